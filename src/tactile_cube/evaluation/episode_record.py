@@ -1,0 +1,138 @@
+"""What happened in one episode, as plain arrays: the one thing that verdicts, pictures and recordings read."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactTable:
+    """Every contact between a finger and the cube, one row each, at the end of a policy step.
+
+    Attributes:
+        step: sample of the episode the row belongs to `(k,)`.
+        finger: 0 ring, 1 middle, 2 fore, 3 thumb `(k,)`.
+        position: where the finger touches the cube, world frame `(k, 3)` [m].
+        force: contact force on the cube, friction included, world frame `(k, 3)` [N].
+        normal_force: its part along the contact normal `(k,)` [N].
+        distance: separation of the shapes, negative when they overlap `(k,)` [m].
+    """
+
+    step: NDArray[np.int64]
+    finger: NDArray[np.int64]
+    position: Array
+    force: Array
+    normal_force: Array
+    distance: Array
+
+
+@dataclass(frozen=True)
+class EpisodeRecord:
+    """One episode at the policy's 10 Hz, samples 0 (start) to n (end), with a 500 Hz trace beside it.
+
+    Attributes:
+        time: `(n + 1,)` [s].
+        theta: angle about the vertical, unwrapped, positive in the rewarded direction `(n + 1,)` [rad].
+        joint_position: q, true link angles `(n + 1, 12)` [rad].
+        filtered_target: q_f `(n + 1, 12)` [rad].
+        target: q_n that reached the hand in each step `(n, 12)` [rad].
+        cube_position: `(n + 1, 3)` [m].
+        cube_quaternion: x, y, z, w `(n + 1, 4)`.
+        reward: `(n,)`.
+        reward_terms: each term's contribution `(n,)`.
+        contacts: who touched the cube where.
+        ending: one of `env.OUTCOMES`: "time_limit", "dropped", "left_range", ...
+        direction: +1 or -1: the sense about +z that is rewarded.
+        cube_size: edge lengths `(3,)` [m].
+        constants: what was drawn for this episode and what the run was given (seed, T_s, gravity, ...).
+        trace: signals at the physics rate, each `(m, ...)`, with "time" [s] among them.
+    """
+
+    time: Array
+    theta: Array
+    joint_position: Array
+    filtered_target: Array
+    target: Array
+    cube_position: Array
+    cube_quaternion: Array
+    reward: Array
+    reward_terms: dict[str, Array]
+    contacts: ContactTable
+    ending: str
+    direction: int
+    cube_size: Array
+    constants: dict[str, float | str] = field(default_factory=dict)
+    trace: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def steps(self) -> int:
+        """Number of policy steps."""
+        return len(self.time) - 1
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the episode ended before its time: the cube was lost, or the physics failed."""
+        return self.ending != "time_limit"
+
+    def save(self, path: Path) -> None:
+        """Write the record as one compressed npz file."""
+        arrays: dict[str, NDArray[np.generic]] = {}
+        for name in ARRAY_FIELDS:
+            arrays[name] = getattr(self, name)
+        arrays |= {f"contacts.{name}": getattr(self.contacts, name) for name in CONTACT_FIELDS}
+        arrays |= {f"reward.{name}": value for name, value in self.reward_terms.items()}
+        arrays |= {f"trace.{name}": value for name, value in self.trace.items()}
+        arrays["meta"] = np.array(json.dumps([self.ending, self.direction, self.constants]))
+        np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path: Path) -> EpisodeRecord:
+        """Read a record that `save` wrote.
+
+        Raises:
+            InputError: the file is missing, damaged or not an episode record.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                data = dict(archive)
+            ending, direction, constants = json.loads(str(data["meta"]))
+            contacts = ContactTable(**{name: data[f"contacts.{name}"] for name in CONTACT_FIELDS})
+            return cls(
+                **{name: data[name] for name in ARRAY_FIELDS},
+                reward_terms=_with_prefix(data, "reward."),
+                contacts=contacts,
+                ending=ending,
+                direction=direction,
+                constants=constants,
+                trace=_with_prefix(data, "trace."),
+            )
+        except (OSError, KeyError, ValueError, EOFError) as error:
+            raise InputError(f"{path}: not an episode recorded by evaluate (*.npz): {error}") from error
+
+
+def _with_prefix(data: dict[str, Array], prefix: str) -> dict[str, Array]:
+    return {name.removeprefix(prefix): value for name, value in data.items() if name.startswith(prefix)}
+
+
+CONTACT_FIELDS = tuple(f.name for f in dataclasses.fields(ContactTable))
+ARRAY_FIELDS = (
+    "time",
+    "theta",
+    "joint_position",
+    "filtered_target",
+    "target",
+    "cube_position",
+    "cube_quaternion",
+    "reward",
+    "cube_size",
+)

@@ -1,0 +1,80 @@
+"""Which finger touched which face of the cube, when it let go, and where it landed again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tactile_cube.evaluation.episode_record import EpisodeRecord
+
+FINGERS = ("ring", "middle", "fore", "thumb")
+FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
+TOUCH_FORCE = 0.02
+"""Smallest normal force that counts as touching [N]: a twenty-fifth of the cube's weight."""
+
+
+@dataclass(frozen=True)
+class FingerHistory:
+    """What one finger did in an episode.
+
+    Attributes:
+        lifts: how often it let go of the cube and touched it again later.
+        faces: faces of the cube in the order in which it landed on them; a face stands again after each change.
+    """
+
+    lifts: int
+    faces: tuple[str, ...]
+
+    @property
+    def face_changes(self) -> int:
+        """How often it moved to another side face: what a regrasp is."""
+        return max(len(self.faces) - 1, 0)
+
+
+def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
+    """Return which finger touches the cube at each sample `(n + 1, 4)`."""
+    table = record.contacts
+    result = np.zeros((record.steps + 1, len(FINGERS)), dtype=bool)
+    firm = table.normal_force > TOUCH_FORCE
+    result[table.step[firm], table.finger[firm]] = True
+    return result
+
+
+def touched_faces(record: EpisodeRecord) -> NDArray[np.int64]:
+    """Return the face of each contact row `(k,)`: an index into `FACES`, in the cube's own frame."""
+    table = record.contacts
+    orientation = Rotation.from_quat(record.cube_quaternion[table.step]) if len(table.step) else None
+    if orientation is None:
+        return np.zeros(0, dtype=np.int64)
+    local = orientation.inv().apply(table.position - record.cube_position[table.step])
+    scaled = local / (record.cube_size / 2)
+    axis = np.argmax(np.abs(scaled), axis=1)
+    negative = scaled[np.arange(len(axis)), axis] < 0
+    return np.asarray(2 * axis + negative, dtype=np.int64)
+
+
+def finger_history(record: EpisodeRecord, finger: int) -> FingerHistory:
+    """Follow one finger through the episode."""
+    contact = touching(record)[:, finger]
+    landed = np.flatnonzero(contact[1:] & ~contact[:-1]) + 1
+    lifts = sum(1 for sample in landed if contact[:sample].any())
+    table = record.contacts
+    mine = (table.finger == finger) & (table.normal_force > TOUCH_FORCE)
+    return FingerHistory(int(lifts), _face_sequence(table.step[mine], touched_faces(record)[mine]))
+
+
+def _face_sequence(steps: NDArray[np.int64], faces: NDArray[np.int64]) -> tuple[str, ...]:
+    """Return side faces in order of landing; an edge touches two faces at once, so a face must hold for two samples."""
+    per_step: dict[int, set[int]] = {}
+    for step, face in zip(steps.tolist(), faces.tolist(), strict=True):
+        if face < 4:
+            per_step.setdefault(step, set()).add(face)
+    sequence: list[int] = []
+    for step in sorted(per_step):
+        settled = per_step[step] & per_step.get(step + 1, set())
+        if len(settled) == 1 and (not sequence or settled != {sequence[-1]}):
+            sequence.extend(settled)
+    return tuple(FACES[face] for face in sequence)

@@ -1,0 +1,113 @@
+"""One word for what an episode was, with the numbers it rests on."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.exploits import exploits, tilt
+from tactile_cube.evaluation.touch import FINGERS, finger_history
+
+REGRASP_ANGLE = 2.0
+"""Final angle beyond which four fingers that never let go cannot have turned the cube [rad].
+
+Source: all four tips in contact reach about -49..+52 deg of yaw (1.76 rad from end to end), measured on this hand.
+"""
+STILL_ANGLE = 0.5
+"""Below this final angle the cube counts as held, not turned [rad]."""
+REGRASP_FACE_CHANGES = 2
+"""Moves of a finger to another side face that a regrasping episode shows at least."""
+
+
+class Verdict(StrEnum):
+    """What an episode was.
+
+    - `regrasping`: kept the cube, turned it beyond `REGRASP_ANGLE`, and fingers moved to new faces at least
+      `REGRASP_FACE_CHANGES` times.
+    - `holding`: kept the cube and turned it by less than `STILL_ANGLE`.
+    - `stuck_twisted`: kept the cube and turned it, without regrasping: the paper's failure (a).
+    - `spun_and_dropped`: lost the cube after turning it by more than `STILL_ANGLE` without regrasping: failure (c).
+    - `dropped`: lost the cube in any other way, be it before turning it or after regrasps.
+    """
+
+    REGRASPING = "regrasping"
+    HOLDING = "holding"
+    STUCK_TWISTED = "stuck_twisted"
+    SPUN_AND_DROPPED = "spun_and_dropped"
+    DROPPED = "dropped"
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """The row of one episode in the results table.
+
+    Attributes:
+        episode: its number.
+        seed: what its start, noise and randomisation were drawn from.
+        final_angle: theta at the end, less theta at the start [rad].
+        duration: time until the end [s].
+        ending: why it ended.
+        verdict: what it was.
+        finger_lifts: how often each finger let go and touched again, ring to thumb.
+        face_changes: how often each finger moved to another side face, ring to thumb.
+        faces_visited: different side faces each finger has stood on, ring to thumb.
+        max_tilt: largest tilt of the cube [rad].
+        episode_return: sum of the rewards.
+        exploits: names of physical exploits found; empty when the turning is honest.
+    """
+
+    episode: int
+    seed: int
+    final_angle: float
+    duration: float
+    ending: str
+    verdict: Verdict
+    finger_lifts: tuple[int, ...]
+    face_changes: tuple[int, ...]
+    faces_visited: tuple[int, ...]
+    max_tilt: float
+    episode_return: float
+    exploits: tuple[str, ...]
+
+    @property
+    def kept(self) -> bool:
+        """Whether the cube was still in the hand at the end."""
+        return self.ending == "time_limit"
+
+    def as_dict(self) -> dict[str, object]:
+        """Return plain data for JSON."""
+        return asdict(self)
+
+
+def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResult:
+    """Reduce an episode to its row."""
+    histories = [finger_history(record, finger) for finger in range(len(FINGERS))]
+    angle = float(record.theta[-1] - record.theta[0])
+    changes = tuple(history.face_changes for history in histories)
+    return EpisodeResult(
+        episode=episode,
+        seed=seed,
+        final_angle=angle,
+        duration=float(record.time[-1] - record.time[0]),
+        ending=record.ending,
+        verdict=verdict(angle, sum(changes), lost=record.cut_short),
+        finger_lifts=tuple(history.lifts for history in histories),
+        face_changes=changes,
+        faces_visited=tuple(len(set(history.faces)) for history in histories),
+        max_tilt=float(np.max(tilt(record))),
+        episode_return=float(np.sum(record.reward)),
+        exploits=tuple(exploits(record)),
+    )
+
+
+def verdict(final_angle: float, face_changes: int, *, lost: bool) -> Verdict:
+    """Apply the definitions of `Verdict`."""
+    regrasped = face_changes >= REGRASP_FACE_CHANGES
+    if lost:
+        return Verdict.SPUN_AND_DROPPED if final_angle > STILL_ANGLE and not regrasped else Verdict.DROPPED
+    if final_angle > REGRASP_ANGLE and regrasped:
+        return Verdict.REGRASPING
+    return Verdict.HOLDING if final_angle < STILL_ANGLE else Verdict.STUCK_TWISTED

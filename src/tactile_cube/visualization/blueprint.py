@@ -1,0 +1,49 @@
+"""Which views open when a recorded episode is opened in the Rerun viewer."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from tactile_cube.evaluation.touch import FINGERS
+
+TIMELINE = "time"
+COLLISION_SHAPES = "- /hand/dlr_hand2/collision_geometries/**"
+"""Rerun's URDF importer logs them beside the visual ones; seen together they flicker."""
+LEGEND = rrb.PlotLegend(corner="LeftTop")
+
+
+def episode_blueprint() -> rrb.Blueprint:
+    """Return the layout: the hand in 3D on the left, the task's signals and the 500 Hz joint signals on the right."""
+    hand = rrb.Spatial3DView(
+        name="Hand and cube",
+        origin="/",
+        contents=["/hand/**", COLLISION_SHAPES, "/cube/**", "/contacts/**", "/support/**"],
+        eye_controls=rrb.EyeControls3D(position=(0.30, -0.34, -0.10), look_target=(0.0, 0.0, 0.04), eye_up=(0, 0, 1)),
+        line_grid=False,
+    )
+    task = rrb.Tabs(
+        rrb.Vertical(
+            rrb.TimeSeriesView(name="theta [rad]", origin="/task/theta"),
+            rrb.TimeSeriesView(name="reward terms", origin="/task/reward", plot_legend=LEGEND),
+            rrb.TimeSeriesView(name="normal force of each finger [N]", origin="/task/force", plot_legend=LEGEND),
+        ),
+        rrb.TimeSeriesView(name="curriculum: T_s [s], gravity", origin="/curriculum"),
+        rrb.TextDocumentView(name="Episode", origin="/episode"),
+    )
+    joints = rrb.Tabs(*(_finger_view(finger) for finger in FINGERS), name="Joints at the physics rate")
+    return rrb.Blueprint(
+        rrb.Horizontal(hand, rrb.Vertical(task, joints), column_shares=[5, 4]),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+    )
+
+
+def _finger_view(finger: str) -> rrb.Container:
+    angles = rrb.TimeSeriesView(
+        name=f"{finger}: q_d, q_m, q [rad]",
+        origin=f"/joints/{finger}",
+        contents=["$origin/q", "$origin/q_m", "$origin/q_d"],
+    )
+    torques = rrb.TimeSeriesView(name=f"{finger}: torque [N m]", origin=f"/joints/{finger}/torque")
+    return rrb.Vertical(angles, torques, name=finger)

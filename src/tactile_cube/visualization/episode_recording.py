@@ -1,0 +1,161 @@
+"""An episode as a Rerun recording: hand, cube and contacts in 3D, the task at 10 Hz, the joints at 500 Hz."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+from rerun.urdf import UrdfTree
+from scipy.spatial.transform import Rotation
+
+from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
+from tactile_cube.evaluation.touch import FINGERS, TOUCH_FORCE
+from tactile_cube.hand import DLR_HAND2, HandModel, hand_urdf
+from tactile_cube.visualization.blueprint import TIMELINE, episode_blueprint
+from tactile_cube.visualization.scene import FACE_COLOURS, FACE_NORMALS, STICKER, STICKER_HEIGHT
+
+ARROW_LENGTH = 0.02
+"""Length of a contact arrow [m/N]."""
+POSE_RATE = 50.0
+"""Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
+FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215))
+SIGNALS = {"q": 1.0, "q_m": 0.75, "q_d": 0.45, "torque": 1.0}
+"""Signals at the physics rate, and how bright their lines are."""
+JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255))
+
+
+def write_recording(record: EpisodeRecord, path: Path, hand: HandModel = DLR_HAND2, summary: str = "") -> None:
+    """Write one episode with its blueprint; open it with `rerun FILE.rrd`.
+
+    Args:
+        record: the episode.
+        path: file to write, `.rrd`.
+        hand: the hand that acted.
+        summary: Markdown shown beside the episode.
+    """
+    stream = rr.RecordingStream("tactile_cube", recording_id=path.stem)
+    stream.save(path, default_blueprint=episode_blueprint())
+    _log_hand(stream, record, hand)
+    _log_cube(stream, record)
+    _log_contacts(stream, record)
+    _log_task(stream, record)
+    _log_joints(stream, record)
+    stream.log(
+        "episode", rr.TextDocument(summary or f"ended: {record.ending}", media_type="text/markdown"), static=True
+    )
+    stream.flush()
+    stream.disconnect()
+
+
+def _pose_samples(record: EpisodeRecord) -> tuple[Array, Array, Array, Array]:
+    """Return time, joint angles, cube position and quaternion at about 50 Hz, or at 10 Hz without a trace."""
+    if not record.trace:
+        return record.time, record.joint_position, record.cube_position, record.cube_quaternion
+    time = record.trace["time"]
+    stride = max(1, round(1.0 / (POSE_RATE * float(time[1] - time[0]))))
+    names = ("time", "q", "cube_position", "cube_quaternion")
+    fine, q, position, quaternion = (record.trace[name][::stride] for name in names)
+    return fine, q, position, quaternion
+
+
+def _at(time: Array) -> list[rr.TimeColumn]:
+    return [rr.TimeColumn(TIMELINE, duration=time)]
+
+
+def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: HandModel) -> None:
+    """Log the URDF once and each joint's transform over time, the coupled joint with the angle of its neighbour."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "hand.urdf"
+        file.write_text(hand_urdf(hand), encoding="utf-8")
+        tree = UrdfTree.from_file_path(file, entity_path_prefix="hand", static_transform_entity_path="hand/static")
+        tree.log_urdf_to_recording(stream)
+    orientation = Rotation.from_matrix(hand.rotation).as_quat()
+    root = rr.Transform3D(
+        translation=hand.position,
+        quaternion=rr.Quaternion(xyzw=orientation),
+        parent_frame="tf#/",
+        child_frame=tree.root_link().name,
+    )
+    stream.log("hand/pose", root, static=True)
+    time, q, _, _ = _pose_samples(record)
+    columns = {name: index for index, name in enumerate(hand.joint_names)}
+    for joint in tree.joints():
+        actuated = joint.name.replace("_q4", "_q3")
+        if actuated in columns:
+            transform = joint.compute_transform_columns(q[:, columns[actuated]].tolist(), clamp=False)
+            stream.send_columns(f"hand/joint_transforms/{joint.name}", _at(time), transform)
+
+
+def _log_cube(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
+    """Log the cube with one colour a face, and its pose over time."""
+    normals = np.array(list(FACE_NORMALS.values()), dtype=np.float64)
+    half = record.cube_size / 2
+    stickers = np.where(np.abs(normals) == 1, STICKER_HEIGHT, STICKER * half)
+    colours = [tuple(round(255 * part) for part in colour) for colour in FACE_COLOURS.values()]
+    boxes = rr.Boxes3D(
+        centers=np.vstack([np.zeros((1, 3)), normals * half]),
+        half_sizes=np.vstack([half[None], stickers]),
+        colors=[(40, 40, 40), *colours],
+        fill_mode="solid",
+    )
+    stream.log("cube", boxes, static=True)
+    time, _, position, quaternion = _pose_samples(record)
+    stream.send_columns("cube", _at(time), rr.Transform3D.columns(translation=position, quaternion=quaternion))
+
+
+def _log_contacts(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
+    """Log the contact forces on the cube as arrows, all fingers in their colour, at the policy's rate."""
+    table = record.contacts
+    for sample, time in enumerate(record.time.tolist()):
+        rows = (table.step == sample) & (table.normal_force > TOUCH_FORCE)
+        stream.set_time(TIMELINE, duration=time)
+        # The arrow ends where the finger pushes: it stands outside the cube and can be seen.
+        vectors = ARROW_LENGTH * table.force[rows]
+        arrows = rr.Arrows3D(
+            origins=table.position[rows] - vectors,
+            vectors=vectors,
+            colors=[FINGER_COLOURS[finger] for finger in table.finger[rows].tolist()],
+            radii=0.0012,
+        )
+        stream.log("contacts", arrows)
+    stream.reset_time()
+
+
+def _log_task(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
+    _send(stream, "task/theta", record.time, record.theta, ["theta"])
+    forces = np.zeros((record.steps + 1, len(FINGERS)))
+    np.add.at(forces, (record.contacts.step, record.contacts.finger), record.contacts.normal_force)
+    _send(stream, "task/force", record.time, forces, list(FINGERS))
+    for name, values in record.reward_terms.items():
+        _send(stream, f"task/reward/{name}", record.time[1:], values, [name])
+    _send(stream, "task/reward/sum", record.time[1:], record.reward, ["sum"])
+    for name, value in record.constants.items():
+        if name in ("filter_time", "gravity_scale"):
+            _send(stream, f"curriculum/{name}", record.time, np.full(record.steps + 1, value), [name])
+
+
+def _log_joints(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
+    """Send the joint signals of each finger at the physics rate in one piece each."""
+    for index, finger in enumerate(FINGERS):
+        mine = slice(3 * index, 3 * index + 3)
+        for signal in SIGNALS:
+            if signal in record.trace:
+                names = [f"{signal} of q{joint}" for joint in (1, 2, 3)]
+                _send(stream, f"joints/{finger}/{signal}", record.trace["time"], record.trace[signal][:, mine], names)
+        _send(
+            stream,
+            f"joints/{finger}/q_n",
+            record.time[:-1],
+            record.target[:, mine],
+            [f"q_n of q{joint}" for joint in (1, 2, 3)],
+        )
+
+
+def _send(
+    stream: rr.RecordingStream, entity: str, time: Array, values: NDArray[np.generic] | Array, names: list[str]
+) -> None:
+    stream.log(entity, rr.SeriesLines(names=names), static=True)
+    stream.send_columns(entity, _at(time), rr.Scalars.columns(scalars=values))

@@ -1,0 +1,83 @@
+"""A small film of an episode, and a sheet of stills on which a person can check the regrasps."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.touch import FINGERS, touching
+from tactile_cube.visualization.scene import BELOW, SIDE, Scene
+
+MAX_BYTES = 3_000_000
+MAX_FRAMES = 100
+CAPTION_HEIGHT = 22
+TOUCH, FREE = (40, 160, 70), (205, 205, 205)
+
+
+def write_film(record: EpisodeRecord, path: Path, *, view: int = 256) -> None:
+    """Write an animated GIF: the hand from the side and from below, in real time, at most 3 MB.
+
+    Args:
+        record: the episode.
+        path: file to write, `.gif`.
+        view: edge of each of the two pictures [pixels].
+    """
+    stride = max(2, -(-record.steps // MAX_FRAMES))
+    samples = list(range(0, record.steps + 1, stride))
+    frames = _frames(record, samples, view)
+    duration = float(record.time[1] - record.time[0]) * stride
+    for colours in (96, 48, 24):
+        _save_gif(frames, path, duration, colours)
+        if path.stat().st_size <= MAX_BYTES:
+            return
+    _save_gif([frame.resize((frame.width * 2 // 3, frame.height * 2 // 3)) for frame in frames], path, duration, 24)
+
+
+def write_stills(record: EpisodeRecord, path: Path, *, every: int = 5, columns: int = 6, view: int = 160) -> None:
+    """Write a PNG sheet with one pair of pictures every `every` policy steps, read row by row."""
+    frames = _frames(record, list(range(0, record.steps + 1, every)), view)
+    width, height = frames[0].size
+    rows = -(-len(frames) // columns)
+    sheet = Image.new("RGB", (columns * width, rows * height), "white")
+    for index, frame in enumerate(frames):
+        sheet.paste(frame, ((index % columns) * width, (index // columns) * height))
+    sheet.save(path, optimize=True)
+
+
+def _frames(record: EpisodeRecord, samples: list[int], view: int) -> list[Image.Image]:
+    contact = touching(record)
+    frames = []
+    with closing(Scene(record.cube_size)) as scene:
+        for sample in samples:
+            scene.pose(record.joint_position[sample], record.cube_position[sample], record.cube_quaternion[sample])
+            frame = Image.new("RGB", (2 * view, view + CAPTION_HEIGHT), "white")
+            frame.paste(scene.picture(SIDE, view, view), (0, CAPTION_HEIGHT))
+            frame.paste(scene.picture(BELOW, view, view), (view, CAPTION_HEIGHT))
+            angle = record.theta[sample] - record.theta[0]
+            _caption(frame, float(record.time[sample]), float(angle), contact[sample].tolist())
+            frames.append(frame)
+    return frames
+
+
+def _caption(frame: Image.Image, time: float, angle: float, contact: list[bool]) -> None:
+    """Write time and angle, and a lamp for each finger: green while it touches the cube."""
+    draw = ImageDraw.Draw(frame)
+    draw.text((4, 5), f"{time:4.1f} s  {np.degrees(angle):5.0f} deg", fill="black")
+    spacing = frame.width // 2 // len(FINGERS)
+    for index, (finger, on) in enumerate(zip(FINGERS, contact, strict=True)):
+        left = frame.width // 2 + index * spacing
+        draw.rectangle((left, 3, left + spacing - 3, CAPTION_HEIGHT - 3), fill=TOUCH if on else FREE)
+        draw.text((left + 3, 5), finger[:6], fill="white" if on else "black")
+
+
+def _save_gif(frames: list[Image.Image], path: Path, duration: float, colours: int) -> None:
+    """Save with one palette for all frames, so that nothing flickers."""
+    palette = frames[len(frames) // 2].quantize(colours)
+    indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    indexed[0].save(
+        path, save_all=True, append_images=indexed[1:], duration=round(1000 * duration), loop=0, optimize=False
+    )
