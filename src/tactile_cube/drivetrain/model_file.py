@@ -1,0 +1,124 @@
+"""The one file that says what was identified: values, intervals, effects, provenance and errors, as plain YAML."""
+
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from tactile_cube.drivetrain.plain_yaml import read_schema
+
+
+class _Strict(BaseModel):
+    """Unknown keys are refused: a misspelt key must not silently change nothing."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Estimate(_Strict):
+    """A value with its 95 % interval; `low` and `high` equal `value` where nothing was estimated."""
+
+    value: float
+    low: float
+    high: float
+    unit: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_number(cls, data: Any) -> Any:
+        if isinstance(data, int | float | str):
+            return {"value": data, "low": data, "high": data}
+        return data
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Estimate":
+        if not self.low <= self.value <= self.high:
+            raise ValueError(f"the interval [{self.low:g}, {self.high:g}] does not hold the value {self.value:g}")
+        return self
+
+
+class EffectEstimate(_Strict):
+    """One effect, `NAME@JOINT` (or `NAME` alone for an effect of the object), and its parameters."""
+
+    effect: str
+    parameters: dict[str, Estimate] = Field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue, or the dotted path of a user's own effect."""
+        return self.effect.partition("@")[0]
+
+    @property
+    def joint(self) -> str | None:
+        """The joint it acts on; None for an effect of the object."""
+        return self.effect.partition("@")[2] or None
+
+
+class Provenance(_Strict):
+    """Where the values come from."""
+
+    recording: str = ""
+    command: str = ""
+    created: str = ""
+    version: str = ""
+    seed: int | None = None
+    trials: list[str] = Field(default_factory=list)
+    held_out: list[str] = Field(default_factory=list)
+
+
+class ModelErrors(_Strict):
+    """RMS position error [rad] on held-out trials at each stage; `joints` maps a stage to joint -> error."""
+
+    nominal: float | None = None
+    refitted: float | None = None
+    with_effects: float | None = None
+    noise_floor: float | None = None
+    joints: dict[str, dict[str, float]] = Field(default_factory=dict)
+
+
+class ModelFile(_Strict):
+    """An identified model.
+
+    Attributes:
+        rig: name of the URDF that was identified.
+        joints: actuated joints in column order.
+        values: parameter -> joint -> estimate; parameters are kp [N m/rad], kd [N m s/rad], torque_limit [N m],
+            stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2].
+        effects: what had to be added to the plain drivetrain.
+        offsets: joint -> offset of the joint's zero [rad]; the interval spans the robot initialisations.
+        provenance: recording, command, version, seed, trials.
+        errors: RMS position errors [rad] before and after.
+    """
+
+    format: Literal[1] = 1
+    rig: str = ""
+    joints: list[str]
+    values: dict[str, dict[str, Estimate]] = Field(default_factory=dict)
+    effects: list[EffectEstimate] = Field(default_factory=list)
+    offsets: dict[str, Estimate] = Field(default_factory=dict)
+    provenance: Provenance = Field(default_factory=Provenance)
+    errors: ModelErrors = Field(default_factory=ModelErrors)
+
+    @model_validator(mode="after")
+    def _known_joints(self) -> "ModelFile":
+        named = {joint: f"values.{key}" for key, joints in self.values.items() for joint in joints}
+        named |= dict.fromkeys(self.offsets, "offsets")
+        named |= {effect.joint: f"effects {effect.effect}" for effect in self.effects if effect.joint}
+        for joint, key in named.items():
+            if joint not in self.joints:
+                raise ValueError(f"{key} names joint '{joint}', which is not among joints {self.joints}")
+        return self
+
+
+def read_model(path: str | Path) -> ModelFile:
+    """The model in a YAML file.
+
+    Raises:
+        InputError: naming the file, the key and the value received.
+    """
+    return read_schema(Path(path), ModelFile)
+
+
+def write_model(model: ModelFile, path: str | Path) -> None:
+    """Write `model` as plain YAML, keys in the order of the schema."""
+    Path(path).write_text(yaml.safe_dump(model.model_dump(), sort_keys=False), encoding="utf-8")

@@ -1,0 +1,140 @@
+"""What recording.yaml may say: the rig, its controller, the values its owner believes, and the trials."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0)]
+PerJoint = float | list[float] | dict[str, float]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class Coupling(_Strict):
+    """A joint that follows another one: q = ratio * q_joint + offset."""
+
+    joint: str
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
+class Controller(_Strict):
+    """The impedance controller: torque = kp (q_d - q_m) - kd dq, clipped to +-torque_limit.
+
+    Attributes:
+        kp: [N m/rad], a number for all joints or one per joint.
+        kd: [N m s/rad].
+        torque_limit: [N m].
+        mode: `position` (commands are angles) or `torque` (commands are torques [N m]; kp and kd are not used).
+    """
+
+    kp: PerJoint = 0.0
+    kd: PerJoint = 0.0
+    torque_limit: PerJoint = float("inf")
+    mode: Literal["position", "torque"] = "position"
+
+
+class ControllerChange(_Strict):
+    """What one trial's controller does differently from the recording's."""
+
+    kp: PerJoint | None = None
+    kd: PerJoint | None = None
+    torque_limit: PerJoint | None = None
+
+
+class Sensors(_Strict):
+    """What is known of the sensors: resolution and standard deviation of the position [rad], of the torque [N m]."""
+
+    position_resolution: NotNegative = 0.0
+    position_noise: NotNegative = 0.0
+    torque_resolution: NotNegative = 0.0
+    torque_noise: NotNegative = 0.0
+
+
+class KnownForce(_Strict):
+    """A force of known size on a link, as a weight or a spring balance gives it.
+
+    Attributes:
+        link: name of the link in the URDF.
+        point: where it acts, in the link's frame [m].
+        vector: force in the rig's base frame [N].
+    """
+
+    link: str
+    point: Annotated[list[float], Field(min_length=3, max_length=3)]
+    vector: Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class TrialEntry(_Strict):
+    """One trial: its file, the robot initialisation it belongs to and the kind of excitation.
+
+    Attributes:
+        file: Parquet, CSV or NPZ file inside the recording's folder.
+        initialisation: a new initialisation of the robot brings new joint offsets.
+        kind: trials of the same kind repeat one command.
+        controller: gains of this trial where they differ from the recording's.
+        force: a known force on a static finger (bench test of kp).
+        clamped: the links are held still (bench test of the drive stiffness).
+        note: free text.
+    """
+
+    file: str
+    initialisation: int = 0
+    kind: str = "unspecified"
+    controller: ControllerChange | None = None
+    force: KnownForce | None = None
+    clamped: bool = False
+    note: str = ""
+
+
+class Description(_Strict):
+    """The content of recording.yaml.
+
+    Attributes:
+        rig: URDF file.
+        gravity: in the rig's base frame [m/s^2].
+        rate_hz: samples per second.
+        joints: actuated joints in column order.
+        coupled: joints that follow another one.
+        nominal: what the owner believes: stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2], ...
+        source: where the data come from, free text.
+    """
+
+    format: Literal[1]
+    rig: str = "rig.urdf"
+    gravity: Annotated[list[float], Field(min_length=3, max_length=3)]
+    rate_hz: Positive
+    joints: Annotated[list[str], Field(min_length=1)]
+    coupled: dict[str, Coupling] = Field(default_factory=dict)
+    controller: Controller
+    nominal: dict[str, PerJoint] = Field(default_factory=dict)
+    sensors: Sensors = Field(default_factory=Sensors)
+    trials: Annotated[list[TrialEntry], Field(min_length=1)]
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _joints_once(self) -> "Description":
+        twice = {joint for joint in self.joints if self.joints.count(joint) > 1}
+        if twice:
+            raise ValueError(f"joints names {sorted(twice)} more than once")
+        return self
+
+
+def per_joint(value: PerJoint, joints: tuple[str, ...], key: str) -> NDArray[np.float64]:
+    """One number per joint, shape (joints,), from a number, a list in joint order or a mapping.
+
+    Raises:
+        ValueError: a list of another length, or a mapping that lacks a joint or names another one.
+    """
+    if isinstance(value, dict):
+        if set(value) != set(joints):
+            raise ValueError(f"key '{key}': expected one number for each of {list(joints)}, received {value}")
+        value = [value[joint] for joint in joints]
+    if isinstance(value, list) and len(value) != len(joints):
+        raise ValueError(f"key '{key}': expected one number for all joints or {len(joints)}, received {value}")
+    return np.broadcast_to(np.asarray(value, dtype=np.float64), (len(joints),)).copy()

@@ -1,0 +1,65 @@
+"""What a recording's URDF says of its joints: names, limits, couplings."""
+
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+from tactile_cube.errors import InputError
+
+MOVABLE = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class RigJoint:
+    """One movable joint of a URDF: limits [rad] (infinite where it has none) and the joint it mimics."""
+
+    name: str
+    lower: float
+    upper: float
+    mimics: str | None
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The mechanism of a recording.
+
+    Attributes:
+        text: the URDF.
+        path: the file it was read from.
+        joints: movable joints by name.
+    """
+
+    text: str
+    path: Path
+    joints: dict[str, RigJoint]
+
+
+def read_rig(path: Path) -> Rig:
+    """The URDF at `path`.
+
+    Raises:
+        InputError: the file is missing, no XML, or no robot with a movable joint.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        root = ElementTree.fromstring(text)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; recording.yaml names it under 'rig'") from None
+    except (ElementTree.ParseError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a URDF: {error}") from None
+    joints = {joint.name: joint for joint in map(_joint, root.iter("joint")) if joint is not None}
+    if root.tag != "robot" or not joints:
+        raise InputError(f"{path}: not a URDF with movable joints (root element <{root.tag}>)")
+    return Rig(text, path, joints)
+
+
+def _joint(element: ElementTree.Element) -> RigJoint | None:
+    kind = element.get("type", "")
+    if kind not in MOVABLE:
+        return None
+    limit, mimic = element.find("limit"), element.find("mimic")
+    bounded = limit is not None and kind != "continuous"
+    lower = float(limit.get("lower", "-inf")) if bounded and limit is not None else -math.inf
+    upper = float(limit.get("upper", "inf")) if bounded and limit is not None else math.inf
+    return RigJoint(element.get("name", ""), lower, upper, mimic.get("joint") if mimic is not None else None)

@@ -1,0 +1,73 @@
+"""One trial on a uniform time grid: what was commanded and what was measured."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.description import KnownForce
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Controller of one trial: kp [N m/rad], kd [N m s/rad], torque_limit [N m], each of shape (joints,)."""
+
+    kp: Array
+    kd: Array
+    torque_limit: Array
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial; `position[k]` is read at `time[k]`, `command[k]` acts from `time[k]` to `time[k + 1]`.
+
+    Attributes:
+        name: file name without its ending.
+        file: path inside the recording's folder.
+        kind: kind of excitation; trials of one kind repeat one command.
+        initialisation: robot initialisation it belongs to; each has joint offsets of its own.
+        time: (n,) uniform, starts at 0 [s].
+        command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
+        position: (n, joints) measured position, on the motor side [rad].
+        torque: (n, joints) measured torque [N m], or None.
+        valid: (n,) False where a dropped sample was interpolated; such samples count in no error.
+        gains: the controller in this trial.
+        force: a known force on a link, or None.
+        clamped: the links were held still.
+    """
+
+    name: str
+    file: str
+    kind: str
+    initialisation: int
+    time: Array
+    command: Array
+    position: Array
+    torque: Array | None
+    valid: NDArray[np.bool_]
+    gains: Gains
+    force: KnownForce | None = None
+    clamped: bool = False
+    warnings: tuple[str, ...] = field(default=(), repr=False)
+
+    @property
+    def step(self) -> float:
+        """Time between samples [s]."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def duration(self) -> float:
+        """Length of the trial [s]."""
+        return float(self.time[-1])
+
+    def velocity(self, window: float = 0.03) -> Array:
+        """Measured velocity (n, joints) [rad/s]: slope of a straight line through a sliding window [s].
+
+        The window keeps quantisation out; a recording's sensor gives no velocity of its own.
+        """
+        half = max(1, min(round(0.5 * window / self.step), (len(self.time) - 1) // 2))
+        lever = np.arange(-half, half + 1) / self.step / np.sum(np.arange(-half, half + 1) ** 2)
+        padded = np.pad(self.position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+        return np.stack([np.convolve(column, lever[::-1], mode="valid") for column in padded.T], axis=1)
