@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
 from scipy.spatial.transform import Rotation
 
@@ -22,6 +23,7 @@ ARROW_LENGTH = 0.02
 POSE_RATE = 50.0
 """Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
 FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215))
+SHAPES = {"box": rr.Boxes3D, "cylinder": rr.Cylinders3D, "sphere": rr.Ellipsoids3D}
 SIGNALS = {"q": 1.0, "q_m": 0.75, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
 JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255))
@@ -67,11 +69,13 @@ def _at(time: Array) -> list[rr.TimeColumn]:
 
 def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: HandModel) -> None:
     """Log the URDF once and each joint's transform over time, the coupled joint with the angle of its neighbour."""
+    urdf = hand_urdf(hand)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "hand.urdf"
-        file.write_text(hand_urdf(hand), encoding="utf-8")
+        file.write_text(urdf, encoding="utf-8")
         tree = UrdfTree.from_file_path(file, entity_path_prefix="hand", static_transform_entity_path="hand/static")
         tree.log_urdf_to_recording(stream)
+    _fill_shapes(stream, tree, urdf)
     orientation = Rotation.from_matrix(hand.rotation).as_quat()
     root = rr.Transform3D(
         translation=hand.position,
@@ -87,6 +91,15 @@ def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: HandModel
         if actuated in columns:
             transform = joint.compute_transform_columns(q[:, columns[actuated]].tolist(), clamp=False)
             stream.send_columns(f"hand/joint_transforms/{joint.name}", _at(time), transform)
+
+
+def _fill_shapes(stream: rr.RecordingStream, tree: UrdfTree, urdf: str) -> None:
+    """Draw the links solid; the importer draws cylinders, spheres and boxes as translucent wire frames."""
+    for link in ElementTree.fromstring(urdf).iter("link"):
+        paths = tree.get_visual_geometry_paths(str(link.get("name")))
+        for path, visual in zip(paths, link.findall("visual"), strict=True):
+            shape = next(archetype for tag, archetype in SHAPES.items() if visual.find(f"geometry/{tag}") is not None)
+            stream.log(path, shape.from_fields(fill_mode="solid"), static=True)
 
 
 def _log_cube(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
@@ -128,7 +141,7 @@ def _log_task(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     _send(stream, "task/theta", record.time, record.theta, ["theta"])
     forces = np.zeros((record.steps + 1, len(FINGERS)))
     np.add.at(forces, (record.contacts.step, record.contacts.finger), record.contacts.normal_force)
-    _send(stream, "task/force", record.time, forces, list(FINGERS))
+    _send(stream, "task/force", record.time, forces, list(FINGERS), FINGER_COLOURS)
     for name, values in record.reward_terms.items():
         _send(stream, f"task/reward/{name}", record.time[1:], values, [name])
     _send(stream, "task/reward/sum", record.time[1:], record.reward, ["sum"])
@@ -141,21 +154,26 @@ def _log_joints(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     """Send the joint signals of each finger at the physics rate in one piece each."""
     for index, finger in enumerate(FINGERS):
         mine = slice(3 * index, 3 * index + 3)
-        for signal in SIGNALS:
+        entity = f"joints/{finger}"
+        for signal, brightness in SIGNALS.items():
             if signal in record.trace:
-                names = [f"{signal} of q{joint}" for joint in (1, 2, 3)]
-                _send(stream, f"joints/{finger}/{signal}", record.trace["time"], record.trace[signal][:, mine], names)
-        _send(
-            stream,
-            f"joints/{finger}/q_n",
-            record.time[:-1],
-            record.target[:, mine],
-            [f"q_n of q{joint}" for joint in (1, 2, 3)],
-        )
+                colours = [tuple(round(brightness * part) for part in colour) for colour in JOINT_COLOURS]
+                time, values = record.trace["time"], record.trace[signal][:, mine]
+                _send(stream, f"{entity}/{signal}", time, values, _joint_labels(signal), colours)
+        _send(stream, f"{entity}/q_n", record.time[:-1], record.target[:, mine], _joint_labels("q_n"))
+
+
+def _joint_labels(signal: str) -> list[str]:
+    return [f"{signal}, joint {joint}" for joint in (1, 2, 3)]
 
 
 def _send(
-    stream: rr.RecordingStream, entity: str, time: Array, values: NDArray[np.generic] | Array, names: list[str]
+    stream: rr.RecordingStream,
+    entity: str,
+    time: Array,
+    values: Array,
+    names: list[str],
+    colours: Sequence[tuple[int, ...]] | None = None,
 ) -> None:
-    stream.log(entity, rr.SeriesLines(names=names), static=True)
+    stream.log(entity, rr.SeriesLines(names=names, colors=colours), static=True)
     stream.send_columns(entity, _at(time), rr.Scalars.columns(scalars=values))
