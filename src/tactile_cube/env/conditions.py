@@ -1,0 +1,28 @@
+"""What changes while learning goes on: filter time, weight of the cube, size of the penalties."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Conditions that an episode starts with and keeps to its end.
+
+    Attributes:
+        filter_time: T_s, time constant of the low-pass that turns q_n into q_f [s].
+        gravity_scale: part of the cube's weight that acts.
+        penalty_scale: factor on the weights of height, plane and tilt.
+    """
+
+    filter_time: float
+    gravity_scale: float
+    penalty_scale: float = 1.0
+
+
+class Curriculum(Protocol):
+    """Gives the conditions for the episodes that start now."""
+
+    def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
+        """Conditions after `environment_steps` with mean final angle `performance` [rad] on the way to `final`."""

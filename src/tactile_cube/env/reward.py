@@ -1,0 +1,89 @@
+"""The reward of one policy step: one function a term, weighed apart from being measured.
+
+The environment puts the measured terms next to the reward, so that a replay can weigh them anew when the weights
+follow a schedule.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.env.cube_pose import CubePose
+from tactile_cube.errors import InputError
+
+REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "leaving")
+"""Names and order of the terms in the key "reward_terms"."""
+
+
+def spin(before: CubePose, after: CubePose, direction: int, limit: float) -> float:
+    """Rotation in the rewarded direction, at most `limit` a step [rad]. Source: paper, section II, and website (clip)."""
+    return min(direction * (after.theta - before.theta), limit)
+
+
+def height(before: CubePose, after: CubePose) -> float:
+    """Vertical motion |d_z| [m]."""
+    return abs(after.z - before.z)
+
+
+def plane(before: CubePose, after: CubePose) -> float:
+    """Horizontal motion |d_xy| [m]."""
+    return math.hypot(after.x - before.x, after.y - before.y)
+
+
+def tilt(before: CubePose, after: CubePose) -> float:
+    """Tilting motion |d_psi| + |d_phi| [rad]."""
+    return abs(after.psi - before.psi) + abs(after.phi - before.phi)
+
+
+def proximal(joint_angles: Sequence[float]) -> float:
+    """Sum over the fingers of q1^4 [rad^4] for joint angles (12,), finger by finger: keeps the fingers from twisting."""
+    return sum(q**4 for q in joint_angles[::3])
+
+
+def leaving(lost: bool) -> float:
+    """1 in the step that ends the episode because the cube was lost, else 0."""
+    return float(lost)
+
+
+@dataclass(frozen=True)
+class Reward:
+    """Weights of the terms, all given as positive numbers. Source: website, table of the reward.
+
+    Attributes:
+        spin: lambda_spin [1/rad].
+        height: lambda_z [1/m].
+        plane: lambda_plane [1/m].
+        tilt: lambda_rot [1/rad].
+        proximal: lambda_proxy [1/rad^4].
+        leaving: penalty for losing the cube (size not published). Must exceed what going on costs, or dropping pays.
+        fastest: rotation above this rate earns nothing more [rad/s].
+    """
+
+    spin: float = 16.0
+    height: float = 100.0
+    plane: float = 300.0
+    tilt: float = 50.0
+    proximal: float = 25.0
+    leaving: float = 10.0
+    fastest: float = 1.0
+
+    def __post_init__(self) -> None:
+        for key in (*REWARD_TERMS, "fastest"):
+            if not (math.isfinite(getattr(self, key)) and getattr(self, key) >= 0.0):
+                raise InputError(
+                    f"reward.{key} is {getattr(self, key)}; give a finite weight >= 0 (signs are built in)"
+                )
+
+    def weights(self, penalty_scale: float = 1.0) -> NDArray[np.float32]:
+        """Signed weights (6,) in the order of REWARD_TERMS: reward = reward_terms @ weights.
+
+        Args:
+            penalty_scale: factor on height, plane and tilt, from the curriculum.
+        """
+        motion = [-penalty_scale * w for w in (self.height, self.plane, self.tilt)]
+        return np.array([self.spin, *motion, -self.proximal, -self.leaving], dtype=np.float32)

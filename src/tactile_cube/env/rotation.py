@@ -1,0 +1,175 @@
+"""The rotation task in one world, at 10 Hz, in plain numpy: every learner's environment is made of this one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.env import reward as terms
+from tactile_cube.env.conditions import Conditions
+from tactile_cube.env.cube_pose import CubePose, cube_pose
+from tactile_cube.env.reward import REWARD_TERMS, Reward
+from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
+from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.randomization import Randomization, StartPoses
+from tactile_cube.simulation import EpisodeConstants, World
+
+Array = NDArray[np.float64]
+
+JOINTS = 12
+OBJECT_STATE = 25
+LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))
+"""Outcomes that end an episode because the cube left the allowed range."""
+
+
+@dataclass(slots=True)
+class Moment:
+    """What the task says after a reset or a policy step.
+
+    Attributes:
+        joint_position: q_m as the policy sees it, before sensor noise `(12,)` [rad].
+        control_error: e_q = q_f - q_m `(12,)` [rad].
+        object_state: what only the critic may see `(25,)`: cube position (3) [m], sin 4theta, cos 4theta, phi, psi,
+            linear velocity (3) [m/s], angular velocity (3) [rad/s], q_f (12) [rad]. Source: paper, section II.
+        theta: rotation since the start in the rewarded direction, unwrapped [rad].
+        reward_terms: the terms before weighing, in the order of REWARD_TERMS `(6,)`.
+        reward: their weighted sum.
+        outcome: index into OUTCOMES; anything but 0 ends the episode.
+        step: policy steps since the start.
+    """
+
+    joint_position: Array
+    control_error: Array
+    object_state: Array
+    theta: float
+    reward_terms: Array
+    reward: float
+    outcome: int
+    step: int
+
+    @property
+    def terminated(self) -> bool:
+        """Whether the cube was lost."""
+        return self.outcome in LOST
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the episode ends for a reason outside the task: the time limit or faulty physics."""
+        return self.outcome in (TIME_LIMIT, FAULTY)
+
+
+class RotationEnv:
+    """One hand, one cube, one episode after the other.
+
+    Every episode draws from a generator of its own, made of the seed, the world's index and the episode's number, so
+    that what happens in it depends on nothing else.
+
+    Example:
+        >>> env = RotationEnv(World(), Task("table"), Reward(), Randomization(), StartStates().of(DLR_HAND2))
+        >>> moment = env.reset()
+        >>> while not (moment.terminated or moment.truncated):
+        ...     moment = env.step(np.zeros(12))
+    """
+
+    def __init__(
+        self,
+        world: World,
+        task: Task,
+        reward: Reward,
+        randomization: Randomization,
+        start: StartPoses,
+        constants: EpisodeConstants | None = None,
+        hand: HandModel = DLR_HAND2,
+    ) -> None:
+        """Puts the task into `world`.
+
+        Args:
+            world: what simulates.
+            task: what to do.
+            reward: weights.
+            randomization: what differs between episodes.
+            start: table of start poses.
+            constants: nominal constants that the randomization varies; None: the published ones.
+            hand: the hand in `world`.
+        """
+        self.world, self.task, self.reward, self.randomization, self.hand = world, task, reward, randomization, hand
+        self.nominal = EpisodeConstants() if constants is None else constants
+        self.start_poses = start
+        self.conditions = task.conditions()
+        self.constants = self.nominal
+        self._middle = 0.5 * (np.asarray(hand.action_lower) + np.asarray(hand.action_upper))
+        self._half_range = 0.5 * (np.asarray(hand.action_upper) - np.asarray(hand.action_lower))
+        self.seed(0)
+
+    def seed(self, seed: int, index: int = 0) -> None:
+        """Starts the count of episodes anew; `index` tells worlds with the same seed apart."""
+        self._seed, self._index, self._episode = seed, index, 0
+
+    def set_conditions(self, conditions: Conditions) -> None:
+        """Conditions of the episodes from the next reset on."""
+        self.conditions = conditions
+
+    def reset(self) -> Moment:
+        """Starts the next episode."""
+        rng = np.random.default_rng([self._seed, self._index, self._episode])
+        self._episode += 1
+        drawn = self.randomization.constants(self.nominal, rng)
+        self.constants = self.task.apply(drawn, self.conditions)
+        self.world.reset(self.constants, self.start_poses.sample(self.randomization, self.constants, rng))
+        self._weights = self.reward.weights(self.conditions.penalty_scale)
+        self._limit = self.reward.fastest * self.world.options.policy_dt
+        self._first = self._pose = cube_pose(self.world.cube_position.tolist(), self.world.cube_quaternion.tolist())
+        self._moment = self._observe(np.zeros(len(REWARD_TERMS)), RUNNING, 0)
+        return self._moment
+
+    def step(self, action: Array) -> Moment:
+        """One policy step of 0.1 s with desired joint angles `action` (12,) in [-1, 1], scaled to the action range.
+
+        Faulty physics ends the episode with the last sound state once more and no reward.
+        """
+        self.world.step(self._middle + self._half_range * action)
+        step = self._moment.step + 1
+        if self.world.healthy:
+            before = self._pose
+            position, quaternion = self.world.cube_position.tolist(), self.world.cube_quaternion.tolist()
+            self._pose = cube_pose(position, quaternion, before.theta)
+            outcome = self.task.outcome(self._first, self._pose, step)
+            moment = self._observe(self._measure(before, self._pose, outcome), outcome, step)
+            if math.isfinite(moment.reward + float(moment.object_state.sum() + moment.joint_position.sum())):
+                self._moment = moment
+                return moment
+        self._moment = self._fault(step)
+        return self._moment
+
+    def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
+        return np.array(
+            (
+                terms.spin(before, after, self.task.direction, self._limit),
+                terms.height(before, after),
+                terms.plane(before, after),
+                terms.tilt(before, after),
+                terms.proximal(self.world.q.tolist()),
+                terms.leaving(outcome in LOST),
+            )
+        )
+
+    def _observe(self, measured: Array, outcome: int, step: int) -> Moment:
+        world, pose = self.world, self._pose
+        q_m, q_f = world.q_m, world.q_f
+        state = np.empty(OBJECT_STATE)
+        state[:7] = (pose.x, pose.y, pose.z, math.sin(4 * pose.theta), math.cos(4 * pose.theta), pose.phi, pose.psi)
+        state[7:10] = world.cube_linear_velocity
+        state[10:13] = world.cube_angular_velocity
+        state[13:] = q_f
+        theta = self.task.direction * (pose.theta - self._first.theta)
+        reward = float(measured @ self._weights)
+        return Moment(np.array(q_m), q_f - q_m, state, theta, measured, reward, outcome, step)
+
+    def _fault(self, step: int) -> Moment:
+        last = self._moment
+        nothing = np.zeros(len(REWARD_TERMS))
+        state = (last.joint_position, last.control_error, last.object_state, last.theta)
+        return Moment(*state, nothing, 0.0, FAULTY, step)

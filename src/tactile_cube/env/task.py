@@ -1,0 +1,85 @@
+"""The task: where the cube may go, how heavy it is, how long an episode lasts."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactile_cube.env.conditions import Conditions
+from tactile_cube.env.cube_pose import CubePose
+from tactile_cube.errors import InputError
+from tactile_cube.simulation import EpisodeConstants
+
+OUTCOMES = ("running", "time_limit", "dropped", "left_range", "tilted", "lifted", "faulty")
+"""What an episode's step can lead to; the key "outcome" is an index into it."""
+
+RUNNING, TIME_LIMIT, DROPPED, LEFT_RANGE, TILTED, LIFTED, FAULTY = range(len(OUTCOMES))
+
+
+@dataclass(frozen=True)
+class Task:
+    """Rotate the cube about the vertical without losing it.
+
+    Attributes:
+        name: "table", "float" or "full"; only a label.
+        filter_time: T_s [s].
+        gravity_scale: part of the cube's weight that acts; float has 0.05. Source: paper, table I.
+        table: whether the cube sits on a table.
+        episode_steps: policy steps until the time limit; 100 first, 200 when fine-tuning. Source: website.
+        direction: sense about +z that is rewarded, +1 or -1.
+        gravity_onset: policy steps at the start in which the cube is weightless. Source: website (less than 0.5 s).
+        plane_range: distance from the start in x and y that ends the episode [m] (size not published).
+        height_range: distance from the start in z that ends the episode [m] (size not published).
+        tilt_limit: angle between the cube's z axis and the vertical that ends the episode [rad]; keeps theta defined.
+    """
+
+    name: str
+    filter_time: float = 0.5
+    gravity_scale: float = 1.0
+    table: bool = False
+    episode_steps: int = 100
+    direction: int = -1
+    gravity_onset: int = 4
+    plane_range: float = 0.035
+    height_range: float = 0.04
+    tilt_limit: float = 0.8
+
+    def __post_init__(self) -> None:
+        for key in ("filter_time", "plane_range", "height_range", "tilt_limit", "episode_steps"):
+            value = getattr(self, key)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"task.{key} is {value}; give a number above 0")
+        for key in ("gravity_scale", "gravity_onset"):
+            if not getattr(self, key) >= 0:
+                raise InputError(f"task.{key} is {getattr(self, key)}; give a number >= 0")
+        if self.direction not in (1, -1):
+            raise InputError(f"task.direction is {self.direction}; give +1 or -1")
+
+    def conditions(self) -> Conditions:
+        """The task's own conditions, which a curriculum ends at."""
+        return Conditions(self.filter_time, self.gravity_scale)
+
+    def apply(self, constants: EpisodeConstants, conditions: Conditions) -> EpisodeConstants:
+        """The constants of an episode of this task: T_s, weight, onset of gravity and table as the task wants them."""
+        return dataclasses.replace(
+            constants,
+            filter_time=conditions.filter_time,
+            gravity_scale=conditions.gravity_scale,
+            gravity_onset=self.gravity_onset,
+            table_height=-0.5 * float(np.asarray(constants.cube_size)[2]) if self.table else None,
+        )
+
+    def outcome(self, start: CubePose, now: CubePose, step: int) -> int:
+        """Index into OUTCOMES for the cube at `now` after `step` policy steps of an episode that began at `start`."""
+        if now.z - start.z < -self.height_range:
+            return DROPPED
+        if max(abs(now.x - start.x), abs(now.y - start.y)) > self.plane_range:
+            return LEFT_RANGE
+        if now.tilt > self.tilt_limit:
+            return TILTED
+        if now.z - start.z > self.height_range:
+            return LIFTED
+        return TIME_LIMIT if step >= self.episode_steps else RUNNING

@@ -1,0 +1,133 @@
+"""Many worlds in one process as one TorchRL environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Bounded, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+from tactile_cube.env.conditions import Conditions, Curriculum
+from tactile_cube.env.reward import REWARD_TERMS
+from tactile_cube.env.rotation import JOINTS, OBJECT_STATE, Moment, RotationEnv
+from tactile_cube.env.task import FAULTY, OUTCOMES
+
+FLOATS = {
+    "joint_position": JOINTS,
+    "control_error": JOINTS,
+    "object_state": OBJECT_STATE,
+    "theta": 1,
+    "reward_terms": len(REWARD_TERMS),
+}
+"""Keys and sizes of the real-valued observations, as Moment describes them."""
+
+
+class WorldsEnv(EnvBase):  # type: ignore[misc]
+    """Rotation tasks side by side, batch size `[worlds]`.
+
+    Keys: "joint_position" (12), "control_error" (12), "object_state" (25), "theta" (1), "reward_terms" (6),
+    "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1), "action" (12), "reward" (1), "done",
+    "terminated", "truncated" (1). Transitions whose "faulty" is true come from broken physics and must not be learned
+    from.
+
+    Example:
+        >>> env = WorldsEnv([RotationEnv(...), RotationEnv(...)])
+        >>> env.rollout(100)["next", "theta"].shape
+        torch.Size([2, 100, 1])
+    """
+
+    def __init__(self, tasks: Sequence[RotationEnv], curriculum: Curriculum | None = None) -> None:
+        """Hosts `tasks`; a `curriculum` changes their conditions as learning goes on (set_progress)."""
+        super().__init__(device="cpu", batch_size=[len(tasks)])
+        self.tasks = list(tasks)
+        self.curriculum = curriculum
+        self._moments: list[Moment] = []
+        self._make_specs()
+        self.set_progress(0, 0.0)
+        self._seed_tasks(0)
+
+    def _make_specs(self) -> None:
+        n = len(self.tasks)
+        spec = Composite({key: Unbounded((n, size)) for key, size in FLOATS.items()}, shape=(n,))
+        spec["episode_step"] = Unbounded((n, 1), dtype=torch.int64)
+        spec["outcome"] = Categorical(len(OUTCOMES), shape=(n, 1), dtype=torch.int64)
+        spec["faulty"] = Categorical(2, shape=(n, 1), dtype=torch.bool)
+        self.observation_spec = spec
+        self.action_spec = Bounded(-1.0, 1.0, (n, JOINTS))
+        self.reward_spec = Unbounded((n, 1))
+        flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
+        self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
+
+    def set_progress(self, environment_steps: int, performance: float) -> dict[str, float]:
+        """Sets the conditions of the episodes that start from now on.
+
+        Args:
+            environment_steps: steps taken so far by all worlds of the training together.
+            performance: mean final angle of recent episodes [rad].
+
+        Returns:
+            The conditions in force, for logs: "T_s" [s], "gravity" and "penalty" (scales).
+        """
+        conditions: Conditions = self.tasks[0].task.conditions()
+        if self.curriculum is not None:
+            conditions = self.curriculum.conditions(environment_steps, performance, conditions)
+        for task in self.tasks:
+            task.set_conditions(conditions)
+        return {
+            "T_s": conditions.filter_time,
+            "gravity": conditions.gravity_scale,
+            "penalty": conditions.penalty_scale,
+        }
+
+    def _set_seed(self, seed: int | None) -> None:
+        """Seeds every world, and torch's global generator, which the transforms draw from."""
+        if seed is None:
+            return
+        torch.manual_seed(seed)
+        self._seed_tasks(seed)
+
+    def _seed_tasks(self, seed: int) -> None:
+        for index, task in enumerate(self.tasks):
+            task.seed(seed, index)
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
+        mask = None if tensordict is None else tensordict.get("_reset", None)
+        chosen = [True] * len(self.tasks) if mask is None or not self._moments else mask.flatten().tolist()
+        self._moments = [
+            task.reset() if start else self._moments[i]
+            for i, (task, start) in enumerate(zip(self.tasks, chosen, strict=True))
+        ]
+        return self._batch(with_reward=False)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        actions = tensordict.get("action").numpy()
+        self._moments = [task.step(action) for task, action in zip(self.tasks, actions, strict=True)]
+        return self._batch(with_reward=True)
+
+    def _batch(self, with_reward: bool) -> TensorDictBase:
+        """All worlds' moments as one tensordict."""
+        moments, n = self._moments, len(self.tasks)
+        data: dict[str, torch.Tensor] = {
+            "joint_position": _rows([m.joint_position for m in moments]),
+            "control_error": _rows([m.control_error for m in moments]),
+            "object_state": _rows([m.object_state for m in moments]),
+            "reward_terms": _rows([m.reward_terms for m in moments]),
+            "theta": _rows([[m.theta] for m in moments]),
+            "episode_step": torch.tensor([[m.step] for m in moments]),
+            "outcome": torch.tensor([[m.outcome] for m in moments]),
+            "faulty": torch.tensor([[m.outcome == FAULTY] for m in moments]),
+            "terminated": torch.tensor([[m.terminated] for m in moments]),
+            "truncated": torch.tensor([[m.truncated] for m in moments]),
+        }
+        data["done"] = data["terminated"] | data["truncated"]
+        if with_reward:
+            data["reward"] = _rows([[m.reward] for m in moments])
+        return TensorDict(data, batch_size=[n])
+
+
+def _rows(rows: Sequence[Any]) -> torch.Tensor:
+    return torch.from_numpy(np.array(rows, dtype=np.float32))

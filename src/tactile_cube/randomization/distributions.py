@@ -1,0 +1,90 @@
+"""Distributions as values: a configuration names them, an episode draws from them.
+
+A distribution is known by its quantile function, so one uniform number drawn anywhere (numpy in a world, torch in a
+transform) becomes one draw.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from tactile_cube.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@runtime_checkable
+class Distribution(Protocol):
+    """A random quantity, given by its quantile function."""
+
+    def quantile(self, u: Array) -> Array:
+        """The values below which the fractions `u` in [0, 1) of all draws lie, same shape as `u`."""
+
+
+def sample(distribution: Distribution, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Array:
+    """Independent draws of `shape`."""
+    return distribution.quantile(rng.random(shape))
+
+
+@dataclass(frozen=True)
+class Constant:
+    """Always `value`."""
+
+    value: float
+
+    def quantile(self, u: Array) -> Array:
+        """`value` in the shape of `u`."""
+        return np.full(np.shape(u), self.value)
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Equally likely everywhere in [low, high)."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.high:
+            raise InputError(f"Uniform: low {self.low} is above high {self.high}; give low <= high")
+
+    def quantile(self, u: Array) -> Array:
+        """Linear between the bounds."""
+        return self.low + (self.high - self.low) * np.asarray(u)
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """Equally likely in every factor: the logarithm is uniform in [log low, log high)."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.low <= self.high:
+            raise InputError(f"LogUniform: needs 0 < low <= high, got low {self.low}, high {self.high}")
+
+    def quantile(self, u: Array) -> Array:
+        """Geometric between the bounds."""
+        return np.asarray(self.low * (self.high / self.low) ** np.asarray(u), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Gaussian with `mean` and standard deviation `std`."""
+
+    mean: float
+    std: float
+
+    def __post_init__(self) -> None:
+        if not self.std >= 0.0:
+            raise InputError(f"Normal: std {self.std} is negative; give a standard deviation >= 0")
+
+    def quantile(self, u: Array) -> Array:
+        """Gaussian quantile; the lowest of 2**53 uniform numbers, 0, becomes the next one so that it stays finite."""
+        return np.asarray(self.mean + self.std * ndtri(np.maximum(u, 2.0**-53)), dtype=np.float64)

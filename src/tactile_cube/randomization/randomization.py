@@ -1,0 +1,85 @@
+"""What differs from episode to episode: physical constants, the start, and the disturbances of sensing and acting."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.randomization.distributions import Constant, Distribution, sample
+from tactile_cube.simulation import EpisodeConstants
+
+Array = NDArray[np.float64]
+
+DRAWN_ONCE = ("cube_size",)
+"""Constants with several numbers that share one draw: a cube stays a cube. All others are drawn per joint."""
+
+FIELDS = tuple(f.name for f in dataclasses.fields(EpisodeConstants))
+
+
+@dataclass(frozen=True)
+class Randomization:
+    """Distributions of everything that an episode draws.
+
+    The three mappings have a field of EpisodeConstants as key; vectors over the joints are drawn joint by joint.
+
+    Attributes:
+        values: what replaces a constant.
+        factors: what multiplies a constant.
+        shifts: what is added to a constant.
+        cube_position: distributions (3,) of the cube's displacement at the start [m].
+        cube_rotation: distributions (3,) of its rotation about x, y, z at the start [rad].
+        start_angles: distribution of each joint's displacement at the start [rad].
+        joint_offset: distribution of each encoder's zero error [rad].
+        sensor_noise: standard deviation of the noise on q_m [rad].
+        sticky_probability: probability that a step repeats the previous action.
+    """
+
+    values: Mapping[str, Distribution] = field(default_factory=dict)
+    factors: Mapping[str, Distribution] = field(default_factory=dict)
+    shifts: Mapping[str, Distribution] = field(default_factory=dict)
+    cube_position: tuple[Distribution, ...] = (Constant(0.0),) * 3
+    cube_rotation: tuple[Distribution, ...] = (Constant(0.0),) * 3
+    start_angles: Distribution = field(default_factory=lambda: Constant(0.0))
+    joint_offset: Distribution = field(default_factory=lambda: Constant(0.0))
+    sensor_noise: float = 0.0
+    sticky_probability: float = 0.0
+
+    def __post_init__(self) -> None:
+        for group in ("values", "factors", "shifts"):
+            for key in getattr(self, group):
+                if key not in FIELDS:
+                    raise InputError(f"randomization.{group}.{key}: no such constant; choose from {', '.join(FIELDS)}")
+        for key in ("cube_position", "cube_rotation"):
+            if len(getattr(self, key)) != 3:
+                raise InputError(f"randomization.{key} has {len(getattr(self, key))} entries; give 3, for x, y, z")
+        if not self.sensor_noise >= 0.0:
+            raise InputError(f"randomization.sensor_noise is {self.sensor_noise}; give a standard deviation >= 0 [rad]")
+        if not 0.0 <= self.sticky_probability < 1.0:
+            raise InputError(f"randomization.sticky_probability is {self.sticky_probability}; give a number in [0, 1)")
+
+    def constants(self, nominal: EpisodeConstants, rng: np.random.Generator) -> EpisodeConstants:
+        """Draws the constants of one episode around `nominal`."""
+        changed: dict[str, Any] = {}
+        for group, combine in ((self.values, _replace), (self.factors, np.multiply), (self.shifts, np.add)):
+            for key, distribution in group.items():
+                value = changed.get(key, getattr(nominal, key))
+                if value is None:
+                    raise InputError(f"randomization of {key}: the nominal value is None, there is nothing to vary")
+                shape = () if key in DRAWN_ONCE else np.shape(value)
+                changed[key] = _plain(combine(value, sample(distribution, rng, shape)))
+        changed["force_seed"] = int(rng.integers(2**31))
+        return dataclasses.replace(nominal, **changed)
+
+
+def _replace(value: Array, drawn: Array) -> Array:
+    return np.broadcast_to(drawn, np.shape(value))
+
+
+def _plain(value: Array) -> Array | float:
+    return float(value) if np.ndim(value) == 0 else np.array(value, dtype=np.float64)

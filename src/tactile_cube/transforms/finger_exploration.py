@@ -1,0 +1,111 @@
+"""Extra exploration that lifts fingers: noise on single joints hardly ever lets go of the cube and grasps it anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor
+from torchrl.data import Categorical, Composite, Unbounded
+from torchrl.envs.transforms import Transform
+
+from tactile_cube.errors import InputError
+from tactile_cube.transforms.partial_reset import reset_mask
+
+GROUPS = torch.tensor(
+    [
+        *[[finger == one for finger in range(4)] for one in range(4)],
+        [True, False, True, False],
+        [False, True, False, True],
+        *[[True] * 4] * 2,
+    ]
+)
+"""Fingers that move together (8, 4): each alone, the opposing pairs ring-fore and middle-thumb, all (twice)."""
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """Extra exploration in a part of the episodes.
+
+    Attributes:
+        episodes: part of the episodes that explore.
+        probability: with which a step of such an episode begins to hold a random target.
+        shortest: fewest steps that a target is held.
+        longest: most steps that it is held.
+    """
+
+    episodes: float = 0.3
+    probability: float = 0.06
+    shortest: int = 2
+    longest: int = 7
+
+    def __post_init__(self) -> None:
+        for key in ("episodes", "probability"):
+            if not 0.0 <= getattr(self, key) <= 1.0:
+                raise InputError(f"exploration.{key} is {getattr(self, key)}; give a number in [0, 1]")
+        if not 1 <= self.shortest <= self.longest:
+            raise InputError(
+                f"exploration holds {self.shortest} to {self.longest} steps; give 1 <= shortest <= longest"
+            )
+
+
+class FingerExploration(Transform):  # type: ignore[misc]
+    """In some episodes a group of fingers holds a random target for a few steps instead of what the policy says.
+
+    Adds "exploring" (1), constant in an episode, so that statistics can leave such episodes out, and "action_taken"
+    (12), the action after this transform: the one that a replay must store. Draws from torch's global generator, the
+    same number of draws at every step.
+
+    Example:
+        >>> env = TransformedEnv(worlds, FingerExploration(Exploration(episodes=0.3)))
+    """
+
+    def __init__(self, exploration: Exploration) -> None:
+        """Explores as `exploration` says."""
+        super().__init__(out_keys=["exploring", "action_taken"])
+        self.settings = exploration
+        self._exploring = self._held = torch.zeros(0)
+        self._target = self._fingers = self._taken = torch.zeros(0)
+
+    def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
+        mask = reset_mask(tensordict, tensordict_reset)
+        worlds = mask.shape[:-1]
+        if self._exploring.shape != mask.shape:
+            self._exploring = torch.zeros_like(mask)
+            self._held = torch.zeros_like(mask, dtype=torch.int64)
+            self._target = torch.zeros(*worlds, 12)
+            self._fingers = torch.zeros(*worlds, 12, dtype=torch.bool)
+            self._taken = torch.zeros(*worlds, 12)
+        self._exploring = torch.where(mask, torch.rand(mask.shape) < self.settings.episodes, self._exploring)
+        self._held = self._held.masked_fill(mask, 0)
+        self._taken = self._taken.masked_fill(mask, 0.0)
+        return self._call(tensordict_reset)
+
+    def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
+        action = tensordict.get("action")
+        self._begin(action.shape[:-1])
+        self._taken = torch.where(self._fingers & (self._held > 0), self._target, action)
+        self._held = (self._held - 1).clamp_min(0)
+        return tensordict.set("action", self._taken)
+
+    def _begin(self, worlds: torch.Size) -> None:
+        """Lets exploring worlds that hold nothing begin to hold, with the probability of a step."""
+        begins = (torch.rand(*worlds, 1) < self.settings.probability) & self._exploring & (self._held == 0)
+        steps = torch.randint(self.settings.shortest, self.settings.longest + 1, (*worlds, 1))
+        fingers = GROUPS[torch.randint(len(GROUPS), worlds)].repeat_interleave(3, dim=-1)
+        target = 2.0 * torch.rand(*worlds, 12) - 1.0
+        self._held = torch.where(begins, steps, self._held)
+        self._fingers = torch.where(begins, fingers, self._fingers)
+        self._target = torch.where(begins, target, self._target)
+
+    def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
+        next_tensordict.set("exploring", self._exploring)
+        return next_tensordict.set("action_taken", self._taken)
+
+    def transform_observation_spec(self, observation_spec: Composite) -> Composite:
+        """Adds the two keys."""
+        worlds = observation_spec.shape
+        observation_spec["exploring"] = Categorical(2, shape=(*worlds, 1), dtype=torch.bool)
+        observation_spec["action_taken"] = Unbounded((*worlds, 12))
+        return observation_spec

@@ -1,0 +1,105 @@
+"""The training environment: worlds and transforms, and the one place that knows the transforms' order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+from torchrl.envs import TransformedEnv
+from torchrl.envs.transforms import Compose, Transform
+
+from tactile_cube.env import Curriculum, Reward, RotationEnv, Task
+from tactile_cube.env.worlds import WorldsEnv
+from tactile_cube.errors import InputError
+from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.randomization import Randomization, StartPoses, StartStates
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
+from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
+from tactile_cube.transforms.joint_offset import JointOffset
+from tactile_cube.transforms.observation_stack import ObservationStack
+from tactile_cube.transforms.privileged_state import PrivilegedState
+from tactile_cube.transforms.sensor_noise import SensorNoise
+from tactile_cube.transforms.sticky_action import StickyAction
+
+
+@dataclass(frozen=True)
+class EnvConfig:
+    """Everything that defines the environment; plain data that can be sent to another process.
+
+    Attributes:
+        task: what to do.
+        reward: weights.
+        randomization: what differs between episodes.
+        start: start poses.
+        exploration: extra exploration in training.
+        curriculum: how conditions change in training; None: they do not.
+        constants: nominal constants, which the task and the randomization change.
+        simulation: numerical options of the world.
+        effects: effects of the drivetrain beyond the basic model.
+        stack: readings in an observation, N_stack.
+    """
+
+    task: Task
+    reward: Reward = field(default_factory=Reward)
+    randomization: Randomization = field(default_factory=Randomization)
+    start: StartStates = field(default_factory=StartStates)
+    exploration: Exploration = field(default_factory=lambda: Exploration(episodes=0.0))
+    curriculum: Curriculum | None = None
+    constants: EpisodeConstants = field(default_factory=EpisodeConstants)
+    simulation: SimulationOptions = field(default_factory=SimulationOptions)
+    effects: Sequence[Any] = ()
+    stack: int = 5
+
+    def __post_init__(self) -> None:
+        if self.stack < 1:
+            raise InputError(f"env.stack is {self.stack}; give at least 1 reading")
+
+
+def make_env(
+    config: EnvConfig, worlds: int, seed: int, evaluation: bool = False, hand: HandModel = DLR_HAND2
+) -> TransformedEnv:
+    """Environment with batch size [worlds] and the keys "observation" (120), "privileged" (25), "action" (12).
+
+    Args:
+        config: what the environment is.
+        worlds: number of worlds that this process hosts.
+        seed: seed of the worlds and, through torch's global generator, of the transforms.
+        evaluation: leaves out the extra exploration and the curriculum; everything else stays as configured.
+        hand: the hand.
+
+    Raises:
+        InputError: fewer than one world.
+    """
+    if worlds < 1:
+        raise InputError(f"number of worlds is {worlds}; give at least 1")
+    poses = config.start.of(hand)
+    tasks = [rotation_env(config, hand, poses) for _ in range(worlds)]
+    base = WorldsEnv(tasks, None if evaluation else config.curriculum)
+    env = TransformedEnv(base, Compose(*transforms(config, hand, explore=not evaluation)))
+    env.set_seed(seed)
+    return env
+
+
+def rotation_env(config: EnvConfig, hand: HandModel = DLR_HAND2, poses: StartPoses | None = None) -> RotationEnv:
+    """The task in one new world, without transforms; `poses` are the start poses where they are at hand already."""
+    world = World(hand, config.simulation, config.effects)
+    start = config.start.of(hand) if poses is None else poses
+    return RotationEnv(world, config.task, config.reward, config.randomization, start, config.constants, hand)
+
+
+def transforms(config: EnvConfig, hand: HandModel, explore: bool) -> list[Transform]:
+    """The transforms, from the world to the policy: readings pass them downwards, actions upwards."""
+    disturbances = config.randomization
+    half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)
+    chain: list[Transform] = [
+        JointOffset(disturbances.joint_offset, half_range),
+        SensorNoise(disturbances.sensor_noise),
+        ObservationStack(config.stack),
+        PrivilegedState(),
+        StickyAction(disturbances.sticky_probability),
+    ]
+    if explore and config.exploration.episodes > 0.0:
+        chain.append(FingerExploration(config.exploration))
+    return chain
