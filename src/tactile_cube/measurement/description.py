@@ -60,12 +60,12 @@ class KnownForce(_Strict):
     """A force of known size on a link, as a weight or a spring balance gives it.
 
     Attributes:
-        link: name of the link in the URDF.
-        point: where it acts, in the link's frame [m].
+        joint: the joint that carries the link (its child link in the URDF).
+        point: where it acts, in that link's frame [m].
         vector: force in the rig's base frame [N].
     """
 
-    link: str
+    joint: str
     point: Annotated[list[float], Field(min_length=3, max_length=3)]
     vector: Annotated[list[float], Field(min_length=3, max_length=3)]
 

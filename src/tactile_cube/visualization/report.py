@@ -1,0 +1,94 @@
+"""A self-contained HTML page that a stranger can read: what was done, what came out, how sure it is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+from jinja2 import Environment
+from markupsafe import Markup
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawing (SVG text) and the sentence that says what to see in it."""
+
+    svg: str
+    caption: str
+    kind: Literal["figure"] = "figure"
+
+    @property
+    def drawing(self) -> Markup:
+        """The SVG, to be put into the page as it is."""
+        return Markup(self.svg)  # noqa: S704 - written by visualization.svg, which escapes its texts
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; numbers are right-aligned."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+    kind: Literal["table"] = "table"
+
+
+@dataclass(frozen=True)
+class Callout:
+    """A sentence that must not be missed: good, warn or plain."""
+
+    text: str
+    tone: Literal["good", "warn", "plain"] = "plain"
+    kind: Literal["callout"] = "callout"
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Sentences as a list, or a command to type (`code`)."""
+
+    lines: Sequence[str]
+    code: bool = False
+    kind: Literal["listing"] = "listing"
+
+
+Block = Figure | Table | Callout | Listing
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading, what it means in a few sentences, and what was found."""
+
+    title: str
+    text: Sequence[str] = ()
+    blocks: Sequence[Block] = ()
+    folded: bool = False
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One number at the top of the page."""
+
+    value: str
+    label: str
+    tone: Literal["good", "warn", "plain"] = "plain"
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page: its title, the answer in one sentence, a few numbers, sections."""
+
+    title: str
+    answer: str
+    tone: Literal["good", "warn", "plain"]
+    tiles: Sequence[Tile] = ()
+    sections: Sequence[Section] = ()
+    footer: str = ""
+    contents: bool = field(default=True)
+
+
+def write_report(report: Report, path: Path) -> None:
+    """Write the page; it needs no network and no other file."""
+    template = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    path.write_text(environment.from_string(template).render(report=report), encoding="utf-8")
