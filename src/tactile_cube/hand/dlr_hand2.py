@@ -28,7 +28,7 @@ TORQUE_LIMIT = 1.0
 
 _FOUR = 4
 
-# Masses are estimates: link volumes of the public meshes, scaled to the finger's 375 g with its drive base (data sheet).
+# Masses are estimates from the volumes of the public meshes; the finger with its drive base weighs 375 g (data sheet).
 # The middle link's capsule and the proximal one's are convex stand-ins; the tip is the published shape (scene).
 _LINKS = (
     Link("knuckle", 0.0, 0.040, 0.0, None),
@@ -45,11 +45,10 @@ def _finger(
     return FingerBase(name, np.array(position), Rotation.from_rotvec(rotation_vector).as_matrix(), np.array(face))
 
 
+_LIKE_RING = (-1.63850239, -0.74407776, -1.79289304)
 _LIKE_MIDDLE = (-1.90822554, 0.04794712, -2.36863463)
 _FINGERS = (
-    _finger(
-        "ring", (-0.005785206, -0.061149354, 0.132621405), (-1.63850239, -0.74407776, -1.79289304), (0.0, -1.0, 0.0)
-    ),
+    _finger("ring", (-0.005785206, -0.061149354, 0.132621405), _LIKE_RING, (0.0, -1.0, 0.0)),
     _finger("middle", (-0.048151365, -0.012101809, 0.133300263), _LIKE_MIDDLE, (1.0, 0.0, 0.0)),
     _finger("fore", (-0.045982316, 0.027691585, 0.138843566), _LIKE_MIDDLE, (0.0, 1.0, 0.0)),
     _finger("thumb", (0.052264236, 0.026986124, 0.102620128), (0.20806912, -1.05993301, -0.25277084), (-1.0, 0.0, 0.0)),
@@ -64,7 +63,7 @@ def _every_finger(*degrees: float) -> Array:
 DLR_HAND2 = HandModel(
     fingers=_FINGERS,
     links=_LINKS,
-    # Source: W, table "theta_min .. theta_max" (hardware) and "theta_lower .. theta_upper" (simulation, action scaling).
+    # Source: W, "theta_min .. theta_max" of the hardware and "theta_lower .. theta_upper" of the simulation's actions.
     lower=_every_finger(-30.0, -20.0, -10.0),
     upper=_every_finger(30.0, 86.0, 105.0),
     action_lower=_every_finger(-30.0, -10.0, -5.0),

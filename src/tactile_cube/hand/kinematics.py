@@ -99,7 +99,7 @@ def _offsets_on_face(face: Array, half: Array) -> Array:
 
 
 def _nearest_within_limits(hand: HandModel, finger: int, targets: Array) -> Array:
-    """The first target's angles that the action limits and the finger's length allow, else the nearest ones (3,) [rad]."""
+    """Angles for the first target that limits and finger length allow, else the nearest miss (3,) [rad]."""
     joints = slice(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1))
     angles = np.clip(finger_angles(hand, finger, targets), hand.action_lower[joints], hand.action_upper[joints])
     miss = np.linalg.norm(_finger_tips(hand, finger, angles) - targets, axis=1)

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand.model import Array, Capsule, HandModel, Link
 
+_ACROSS = '<origin xyz="0 0 0" rpy="1.5707963267948966 0 0"/>'
 _COLOURS = {"palm": "0.35 0.37 0.40 1", "link": "0.72 0.74 0.78 1", "tip": "0.13 0.15 0.18 1"}
 
 
@@ -20,9 +21,8 @@ def finger_urdf(hand: HandModel, prefix: str = "") -> str:
         hand: The hand; all its fingers are identical, so no finger is named.
         prefix: Put before link and joint names, e.g. `ring_`.
     """
-    return _robot(
-        f"{prefix}finger", [f'<link name="{prefix}base"/>', *_finger_parts(hand, prefix, f"{prefix}base", "")]
-    )
+    root = f"{prefix}base"
+    return _robot(f"{prefix}finger", [_root(root), *_finger_parts(hand, prefix, root, "")])
 
 
 def hand_urdf(hand: HandModel) -> str:
@@ -35,6 +35,12 @@ def hand_urdf(hand: HandModel) -> str:
 
 def _robot(name: str, parts: list[str]) -> str:
     return "\n".join(['<?xml version="1.0"?>', f'<robot name="{name}">', *parts, "</robot>", ""])
+
+
+def _root(name: str) -> str:
+    """The fixed base; its numbers do nothing, but Bullet warns about links without any."""
+    inertia = '<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/>'
+    return f'<link name="{name}"><inertial><mass value="0.1"/>{inertia}</inertial></link>'
 
 
 def _finger_parts(hand: HandModel, prefix: str, parent: str, base: str) -> list[str]:
@@ -56,10 +62,9 @@ def _finger_parts(hand: HandModel, prefix: str, parent: str, base: str) -> list[
 
 
 def _joint(name: str, parent: str, child: str, origin: str, lower: float, upper: float, extra: str = "") -> str:
-    return (
-        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>{origin}<axis xyz="0 0 1"/>'
-        f'<limit lower="{lower:.10g}" upper="{upper:.10g}" effort="10" velocity="50"/>{extra}</joint>'
-    )
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    limit = f'<limit lower="{lower:.10g}" upper="{upper:.10g}" effort="10" velocity="50"/>'
+    return f'<joint name="{name}" type="revolute">{ends}{origin}<axis xyz="0 0 1"/>{limit}{extra}</joint>'
 
 
 def _link(prefix: str, link: Link) -> str:

@@ -1,0 +1,8 @@
+"""The PyBullet world: bodies, 500 Hz physics steps, contacts, and every constant of an episode in one dataclass."""
+
+from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.contact import Contact
+from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.world import World
+
+__all__ = ["Contact", "EpisodeConstants", "SimulationOptions", "Start", "World"]

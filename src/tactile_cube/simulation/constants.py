@@ -1,0 +1,182 @@
+"""Every physical constant of one episode, and how the episode starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.hand import dlr_hand2
+
+Array = NDArray[np.float64]
+_JOINTS = 12
+
+
+@dataclass(frozen=True)
+class EpisodeConstants:
+    """What stays constant during an episode; made anew for each one by randomisation.
+
+    Vectors over the joints are ordered ring, middle, fore, thumb x (q1, q2, q3); a float means the same for all.
+
+    Attributes:
+        gravity: Acceleration of gravity [m/s^2].
+        gravity_direction: Where it points in the world (3,); other than straight down means a tilted hand.
+        gravity_scale: Share of the cube's weight that acts: 1 full, 0.05 "float". Fingers always weigh in full.
+        gravity_onset: Policy steps after the start before the cube has weight.
+        filter_time: T_s of the first-order low-pass from q_n to q_f [s].
+        rate_limit: Largest change of the target [rad/s].
+        torque_limit: Largest joint torque [N m].
+        kp: Stiffness K_P of the impedance law (12,) [N m/rad].
+        kd: Damping K_D of the impedance law (12,) [N m s/rad].
+        stiffness: Elasticity K_e between motor and joint (12,) [N m/rad].
+        elasticity_sign: +1: the motor is ahead of a driven joint (physical); -1: as printed in the paper's eq. (2).
+        static_friction: Dry friction of the joint (12,) [N m].
+        reflected_inertia: Rotor inertia seen at the joint (12,) [kg m^2].
+        joint_offset: What the position sensors read too much (12,) [rad]; targets are meant in what the sensors read.
+        cube_size: Edge lengths (3,) [m]; a float means a cube.
+        cube_mass: [kg].
+        cube_friction: Lateral friction factor of the cube; that of a contact is the product of both bodies'.
+        tip_friction: Lateral friction factor of the fingertips.
+        link_friction: Lateral friction factor of all other links.
+        tip_spinning_friction: Torque against spinning under a fingertip per normal force [m].
+        table_height: Top of the table in the world [m]; None: no table.
+        table_friction: Lateral friction factor of the table.
+        force_mean: Mean size of the random force on the cube [N].
+        force_std: Its standard deviation [N].
+        torque_mean: Mean size of the random torque on the cube [N m].
+        torque_std: Its standard deviation [N m].
+        force_interval: Time after which force and torque are redrawn [s].
+        force_seed: Seed of these draws.
+    """
+
+    gravity: float = 9.81
+    gravity_direction: Array | tuple[float, ...] = (0.0, 0.0, -1.0)
+    gravity_scale: float = 1.0
+    gravity_onset: int = 4
+    filter_time: float = 0.5
+    rate_limit: float = float("inf")
+    torque_limit: float = dlr_hand2.TORQUE_LIMIT
+    kp: Array | float = dlr_hand2.KP
+    kd: Array | float = dlr_hand2.KD
+    stiffness: Array | float = dlr_hand2.STIFFNESS
+    elasticity_sign: int = 1
+    static_friction: Array | float = dlr_hand2.STATIC_FRICTION
+    reflected_inertia: Array | float = dlr_hand2.REFLECTED_INERTIA
+    joint_offset: Array | float = 0.0
+    cube_size: Array | tuple[float, ...] | float = 0.08
+    cube_mass: float = 0.05
+    cube_friction: float = 1.0
+    tip_friction: float = 0.9
+    link_friction: float = 0.09
+    tip_spinning_friction: float = 0.1
+    table_height: float | None = None
+    table_friction: float = 0.5
+    force_mean: float = 0.0
+    force_std: float = 0.0
+    torque_mean: float = 0.0
+    torque_std: float = 0.0
+    force_interval: float = 0.5
+    force_seed: int = 0
+
+    _LENGTHS: ClassVar[dict[str, int]] = {
+        "gravity_direction": 3,
+        "cube_size": 3,
+        "kp": _JOINTS,
+        "kd": _JOINTS,
+        "stiffness": _JOINTS,
+        "static_friction": _JOINTS,
+        "reflected_inertia": _JOINTS,
+        "joint_offset": _JOINTS,
+    }
+    _POSITIVE: ClassVar[tuple[str, ...]] = (
+        "gravity",
+        "filter_time",
+        "rate_limit",
+        "torque_limit",
+        "kp",
+        "stiffness",
+        "cube_size",
+        "cube_mass",
+        "force_interval",
+    )
+    _ANY_SIGN: ClassVar[tuple[str, ...]] = ("gravity_direction", "elasticity_sign", "joint_offset", "table_height")
+
+    def __post_init__(self) -> None:
+        """Give every vector its length and refuse values without a physical meaning."""
+        for name, length in self._LENGTHS.items():
+            object.__setattr__(self, name, _vector(name, getattr(self, name), length))
+        if self.elasticity_sign not in (1, -1):
+            raise InputError(f"elasticity_sign is {self.elasticity_sign}; choose 1 (physical) or -1 (as printed)")
+        for field in fields(self):
+            if field.name not in self._ANY_SIGN:
+                _refuse_below_zero(field.name, getattr(self, field.name), field.name in self._POSITIVE)
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether random forces act on the cube."""
+        return bool(max(self.force_mean, self.force_std, self.torque_mean, self.torque_std) > 0.0)
+
+
+@dataclass(frozen=True)
+class Start:
+    """State in which an episode starts.
+
+    Attributes:
+        angles: True joint angles (12,) [rad].
+        cube_position: Centre of the cube in the world (3,) [m].
+        cube_quaternion: Orientation of the cube (4,), xyzw.
+        target: Initial filtered target q_f (12,) [rad] as the sensors would read it; None: where the sensors read now.
+        velocities: Joint velocities (12,) [rad/s]; a float means the same for all.
+        cube_linear_velocity: (3,) [m/s].
+        cube_angular_velocity: (3,) [rad/s].
+    """
+
+    angles: Array
+    cube_position: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
+    cube_quaternion: Array | tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
+    target: Array | None = None
+    velocities: Array | float = 0.0
+    cube_linear_velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
+    cube_angular_velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    _LENGTHS: ClassVar[dict[str, int]] = {
+        "angles": _JOINTS,
+        "cube_position": 3,
+        "cube_quaternion": 4,
+        "velocities": _JOINTS,
+        "cube_linear_velocity": 3,
+        "cube_angular_velocity": 3,
+    }
+
+    def __post_init__(self) -> None:
+        """Give every vector its length; normalise the quaternion."""
+        for name, length in self._LENGTHS.items():
+            object.__setattr__(self, name, _vector(f"start.{name}", getattr(self, name), length))
+        if self.target is not None:
+            object.__setattr__(self, "target", _vector("start.target", self.target, _JOINTS))
+        norm = float(np.linalg.norm(self.cube_quaternion))
+        if norm < 1e-9:
+            raise InputError("start.cube_quaternion is zero; give a unit quaternion xyzw")
+        object.__setattr__(self, "cube_quaternion", np.asarray(self.cube_quaternion) / norm)
+
+
+def _vector(name: str, value: object, length: int) -> Array:
+    """A read-only vector of the given length, from one number or as many as needed."""
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape not in ((), (length,)):
+        raise InputError(f"{name} has shape {array.shape}; give one number or {length}")
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"{name} is {array}; give finite numbers")
+    array = np.broadcast_to(array, (length,)).copy()
+    array.flags.writeable = False
+    return array
+
+
+def _refuse_below_zero(name: str, value: object, zero_too: bool) -> None:
+    """Raise for negative values, and for zero where it has no meaning."""
+    numbers = np.asarray(value, dtype=np.float64)
+    if np.any(np.isnan(numbers)) or np.any(numbers < 0.0) or (zero_too and np.any(numbers == 0.0)):
+        raise InputError(f"{name} is {value}; choose {'a value above 0' if zero_too else '0 or more'}")

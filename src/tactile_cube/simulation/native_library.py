@@ -1,0 +1,74 @@
+"""The compiled loop over physics steps: built once with the system's C compiler, kept in the user's cache."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import pybullet
+
+from tactile_cube.errors import InputError
+
+_SOURCE = Path(__file__).parent / "native" / "physics_steps.c"
+_FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
+
+
+def find_compiler() -> str | None:
+    """Path of the system's C compiler ($CC, cc, gcc or clang), or None."""
+    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
+        if name and (path := shutil.which(name)):
+            return path
+    return None
+
+
+def cache_folder() -> Path:
+    """Where compiled code is kept: $TACTILE_CUBE_CACHE, else the user's cache folder."""
+    if folder := os.environ.get("TACTILE_CUBE_CACHE"):
+        return Path(folder)
+    return Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))) / "tactile_cube"
+
+
+@functools.cache
+def native_library() -> Path:
+    """The shared library, compiled now if this source never was; several processes may ask at once.
+
+    Raises:
+        InputError: No compiler was found, or it failed.
+    """
+    source = _SOURCE.read_bytes()
+    digest = hashlib.sha256(source + " ".join(_FLAGS).encode()).hexdigest()[:16]
+    library = cache_folder() / f"physics_steps-{digest}.so"
+    if not library.exists():
+        _compile(library)
+    return library
+
+
+def _compile(library: Path) -> None:
+    """Compiles beside the target and renames, so that no process ever sees half a library."""
+    compiler = find_compiler()
+    if compiler is None:
+        raise InputError("simulation.loop=c needs a C compiler (cc); install one or choose simulation.loop=python")
+    library.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        fresh = Path(folder) / library.name
+        command = [compiler, *_FLAGS, "-o", str(fresh), str(_SOURCE)]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        if result.returncode != 0:
+            raise InputError(f"{' '.join(command)} failed: {result.stderr.strip()}; choose simulation.loop=python")
+        fresh.replace(library)
+
+
+@functools.cache
+def load_native() -> ctypes.CDLL:
+    """The library, with PyBullet's exported functions made visible to it first."""
+    ctypes.CDLL(pybullet.__file__, mode=ctypes.RTLD_GLOBAL)
+    library = ctypes.CDLL(str(native_library()))
+    library.physics_client.restype = ctypes.c_void_p
+    library.run_physics_steps.restype = None
+    return library

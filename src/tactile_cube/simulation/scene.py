@@ -1,0 +1,211 @@
+"""The bodies in PyBullet: four fingers, a cube and a table, placed so that nothing of the past remains.
+
+One multibody per finger: the solver couples the rows of everything that hangs on one multibody, and four small ones are
+several times faster than one hand.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tactile_cube.hand.model import LINK_NAMES, LINKS_PER_FINGER, HandModel
+from tactile_cube.hand.urdf import finger_urdf
+from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.contact import Contact
+from tactile_cube.simulation.options import SimulationOptions
+
+Array = NDArray[np.float64]
+
+_TIP = LINKS_PER_FINGER - 1
+_TABLE_SIZE = np.array([0.5, 0.5, 0.04])
+_TABLE_AWAY = 10.0
+_ALL_GROUPS = 0xFF
+_URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+_NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
+
+
+def connect(options: SimulationOptions) -> int:
+    """A physics server of its own in this process; gives the id of its client."""
+    client = int(pybullet.connect(pybullet.DIRECT))
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=options.dt,
+        numSolverIterations=options.solver_iterations,
+        numSubSteps=0,
+        deterministicOverlappingPairs=1,
+        enableFileCaching=0,
+        physicsClientId=client,
+    )
+    return client
+
+
+def load_chain(client: int, urdf: str, position: Array, rotation: Array) -> int:
+    """Loads a robot with a fixed base and free joints: no motors, no damping. Gives its body id."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "chain.urdf"
+        file.write_text(urdf, encoding="utf-8")
+        quaternion = Rotation.from_matrix(rotation).as_quat().tolist()
+        body = pybullet.loadURDF(
+            str(file), list(position), quaternion, useFixedBase=True, flags=_URDF_FLAGS, physicsClientId=client
+        )
+    for joint in range(-1, pybullet.getNumJoints(body, physicsClientId=client)):
+        pybullet.changeDynamics(body, joint, **_NO_DAMPING, physicsClientId=client)
+        if joint >= 0:
+            pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
+    return int(body)
+
+
+class Scene:
+    """The hand, the cube and the table of one world.
+
+    Attributes:
+        client: PyBullet's client id.
+        fingers: Body ids of the fingers.
+        cube: Body id of the cube, -1 before the first `place`.
+    """
+
+    def __init__(self, hand: HandModel, options: SimulationOptions) -> None:
+        """Builds fingers and table; the cube comes with the first episode."""
+        self.hand = hand
+        self.client = connect(options)
+        self.fingers = self._load_fingers()
+        self.inertias = [self._inertia(link) for link in range(LINKS_PER_FINGER)]
+        self.table = self._load_table()
+        self.cube = -1
+        self._cube_size = np.zeros(3)
+
+    def place(self, constants: EpisodeConstants, start: Start, angles: Array, velocities: Array) -> None:
+        """Puts everything at the start of an episode.
+
+        Args:
+            constants: Sizes, masses and friction.
+            start: Pose and velocity of the cube.
+            angles: All joints of all fingers (fingers, 4) [rad].
+            velocities: Likewise [rad/s].
+        """
+        self._set_cube(constants, start)
+        self._set_table(constants)
+        for body, q, v in zip(self.fingers, angles, velocities, strict=True):
+            for joint in range(LINKS_PER_FINGER):
+                pybullet.resetJointState(body, joint, q[joint], v[joint], physicsClientId=self.client)
+        self._set_friction(constants)
+        self._forget_contacts()
+
+    def set_gravity(self, acceleration: Array) -> None:
+        """Sets the world's gravity (3,) [m/s^2]."""
+        pybullet.setGravity(*acceleration, physicsClientId=self.client)
+
+    def set_spin_inertia(self, spin_inertia: Array) -> None:
+        """Adds inertia about the joint axis to each link, for numerical stability (fingers, links) [kg m^2]."""
+        for body, spins in zip(self.fingers, spin_inertia, strict=True):
+            for link, spin in enumerate(spins):
+                ixx, iyy, izz = self.inertias[link]
+                pybullet.changeDynamics(
+                    body, link, localInertiaDiagonal=[ixx, iyy, izz + spin], physicsClientId=self.client
+                )
+
+    def contacts(self) -> list[Contact]:
+        """Contacts with the cube and between fingers in the last physics step."""
+        return [self._contact(row) for row in pybullet.getContactPoints(physicsClientId=self.client)]
+
+    def close(self) -> None:
+        """Ends the physics server."""
+        if pybullet.isConnected(self.client):
+            pybullet.disconnect(self.client)
+
+    def _load_fingers(self) -> list[int]:
+        urdf = finger_urdf(self.hand)
+        bases = [self.hand.base_in_world(k) for k in range(len(self.hand.fingers))]
+        return [load_chain(self.client, urdf, position, rotation) for position, rotation in bases]
+
+    def _inertia(self, link: int) -> tuple[float, float, float]:
+        diagonal = pybullet.getDynamicsInfo(self.fingers[0], link, physicsClientId=self.client)[2]
+        return (float(diagonal[0]), float(diagonal[1]), float(diagonal[2]))
+
+    def _load_table(self) -> int:
+        half = (0.5 * _TABLE_SIZE).tolist()
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
+        return int(pybullet.createMultiBody(0.0, shape, physicsClientId=self.client))
+
+    def _set_table(self, constants: EpisodeConstants) -> None:
+        top = -_TABLE_AWAY if constants.table_height is None else constants.table_height
+        centre = [0.0, 0.0, top - 0.5 * float(_TABLE_SIZE[2])]
+        pybullet.resetBasePositionAndOrientation(self.table, centre, [0, 0, 0, 1], physicsClientId=self.client)
+        pybullet.changeDynamics(self.table, -1, lateralFriction=constants.table_friction, physicsClientId=self.client)
+
+    def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
+        """Builds the cube anew where its size changed, then sets mass, inertia, friction, pose and velocity."""
+        size = np.asarray(constants.cube_size)
+        if self.cube < 0 or not np.array_equal(size, self._cube_size):
+            self._build_cube(size)
+        inertia = constants.cube_mass / 12.0 * (np.sum(size**2) - size**2)
+        pybullet.changeDynamics(
+            self.cube,
+            -1,
+            mass=constants.cube_mass,
+            localInertiaDiagonal=inertia.tolist(),
+            lateralFriction=constants.cube_friction,
+            spinningFriction=0.0,
+            rollingFriction=0.0,
+            **_NO_DAMPING,
+            physicsClientId=self.client,
+        )
+        pose = list(np.asarray(start.cube_position)), list(np.asarray(start.cube_quaternion))
+        velocity = list(np.asarray(start.cube_linear_velocity)), list(np.asarray(start.cube_angular_velocity))
+        pybullet.resetBasePositionAndOrientation(self.cube, *pose, physicsClientId=self.client)
+        pybullet.resetBaseVelocity(self.cube, *velocity, physicsClientId=self.client)
+
+    def _build_cube(self, size: Array) -> None:
+        if self.cube >= 0:
+            pybullet.removeBody(self.cube, physicsClientId=self.client)
+        half = (0.5 * size).tolist()
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
+        self.cube = int(pybullet.createMultiBody(1.0, shape, physicsClientId=self.client))
+        self._cube_size = size.copy()
+
+    def _set_friction(self, constants: EpisodeConstants) -> None:
+        """Friction of the links; Bullet multiplies the factors of the two bodies that touch."""
+        for body in self.fingers:
+            for link in range(LINKS_PER_FINGER):
+                tip = link == _TIP
+                pybullet.changeDynamics(
+                    body,
+                    link,
+                    lateralFriction=constants.tip_friction if tip else constants.link_friction,
+                    spinningFriction=constants.tip_spinning_friction if tip else 0.0,
+                    physicsClientId=self.client,
+                )
+
+    def _forget_contacts(self) -> None:
+        """Registers every body anew with the broadphase, in a fixed order.
+
+        That drops cached contacts and their impulses, so an episode depends on nothing that happened before it.
+        """
+        bodies = [(body, link) for body in self.fingers for link in range(LINKS_PER_FINGER)]
+        for body, link in [*bodies, (self.table, -1), (self.cube, -1)]:
+            group = 2 if body == self.table else 1
+            mask = 1 if body == self.table else _ALL_GROUPS
+            pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=self.client)
+
+    def _contact(self, row: tuple[object, ...]) -> Contact:
+        """One row of PyBullet's answer, turned so that the cube (or the later finger) is pushed."""
+        body, other, link, other_link, on_body, on_other, normal, distance, force, f1, d1, f2, d2 = row[1:14]
+        friction = float(f1) * np.array(d1) + float(f2) * np.array(d2)  # type: ignore[arg-type]
+        towards_other = -np.array(normal)
+        position = np.array(on_other)
+        if body == self.cube or other == self.table:
+            body, other, link, other_link = other, body, other_link, link
+            towards_other, friction, position = -towards_other, -friction, np.array(on_body)
+        finger, other_name = self._body_name(int(body)), self._body_name(int(other))  # type: ignore[call-overload]
+        link_name = LINK_NAMES[int(link)] if int(link) >= 0 else ""  # type: ignore[call-overload]
+        return Contact(finger, link_name, other_name, position, towards_other, float(distance), float(force), -friction)  # type: ignore[arg-type]
+
+    def _body_name(self, body: int) -> str:
+        if body == self.cube:
+            return "cube"
+        return "table" if body == self.table else self.hand.fingers[self.fingers.index(body)].name

@@ -1,0 +1,276 @@
+"""The world in which the hand turns the cube: 500 Hz physics under a 10 Hz policy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, Effect
+from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
+from tactile_cube.hand.model import JOINTS_PER_FINGER, LINKS_PER_FINGER
+from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.contact import Contact
+from tactile_cube.simulation.disturbance import Disturbance
+from tactile_cube.simulation.health import find_fault
+from tactile_cube.simulation.loop import OBJECT_STATE, make_loop
+from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+class World:
+    """Hand and cube in PyBullet. Joint vectors are ordered ring, middle, fore, thumb x (q1, q2, q3).
+
+    An episode is a function of constants, start and actions alone: equal to the bit, whatever the world did before.
+
+    Attributes:
+        hand: The hand.
+        options: Numerical choices.
+        constants: Constants of the running episode.
+        steps: Policy steps since the reset.
+        fault: What made the physics unusable, "" while all is well.
+    """
+
+    constants: EpisodeConstants
+
+    def __init__(
+        self,
+        hand: HandModel = DLR_HAND2,
+        options: SimulationOptions | None = None,
+        effects: Sequence[Effect] = (),
+    ) -> None:
+        """Builds the bodies and the compiled control step.
+
+        Args:
+            hand: The hand.
+            options: Numerical choices; the fast ones by default.
+            effects: Further physical effects of the drivetrain, each at a joint.
+        """
+        self.hand = hand
+        self.options = options or SimulationOptions()
+        self.steps = 0
+        self.fault = ""
+        self._effects = list(effects)
+        self._scene = Scene(hand, self.options)
+        tree = RigidBodyTree.from_urdf(finger_urdf(hand))
+        self._plant = Plant(
+            trees=[tree] * len(hand.fingers),
+            dt=self.options.dt,
+            effects=tuple(dict.fromkeys(type(effect) for effect in effects)),
+            joint_names=hand.joint_names,
+            trace_rows=self.options.substeps if self.options.trace else 0,
+        )
+        self._loop = make_loop(self.options.loop, self._scene.client, self._scene.fingers, self._plant)
+        self._memory = np.zeros(self._plant.size)
+        self._joints = np.zeros((2, len(hand.fingers), LINKS_PER_FINGER))
+        self._cube = np.zeros(OBJECT_STATE)
+        self._push = np.zeros(6)
+        self._cube_states: Array | None = None
+        self._down = np.array([0.0, 0.0, -1.0])
+
+    # --- running -------------------------------------------------------------------------------------------------
+
+    def reset(self, constants: EpisodeConstants, start: Start) -> None:
+        """Starts an episode.
+
+        Args:
+            constants: Every physical constant of the episode.
+            start: Where fingers and cube are.
+
+        Raises:
+            InputError: The torque loop would be unstable with these constants and this time step.
+        """
+        self.constants = constants
+        self.steps, self.fault = 0, ""
+        self._push[:] = 0.0
+        self._disturbance = Disturbance(constants)
+        self._set_drivetrain(constants, start)
+        self._set_joints(start)
+        self._scene.place(constants, start, *self._joints)
+        self._scene.set_spin_inertia(self._plant.view(self._memory, "spin_inertia"))
+        self._set_weight(constants.gravity_scale if constants.gravity_onset == 0 else 0.0)
+        self._sense_once()
+        self._read_cube()
+
+    def step(self, q_n: Array) -> None:
+        """One policy step: `options.substeps` physics steps with the desired joint angles q_n (12,) [rad]."""
+        if self.steps == self.constants.gravity_onset:
+            self._set_weight(self.constants.gravity_scale)
+        self._plant.view(self._memory, "goal")[:] = q_n - self.constants.joint_offset
+        substeps = self.options.substeps
+        self._cube_states = np.empty((substeps + 1, OBJECT_STATE)) if self.options.trace else None
+        q, v = self._joints.reshape(2, -1)
+        self._loop.run(substeps, q, v, self._memory, self._scene.cube, self._wrench(), self._cube_states)
+        self.steps += 1
+        self._read_cube()
+        distances = [row[8] for row in pybullet.getContactPoints(physicsClientId=self._scene.client)]
+        self.fault = self.fault or find_fault(self._joints[0], self._joints[1], self._cube, distances)
+
+    def push_cube(self, force: Array, torque: Array) -> None:
+        """Pushes the cube's centre with force [N] and torque [N m] in the world until changed or reset."""
+        self._push[:] = np.concatenate([force, torque])
+
+    def pull_finger(self, finger: int, force: Array) -> None:
+        """Pulls a fingertip with a force (3,) [N] in the world until changed or reset."""
+        joints = slice(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1))
+        load = self._plant.view(self._memory, "external_torque")
+        load[joints] = self._tip_jacobian(finger).T @ force
+
+    def close(self) -> None:
+        """Ends the physics server."""
+        self._scene.close()
+
+    # --- read-outs -----------------------------------------------------------------------------------------------
+
+    @property
+    def q(self) -> Array:
+        """True joint angles (12,) [rad]."""
+        return self._joints[0, :, :JOINTS_PER_FINGER].ravel()
+
+    @property
+    def dq(self) -> Array:
+        """True joint velocities (12,) [rad/s]."""
+        return self._joints[1, :, :JOINTS_PER_FINGER].ravel()
+
+    @property
+    def all_joint_angles(self) -> Array:
+        """Angles of all joints (16,) [rad], q1..q4 of each finger: the joints of `hand_urdf`."""
+        return self._joints[0].ravel()
+
+    @property
+    def q_m(self) -> Array:
+        """Measured joint angles (12,) [rad]: motor side of the elasticity, joint offset included, without noise."""
+        return self._plant.signal(self._memory, MOTOR_POSITION) + self.constants.joint_offset
+
+    @property
+    def q_f(self) -> Array:
+        """Target after the low-pass (12,) [rad], in what the sensors read."""
+        return np.asarray(self._plant.view(self._memory, "filtered") + self.constants.joint_offset)
+
+    @property
+    def q_d(self) -> Array:
+        """Target of the impedance law after rate and torque limits (12,) [rad], in what the sensors read."""
+        return self._plant.signal(self._memory, COMMAND) + self.constants.joint_offset
+
+    @property
+    def torque(self) -> Array:
+        """Joint torques of the last physics step (12,) [N m]."""
+        return self._plant.signal(self._memory, TORQUE)
+
+    @property
+    def cube_position(self) -> Array:
+        """Centre of the cube in the world (3,) [m]."""
+        return self._cube[:3]
+
+    @property
+    def cube_quaternion(self) -> Array:
+        """Orientation of the cube (4,), xyzw."""
+        return self._cube[3:7]
+
+    @property
+    def cube_linear_velocity(self) -> Array:
+        """(3,) [m/s]."""
+        return self._cube[7:10]
+
+    @property
+    def cube_angular_velocity(self) -> Array:
+        """(3,) [rad/s]."""
+        return self._cube[10:13]
+
+    @property
+    def tip_positions(self) -> Array:
+        """Centres of the fingertip spheres in the world (4, 3) [m]."""
+        return tip_positions(self.hand, self.q)
+
+    @property
+    def healthy(self) -> bool:
+        """Whether the physics of this episode can be believed so far."""
+        return not self.fault
+
+    @property
+    def time(self) -> float:
+        """Time since the reset [s]."""
+        return self.steps * self.options.policy_dt
+
+    @property
+    def loop(self) -> Literal["c", "python"]:
+        """Which loop runs the physics steps."""
+        return self._loop.kind
+
+    def contacts(self) -> list[Contact]:
+        """Contacts of the last physics step."""
+        return self._scene.contacts()
+
+    # --- parts of reset and step ---------------------------------------------------------------------------------
+
+    def _set_drivetrain(self, c: EpisodeConstants, start: Start) -> None:
+        """Fills the memory of the control step and puts it at rest at the start."""
+        drivetrain = DrivetrainConstants(
+            kp=c.kp,
+            kd=c.kd,
+            stiffness=c.stiffness,
+            static_friction=c.static_friction,
+            reflected_inertia=c.reflected_inertia,
+            torque_limit=c.torque_limit,
+            rate_limit=c.rate_limit,
+            sign="physical" if c.elasticity_sign > 0 else "printed",
+        )
+        self._down = np.asarray(c.gravity_direction) / np.linalg.norm(c.gravity_direction)
+        gravity = np.stack([self._in_base(k, c.gravity * self._down) for k in range(len(self.hand.fingers))])
+        self._memory[:] = self._plant.memory(drivetrain, gravity=gravity, effects=self._effects)
+        self._plant.view(self._memory, "time_constant")[:] = c.filter_time
+        self._plant.view(self._memory, "command_torque_limit")[:] = c.torque_limit
+        target = start.angles if start.target is None else start.target - c.joint_offset
+        self._plant.reset(self._memory, start.angles, v=start.velocities, goal=target)
+
+    def _set_joints(self, start: Start) -> None:
+        for row, values in zip(self._joints, (start.angles, start.velocities), strict=True):
+            row[:, :JOINTS_PER_FINGER] = np.asarray(values).reshape(-1, JOINTS_PER_FINGER)
+            row[:, JOINTS_PER_FINGER] = row[:, JOINTS_PER_FINGER - 1]
+
+    def _set_weight(self, scale: float) -> None:
+        """Gives the cube a share of its weight through Bullet's gravity; the control step keeps the fingers' whole."""
+        acceleration = scale * self.constants.gravity * self._down
+        self._scene.set_gravity(acceleration)
+        for k, engine in enumerate(self._plant.view(self._memory, "engine_gravity")):
+            engine[:] = self._in_base(k, acceleration)
+
+    def _sense_once(self) -> None:
+        """Computes what the sensors read at the start, without moving anything or changing any state."""
+        q, v = self._joints.reshape(2, -1)
+        states = self._memory.copy()
+        self._plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), states)
+        self._plant.view(self._memory, "signals")[:] = self._plant.view(states, "signals")
+
+    def _wrench(self) -> Array | None:
+        """Everything that pushes the cube in this policy step, or None."""
+        random = self._disturbance.wrench(self.time)
+        if random is None:
+            return self._push if self._push.any() else None
+        return random + self._push
+
+    def _read_cube(self) -> None:
+        client, cube = self._scene.client, self._scene.cube
+        position, quaternion = pybullet.getBasePositionAndOrientation(cube, physicsClientId=client)
+        linear, angular = pybullet.getBaseVelocity(cube, physicsClientId=client)
+        self._cube = np.array([*position, *quaternion, *linear, *angular])
+
+    def _in_base(self, finger: int, vector: Array) -> Array:
+        """A world vector in the frame of a finger's base (3,)."""
+        return np.asarray(self.hand.base_in_world(finger)[1].T @ vector)
+
+    def _tip_jacobian(self, finger: int) -> Array:
+        """Velocity of a fingertip's centre per joint velocity (3, 3), by central differences."""
+        columns, q, width = [], self.q, 1e-6
+        for joint in range(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1)):
+            delta = np.where(np.arange(q.size) == joint, width, 0.0)
+            ahead, behind = tip_positions(self.hand, q + delta), tip_positions(self.hand, q - delta)
+            columns.append((ahead - behind)[finger] / (2.0 * width))
+        return np.stack(columns, axis=1)
