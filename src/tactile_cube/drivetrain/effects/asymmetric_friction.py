@@ -1,0 +1,30 @@
+"""Dry friction that differs between the two directions."""
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import DIRECTION, FRICTION
+
+
+class AsymmetricFriction(Effect):
+    """F(+v) - F(-v) = difference; the mean of both stays the nominal friction.
+
+    Source: Olsson et al., Friction models and friction compensation, 1998.
+    """
+
+    name = "asymmetric_friction"
+    stage = Stage.FRICTION
+    parameters = (
+        Parameter(
+            "difference",
+            unit="N m",
+            neutral=0.0,
+            low=-0.3,
+            high=0.3,
+            typical=0.02,
+            source="5-30 % of the dry friction; more with worn gears",
+        ),
+    )
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Friction limit [N m]."""
+        return x[FRICTION, j] + 0.5 * p[0] * x[DIRECTION, j]

@@ -1,0 +1,35 @@
+"""Dry friction that changes while the joint warms up."""
+
+from math import exp
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import FRICTION, TIME
+
+
+class FrictionDrift(Effect):
+    """F += change * (1 - exp(-t / time_constant)), t from the start of the trial.
+
+    Source: Bittencourt and Axelsson, Modeling and experiment design for temperature effects of joint friction, 2014.
+    """
+
+    name = "friction_drift"
+    stage = Stage.FRICTION
+    parameters = (
+        Parameter("change", unit="N m", neutral=0.0, low=-0.5, high=0.5, typical=0.02, source="-20 to -50 % over 20 K"),
+        Parameter(
+            "time_constant",
+            unit="s",
+            neutral=5.0,
+            low=0.5,
+            high=200.0,
+            typical=5.0,
+            source="seconds (lubricant) to minutes (housing)",
+        ),
+    )
+
+    forms = ({"change": 0.02, "time_constant": 5.0},)
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Friction limit [N m]."""
+        return max(x[FRICTION, j] + p[0] * (1.0 - exp(-x[TIME, 0] / p[1])), 0.0) if p[0] != 0.0 else x[FRICTION, j]

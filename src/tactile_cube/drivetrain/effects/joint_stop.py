@@ -1,0 +1,52 @@
+"""An end stop inside the range of motion."""
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import JOINT_TORQUE, POSITION, VELOCITY
+
+
+class JointStop(Effect):
+    """A spring and a damper beyond the upper or the lower stop; they push, never pull.
+
+    Source: rubber end stops; Hunt and Crossley 1975 without the nonlinear term.
+    """
+
+    name = "joint_stop"
+    stage = Stage.JOINT_TORQUE
+    parameters = (
+        Parameter(
+            "upper",
+            unit="rad",
+            neutral=1e9,
+            low=-7.0,
+            high=1e9,
+            typical=1.0,
+            source="within the range of motion",
+        ),
+        Parameter(
+            "lower",
+            unit="rad",
+            neutral=-1e9,
+            low=-1e9,
+            high=7.0,
+            typical=-1e9,
+            source="within the range of motion",
+        ),
+        Parameter("stiffness", unit="N m/rad", neutral=5.0, low=0.1, high=500.0, typical=5.0, source="rubber to metal"),
+        Parameter("damping", unit="N m s/rad", neutral=0.0, low=0.0, high=2.0, typical=0.0, source="rubber to metal"),
+    )
+
+    forms = (
+        {"upper": 1.0, "stiffness": 5.0},
+        {"lower": -1.0, "stiffness": 5.0},
+    )
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Joint torque [N m]."""
+        over = x[POSITION, j] - p[0]
+        if over > 0.0:
+            return x[JOINT_TORQUE, j] - max(p[2] * over + p[3] * x[VELOCITY, j], 0.0)
+        under = p[1] - x[POSITION, j]
+        if under > 0.0:
+            return x[JOINT_TORQUE, j] + max(p[2] * under - p[3] * x[VELOCITY, j], 0.0)
+        return x[JOINT_TORQUE, j]

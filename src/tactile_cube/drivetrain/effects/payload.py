@@ -1,0 +1,35 @@
+"""A mass on the rig that its description does not know."""
+
+import numpy as np
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Stage, View
+
+
+class Payload(Effect):
+    """A point mass on the outermost link that the joint moves by itself, `distance` from that link's joint.
+
+    It lies on the line through the link's centre of mass; a negative mass is a link lighter than stated.
+
+    Source: parallel-axis theorem.
+    """
+
+    name = "payload"
+    stage = Stage.MECHANISM
+    parameters = (
+        Parameter("mass", "kg", 0.0, -0.2, 5.0, 0.02, "0-20 % of the link's mass, or a tool"),
+        Parameter("distance", "m", 0.03, 0.0, 1.0, 0.03, "within the link"),
+    )
+
+    @staticmethod
+    def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102
+        link = (..., place.chain, place.outermost)
+        mass, com = view("mass")[link], view("com")[link]
+        length = np.maximum(np.linalg.norm(com, axis=-1), 1e-9)[..., None]
+        point = com / length * p[..., 1, None]
+        total = np.maximum(mass + p[..., 0], 1e-6)
+        lever = point - com
+        reduced = mass * p[..., 0] / total
+        square = np.sum(lever * lever, axis=-1)[..., None, None] * np.eye(3)
+        view("inertia")[link] += reduced[..., None, None] * (square - lever[..., :, None] * lever[..., None, :])
+        view("com")[link] = com + lever * (p[..., 0] / total)[..., None]
+        view("mass")[link] = total

@@ -1,0 +1,20 @@
+"""An encoder whose zero is wrong."""
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import MOTOR_POSITION
+
+
+class PositionOffset(Effect):
+    """q_m += offset, in every initialisation the same.
+
+    Source: Sievers et al., ICRA 2022, joint-angle offsets dominate the model error.
+    """
+
+    name = "position_offset"
+    stage = Stage.POSITION_SENSOR
+    parameters = (Parameter("offset", unit="rad", neutral=0.0, low=-0.3, high=0.3, typical=0.02, source="0.5-3 deg"),)
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Motor position [rad]."""
+        return x[MOTOR_POSITION, j] + p[0]

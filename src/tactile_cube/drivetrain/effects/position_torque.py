@@ -1,0 +1,44 @@
+"""A torque that depends on the position alone."""
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import JOINT_TORQUE, POSITION
+
+KNOTS = 9
+SOURCE = "return springs, cables, detents"
+
+
+class PositionTorque(Effect):
+    """Spring, cable or detent: tau += bias - stiffness * q + f(q).
+
+    f is piecewise linear between KNOTS equally spaced knots from `first` to `last` and constant beyond.
+
+    Source: cable and tendon routing; any spring parallel to the joint.
+    """
+
+    name = "position_torque"
+    stage = Stage.JOINT_TORQUE
+    parameters = (
+        Parameter("stiffness", unit="N m/rad", neutral=0.0, low=-3.0, high=3.0, typical=0.05, source=SOURCE),
+        Parameter("bias", unit="N m", neutral=0.0, low=-1.0, high=1.0, typical=0.0, source=SOURCE),
+        Parameter("first", unit="rad", neutral=-1.0, low=-7.0, high=7.0, typical=-1.0, source="range of motion"),
+        Parameter("last", unit="rad", neutral=1.0, low=-7.0, high=7.0, typical=1.0, source="range of motion"),
+        *(
+            Parameter(f"torque_{k}", unit="N m", neutral=0.0, low=-1.0, high=1.0, typical=0.0, source=SOURCE)
+            for k in range(KNOTS)
+        ),
+    )
+
+    forms = (
+        {"stiffness": 0.05, "bias": 0.0},
+        {f"torque_{k}": 0.01 for k in range(KNOTS)},
+    )
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Joint torque [N m]."""
+        place = (x[POSITION, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1)
+        place = min(max(place, 0.0), KNOTS - 1.000001)
+        knot = int(place)
+        share = place - knot
+        shape = (1.0 - share) * p[4 + knot] + share * p[5 + knot]
+        return x[JOINT_TORQUE, j] + p[1] - p[0] * x[POSITION, j] + shape

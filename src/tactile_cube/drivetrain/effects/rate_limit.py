@@ -1,0 +1,40 @@
+"""A command that may only change so fast."""
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import COMMAND
+
+
+class RateLimit(Effect):
+    """|dq_d / dt| <= speed.
+
+    Source: set-point generators of servo drives.
+    """
+
+    name = "rate_limit"
+    stage = Stage.COMMAND
+    parameters = (
+        Parameter(
+            "speed",
+            unit="rad/s",
+            neutral=1e9,
+            low=0.02,
+            high=1e9,
+            typical=1.0,
+            source="below the fastest command",
+        ),
+    )
+
+    @classmethod
+    def state_size(cls, dt: float) -> int:
+        """Limited command, first-call flag."""
+        return 2
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Command [rad]."""
+        if s[1] == 0.0:
+            s[0] = x[COMMAND, j]
+            s[1] = 1.0
+        step = p[0] * dt
+        s[0] = s[0] + min(max(x[COMMAND, j] - s[0], -step), step) if abs(x[COMMAND, j] - s[0]) > step else x[COMMAND, j]
+        return s[0]

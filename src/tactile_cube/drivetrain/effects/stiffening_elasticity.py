@@ -1,0 +1,49 @@
+"""A tendon or belt that gets stiffer as it is pulled."""
+
+from math import asinh, sinh, sqrt
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import DEFLECTION, TORQUE
+
+
+class StiffeningElasticity(Effect):
+    """tau = K d + cubic * d^3 with 1 / K = 1 / K_e + compliance.
+
+    Source: Palli et al., tendon transmissions; Spong 1987 with a cubic spring.
+    """
+
+    name = "stiffening_elasticity"
+    stage = Stage.DEFLECTION
+    parameters = (
+        Parameter(
+            "compliance",
+            unit="rad/(N m)",
+            neutral=0.0,
+            low=0.0,
+            high=2.0,
+            typical=0.1,
+            source="slack tendons: 2-20 N m/rad",
+        ),
+        Parameter(
+            "cubic",
+            unit="N m/rad^3",
+            neutral=0.0,
+            low=0.0,
+            high=10000000.0,
+            typical=2000.0,
+            source="as large as the linear part at 10-50 mrad",
+        ),
+    )
+
+    forms = ({"compliance": 0.1, "cubic": 2e3},)
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Deflection q_m - q [rad]: the real root of cubic * d^3 + K d = tau (Cardano)."""
+        torque = x[TORQUE, j]
+        deflection = x[DEFLECTION, j] + p[0] * torque
+        if p[1] <= 0.0 or torque == 0.0 or deflection == 0.0:
+            return deflection
+        linear = torque / deflection / p[1]
+        half_width = sqrt(linear / 3.0)
+        return 2.0 * half_width * sinh(asinh(1.5 * torque / p[1] / (linear * half_width)) / 3.0)

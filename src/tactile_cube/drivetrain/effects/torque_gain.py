@@ -1,0 +1,20 @@
+"""A motor constant that is not the stated one."""
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import TORQUE
+
+
+class TorqueGain(Effect):
+    """tau *= 1 + error.
+
+    Source: tolerance of torque constants and current sensors.
+    """
+
+    name = "torque_gain"
+    stage = Stage.MOTOR_TORQUE
+    parameters = (Parameter("error", unit="1", neutral=0.0, low=-0.8, high=1.0, typical=0.1, source="1-15 %"),)
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Motor torque [N m]."""
+        return x[TORQUE, j] * (1.0 + p[0])

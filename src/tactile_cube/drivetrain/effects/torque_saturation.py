@@ -1,0 +1,30 @@
+"""A torque limit below the stated one."""
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import TORQUE
+
+
+class TorqueSaturation(Effect):
+    """|tau| <= limit.
+
+    Source: current limits of drives.
+    """
+
+    name = "torque_saturation"
+    stage = Stage.MOTOR_TORQUE
+    parameters = (
+        Parameter(
+            "limit",
+            unit="N m",
+            neutral=1e9,
+            low=0.005,
+            high=1e9,
+            typical=0.1,
+            source="a fraction of the stated limit",
+        ),
+    )
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Motor torque [N m]."""
+        return min(max(x[TORQUE, j], -p[0]), p[0])

@@ -1,0 +1,37 @@
+"""A position error that repeats with the gear's turn."""
+
+from math import cos, sin
+
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.signals import MOTOR_POSITION, POSITION
+
+
+class TransmissionError(Effect):
+    """q_m += sine * sin(harmonic q) + cosine * cos(harmonic q).
+
+    Source: Tuttle and Seering, A nonlinear model of a harmonic drive gear transmission, 1996.
+    """
+
+    name = "transmission_error"
+    stage = Stage.POSITION_SENSOR
+    parameters = (
+        Parameter("sine", unit="rad", neutral=0.0, low=-0.1, high=0.1, typical=0.003, source="1 arcmin to 0.5 deg"),
+        Parameter("cosine", unit="rad", neutral=0.0, low=-0.1, high=0.1, typical=0.0, source="1 arcmin to 0.5 deg"),
+        Parameter(
+            "harmonic",
+            unit="1/rad",
+            neutral=10.0,
+            low=1.0,
+            high=250.0,
+            typical=10.0,
+            source="eccentric pulleys to teeth",
+        ),
+    )
+
+    forms = ({"sine": 0.003, "cosine": 0.0, "harmonic": 10.0},)
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Motor position [rad]."""
+        angle = p[2] * x[POSITION, j]
+        return x[MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)
