@@ -1,0 +1,127 @@
+"""Which effects exist, and how a user names them: `stribeck_friction@q3`, `my_rig.CableDrag@q2`, `cogging` (all joints)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.errors import InputError
+
+EffectClass = type[Effect]
+CATALOGUE_MODULES = (
+    "command_dead_zone",
+    "rate_limit",
+    "command_delay",
+    "velocity_filter_lag",
+    "torque_gain",
+    "torque_bias",
+    "torque_crosstalk",
+    "cogging",
+    "actuator_lag",
+    "torque_saturation",
+    "elasticity",
+    "stiffening_elasticity",
+    "backlash",
+    "transmission_error",
+    "position_offset",
+    "viscous_friction",
+    "nonlinear_drag",
+    "position_torque",
+    "joint_coupling",
+    "joint_stop",
+    "coulomb_friction",
+    "stribeck_friction",
+    "load_dependent_friction",
+    "asymmetric_friction",
+    "friction_drift",
+    "presliding_friction",
+    "reflected_inertia",
+    "payload",
+    "coupling_error",
+)
+"""Files of this folder, in the order in which effects of one stage act."""
+
+
+@cache
+def catalogue() -> dict[str, EffectClass]:
+    """All effects of this package by name, in the order in which they act."""
+    package = __package__ or __name__.rpartition(".")[0]
+    modules = (import_module(f"{package}.{name}") for name in CATALOGUE_MODULES)
+    found = (value for module in modules for value in vars(module).values() if _defines_effect(value, module.__name__))
+    return {effect.name: effect for effect in found}
+
+
+def find_effect(name: str) -> EffectClass:
+    """An effect by its catalogue name, or a user's own class by its dotted path.
+
+    Raises:
+        InputError: there is no such effect.
+    """
+    if name in catalogue():
+        return catalogue()[name]
+    if "." not in name:
+        known = ", ".join(catalogue())
+        raise InputError(f"effect '{name}' is unknown; use a dotted path to your own class, or one of: {known}")
+    return _import_effect(name)
+
+
+def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectClass, str]]:
+    """Effects and joints for names such as `backlash@q3`; without `@JOINT` the effect is placed on every joint.
+
+    Args:
+        names: as a user writes them.
+        joints: the plant's joints; `@q3` also stands for every joint that ends in `_q3`, `/q3` or `.q3`.
+
+    Raises:
+        InputError: an unknown effect or joint.
+    """
+    placed = []
+    for text in names:
+        name, at, joint = text.partition("@")
+        effect = find_effect(name)
+        found = matching_joints(joint, joints) if at else list(joints)
+        placed += [(effect, match) for match in found]
+    return placed
+
+
+def matching_joints(joint: str, joints: Sequence[str]) -> list[str]:
+    """The joint of that name, or else those whose name ends in it after `_`, `/` or `.` (one per finger).
+
+    Raises:
+        InputError: there is none.
+    """
+    if joint in joints:
+        return [joint]
+    found = [name for name in joints if joint and name.endswith(tuple(mark + joint for mark in "_/."))]
+    if not found:
+        raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(joints)}")
+    return found
+
+
+def _import_effect(path: str) -> EffectClass:
+    module_name, _, class_name = path.rpartition(".")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.append(str(Path.cwd()))  # a user's file lies where the command is typed
+    try:
+        module = import_module(module_name)
+    except Exception as error:  # whatever the user's file raises
+        raise InputError(f"effect '{path}': cannot import '{module_name}': {error}") from None
+    found = getattr(module, class_name, None)
+    if not (isinstance(found, type) and issubclass(found, Effect)):
+        raise InputError(f"effect '{path}': '{module_name}' has no subclass of Effect named '{class_name}'")
+    _check(found, path)
+    return found
+
+
+def _check(effect: EffectClass, path: str) -> None:
+    for key in ("name", "stage", "parameters"):
+        if not hasattr(effect, key):
+            raise InputError(f"effect '{path}': the class lacks '{key}'; see tactile_cube.drivetrain.effects.Effect")
+
+
+def _defines_effect(value: object, module: str) -> bool:
+    return isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module

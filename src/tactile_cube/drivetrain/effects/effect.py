@@ -1,0 +1,150 @@
+"""One physical effect of a drive: its parameters, where it acts, its law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from math import isfinite
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from tactile_cube.drivetrain import signals
+from tactile_cube.errors import InputError
+
+Array = npt.NDArray[np.float64]
+View = Callable[[str], Array]
+
+
+class Stage(Enum):
+    """Where an effect acts; the value is the row of `x` that its law returns anew (MECHANISM: no law)."""
+
+    COMMAND = signals.COMMAND
+    VELOCITY_SENSOR = signals.MEASURED_VELOCITY
+    MOTOR_TORQUE = signals.TORQUE
+    DEFLECTION = signals.DEFLECTION
+    POSITION_SENSOR = signals.MOTOR_POSITION
+    JOINT_TORQUE = signals.JOINT_TORQUE
+    FRICTION = signals.FRICTION
+    MECHANISM = -1
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of an effect.
+
+    Attributes:
+        name: its key in configurations and model files.
+        unit: SI, `1` for none.
+        neutral: the value at which the effect changes nothing.
+        low: smallest value that a search may try.
+        high: largest.
+        typical: a usual size, where a search starts.
+        source: where the figures come from.
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    low: float
+    high: float
+    typical: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Place:
+    """The joint that a mechanism effect changes.
+
+    Attributes:
+        joint: plant-wide index.
+        chain: finger.
+        link: dof of the joint in its chain.
+        followers: dofs of the chain that are coupled to the joint (an index list, possibly empty).
+    """
+
+    joint: int
+    chain: int
+    link: int
+    followers: tuple[int, ...] = ()
+
+    @property
+    def outermost(self) -> int:
+        """The last dof that the joint moves by itself: its own or its last follower."""
+        return max((self.link, *self.followers))
+
+
+class Effect:
+    """An effect on one joint, with values; subclass it to describe a new one.
+
+    A subclass states `name`, `stage`, `parameters`, and gives `law` (or `configure` for a MECHANISM). With every
+    parameter at its neutral value the law returns the row's own value, bit for bit.
+
+    Example:
+        >>> class CableDrag(Effect):
+        ...     name, stage = "cable_drag", Stage.JOINT_TORQUE
+        ...     parameters = (Parameter("stiffness", "N m/rad", 0.0, 0.0, 1.0, 0.05, "spring balance"),)
+        ...
+        ...     @staticmethod
+        ...     def law(x, j, p, s, dt):
+        ...         return x[JOINT_TORQUE, j] - p[0] * x[POSITION, j]
+    """
+
+    name: ClassVar[str]
+    stage: ClassVar[Stage]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    forms: ClassVar[tuple[dict[str, float], ...]] = ()
+    """Alternative descriptions that a search tries in turn: parameters fitted and their starts, the rest neutral.
+
+    Empty: one form, all parameters at their typical values.
+    """
+
+    def __init__(self, joint: str, **values: float) -> None:
+        """Place the effect on `joint`; parameters not given take their typical value.
+
+        Raises:
+            InputError: an unknown parameter or a value that is no finite number.
+        """
+        self.joint = joint
+        self.values = {p.name: float(values.pop(p.name, p.typical)) for p in self.parameters}
+        for key in values:
+            known = ", ".join(p.name for p in self.parameters)
+            raise InputError(f"effect '{self.name}' has no parameter '{key}'; it has {known}")
+        for key, value in self.values.items():
+            if not isfinite(value):
+                raise InputError(f"effect '{self.name}': {key} is {value}; give a finite number")
+
+    @classmethod
+    def state_size(cls, dt: float) -> int:
+        """How many numbers the law remembers between steps of `dt` [s]; they are zero after a reset."""
+        return 0
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """The new value of the stage's row for joint j; scalar Python that Numba compiles.
+
+        Args:
+            x: (ROWS, n) signals of the joint's finger, see `signals`; columns are joints, so neighbours are visible.
+            j: the joint's column.
+            p: (parameters,) values in the order of `parameters`.
+            s: (state_size,) the law's own memory, to be changed in place.
+            dt: step [s].
+        """
+        raise NotImplementedError
+
+    @staticmethod
+    def configure(view: View, place: Place, p: Array) -> None:
+        """Change the plant's constants before a simulation (MECHANISM effects).
+
+        Args:
+            view: `view(key)` is a writable view of the plant's memory; leading dimensions are a batch.
+            place: the joint.
+            p: (..., parameters) with the same leading dimensions.
+        """
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{key}={value:g}" for key, value in self.values.items())
+        return f"{type(self).__name__}('{self.joint}', {values})"

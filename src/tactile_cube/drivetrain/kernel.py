@@ -1,0 +1,116 @@
+"""Turns a kernel's source into machine code, kept on disk so that the next process starts at once."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+
+import numba
+import numpy as np
+
+from tactile_cube import compiled as decorator
+from tactile_cube.drivetrain import coupled_joints, dry_friction, impedance, signals, target_filter
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.kernel_source import kernel_source
+from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology
+from tactile_cube.errors import InputError
+from tactile_cube.hand import rigid_body_equations
+
+_PHYSICS = (coupled_joints, decorator, dry_friction, impedance, rigid_body_equations, signals, target_filter)
+
+
+class Kernel:
+    """The compiled steps of a plant; all are Numba functions that can be called inside other compiled code.
+
+    Attributes:
+        control_step: (i, q (D,), v (D,), torque_out (D,), memory): torques for PyBullet.
+        step: (command (n,), memory): one step of the mechanism without contacts.
+        rollout: (commands (H + T, n), H, substeps, memory, rows (R,), out (T, R, n)): signals of each command row.
+        rollout_batch: (commands (S, L, n), which (B,), lengths (S,), H, substeps, memory (B, size), rows (R,),
+            out (B, T, R, n)).
+    """
+
+    def __init__(self, topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> None:
+        self._module = load_kernel(topology, effects, layout)
+        self.control_step: Callable[..., None] = self._module.control_step
+        self.step: Callable[..., None] = self._module.step
+        self.rollout: Callable[..., None] = self._module.rollout
+        self.rollout_batch: Callable[..., None] = self._module.rollout_batch
+
+    @cached_property
+    def _callback(self) -> object:
+        return self._module.control_callback()
+
+    @property
+    def control_address(self) -> int:
+        """Address of the control step as void(int64 i, double *q, double *v, double *torque, double *memory)."""
+        return int(self._callback.address)  # type: ignore[attr-defined]
+
+
+def load_kernel(topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> ModuleType:
+    """The kernel's module, written to the cache directory if it is not there yet."""
+    source = kernel_source(topology, effects, layout)
+    name = "kernel_" + _fingerprint(source, effects)
+    if name not in sys.modules:
+        _import_file(name, _write_once(cache_directory() / f"{name}.py", source))
+    return sys.modules[name]
+
+
+def cache_directory() -> Path:
+    """Where compiled kernels are kept: $XDG_CACHE_HOME/tactile_cube, ~/.cache, or the temporary directory."""
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    for root in (Path(home), Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"):
+        folder = root / "tactile_cube"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    raise InputError("no writable directory for compiled kernels; set XDG_CACHE_HOME to one")
+
+
+def _fingerprint(source: str, effects: Sequence[type[Effect]]) -> str:
+    """Of everything that the machine code depends on: any change of a law or a library asks for a new file."""
+    digest = hashlib.sha256(source.encode())
+    for module in _PHYSICS:
+        digest.update(inspect.getsource(module).encode())
+    for effect in effects:
+        digest.update(_source_of(effect).encode())
+    digest.update(f"{numba.__version__} {np.__version__} {sys.version}".encode())
+    return digest.hexdigest()[:20]
+
+
+def _source_of(effect: type[Effect]) -> str:
+    module = sys.modules[effect.__module__]
+    if effect.__module__ == "__main__" or "<locals>" in effect.__qualname__:
+        raise InputError(f"effect '{effect.__qualname__}' must stand at the top of a file of its own, to be imported")
+    return inspect.getsource(module)
+
+
+def _write_once(path: Path, source: str) -> Path:
+    """Writes a file that other processes may be writing too: all write the same, the last one replaces the others."""
+    if not path.exists():
+        handle, draft = tempfile.mkstemp(dir=path.parent, suffix=".py")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(source)
+        os.utime(draft, (0, 0))  # Numba tells versions of a file apart by its time: equal files, equal time
+        os.replace(draft, path)
+    return path
+
+
+def _import_file(name: str, path: Path) -> None:
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"cannot load {path}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)

@@ -1,0 +1,226 @@
+"""A drivetrain and the mechanism that it moves, ready to be stepped: one or more equal fingers, any effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from tactile_cube.drivetrain.constants import DrivetrainConstants
+from tactile_cube.drivetrain.effects.catalogue import matching_joints
+from tactile_cube.drivetrain.effects.effect import Effect, Place, Stage
+from tactile_cube.drivetrain.kernel import Kernel
+from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology, plan_memory
+from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, POSITION, VELOCITY
+from tactile_cube.errors import InputError
+from tactile_cube.hand.rigid_body import RigidBodyTree
+
+Array = npt.NDArray[np.float64]
+EffectClass = type[Effect]
+
+_TREE_KEYS = (
+    "ratio",
+    "offset",
+    "placement_rotation",
+    "placement_translation",
+    "axis",
+    "mass",
+    "com",
+    "inertia",
+)
+_CONSTANT_KEYS = ("kp", "kd", "compliance", "static_friction", "reflected_inertia", "torque_limit", "rate_limit")
+_STARTING_ROWS = {POSITION: "q", VELOCITY: "v", MOTOR_POSITION: "q", COMMAND: "q"}
+CONTACT_TORQUE_LIMIT = 5.0
+"""Largest contact torque that is believed [N m]: 30 N at the outstretched tip of a finger."""
+
+
+class Plant:
+    """C equal chains of n actuated joints each; every number lies in a flat memory that the caller keeps.
+
+    Example:
+        >>> plant = Plant([tree], dt=0.002, effects=[StribeckFriction])
+        >>> memory = plant.memory(DrivetrainConstants(), gravity=(0, 0, -9.81), effects=[StribeckFriction("q3")])
+        >>> plant.reset(memory, q=np.zeros(3))
+        >>> plant.kernel.step(np.zeros(3), memory)
+    """
+
+    def __init__(
+        self,
+        trees: Sequence[RigidBodyTree],
+        dt: float,
+        effects: Sequence[EffectClass] = (),
+        joint_names: Sequence[str] | None = None,
+        trace_rows: int = 0,
+    ) -> None:
+        """Describe a plant.
+
+        Args:
+            trees: one per chain; they may differ in their numbers, not in their structure.
+            dt: step of the physics [s].
+            effects: the effects that can be switched on; each once, in the order in which they act within a stage.
+            joint_names: of all actuated joints, chain by chain; by default the tree's own, with `0/`, `1/` .. before
+                them if there are several chains.
+            trace_rows: steps of the control loop whose signals are kept under the key `trace`.
+
+        Raises:
+            InputError: trees of different structure, a step that is not positive.
+        """
+        if not dt > 0.0:
+            raise InputError(f"dt is {dt} s; the physics step must be positive")
+        self.trees = tuple(trees)
+        self.dt = float(dt)
+        self.effects = tuple(dict.fromkeys(effects))
+        self.topology = _common_topology(self.trees)
+        self.joint_names = _joint_names(self.trees, joint_names)
+        self.trace_rows = trace_rows
+        self.layout: MemoryLayout = plan_memory(self.topology, self.effects, self.dt, trace_rows)
+
+    @property
+    def size(self) -> int:
+        """Numbers in a memory."""
+        return self.layout.size
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """The compiled steps, generated when first used."""
+        return Kernel(self.topology, self.effects, self.layout)
+
+    def view(self, memory: Array, key: str) -> Array:
+        """A writable view (..., shape) of memory (..., size)."""
+        return self.layout.view(memory, key)
+
+    def signal(self, memory: Array, row: int) -> Array:
+        """One signal (..., all joints) of the last step, e.g. `signals.MOTOR_POSITION`."""
+        rows = self.view(memory, "signals")[..., row, :]
+        return rows.reshape(*memory.shape[:-1], self.topology.joints)
+
+    def memory(
+        self,
+        constants: DrivetrainConstants,
+        gravity: npt.ArrayLike = (0.0, 0.0, -9.81),
+        effects: Sequence[Effect] = (),
+    ) -> Array:
+        """A memory (size,) at rest at zero, with these constants and effects.
+
+        Args:
+            constants: of the drivetrain; per-joint values hold n (repeated in every chain) or C n numbers.
+            gravity: (3,) or (C, 3) in the frame of each chain's base [m/s^2].
+            effects: effects to switch on; their classes must be among the plant's.
+        """
+        memory = np.zeros(self.size)
+        self._fill_header(memory)
+        for key in _TREE_KEYS:
+            self.view(memory, key)[...] = np.stack([getattr(tree, key) for tree in self.trees])
+        self.view(memory, "gravity")[...] = gravity
+        self.view(memory, "contact_torque_limit")[...] = CONTACT_TORQUE_LIMIT
+        self.set_constants(memory, constants)
+        self.view(memory, "command_torque_limit")[...] = self.view(memory, "torque_limit")
+        for effect in effects:
+            for joint in matching_joints(effect.joint, self.joint_names):
+                self.set_effect(memory, type(effect), joint, effect.values)
+        self.reset(memory, np.zeros(self.topology.joints))
+        return memory
+
+    def set_constants(self, memory: Array, constants: DrivetrainConstants) -> None:
+        """Write the drivetrain's constants into memory (..., size)."""
+        for key in _CONSTANT_KEYS:
+            value = np.asarray(getattr(constants, key), dtype=float)
+            self.view(memory, key)[...] = self._per_joint(value, key)
+
+    def set_effect(
+        self, memory: Array, effect: EffectClass, joint: str, values: Mapping[str, float | Array]
+    ) -> None:
+        """Switch an effect on at a joint of memory (..., size); values may be (batch,) arrays.
+
+        An effect on the MECHANISM changes the constants in place, so apply it once to a fresh memory.
+        """
+        self._check_known(effect)
+        a = self._index(joint)
+        block = np.empty((*memory.shape[:-1], len(effect.parameters)))
+        for k, parameter in enumerate(effect.parameters):
+            block[..., k] = values.get(parameter.name, parameter.typical)
+        if effect.stage is Stage.MECHANISM:
+            effect.configure(lambda key: self.view(memory, key), self.place(joint), block)
+            return
+        self.view(memory, f"parameters:{effect.name}")[..., a, :] = block
+        self.view(memory, f"active:{effect.name}")[..., a] = 1.0
+
+    def clear_effect(self, memory: Array, effect: EffectClass, joint: str) -> None:
+        """Switch an effect off at a joint."""
+        self._check_known(effect)
+        self.view(memory, f"active:{effect.name}")[..., self._index(joint)] = 0.0
+
+    def place(self, joint: str) -> Place:
+        """Where a joint sits in the plant."""
+        a = self._index(joint)
+        chain, j = divmod(a, len(self.topology.leader))
+        return Place(joint=a, chain=chain, link=self.topology.leader[j])
+
+    def reset(self, memory: Array, q: npt.ArrayLike, v: npt.ArrayLike = 0.0, time: float = 0.0) -> None:
+        """Start anew at positions q and speeds v (..., all joints): filters at q, effects without a past.
+
+        Args:
+            memory: (..., size).
+            q: link-side positions [rad].
+            v: [rad/s].
+            time: of the first step [s].
+        """
+        for key in ("q", "filtered", "limited", "goal"):
+            self.view(memory, key)[...] = q
+        self.view(memory, "v")[...] = v
+        for key in ("extra", "contact", "signals", "seen"):
+            self.view(memory, key)[...] = 0.0
+        self.view(memory, "step")[...] = time / self.dt
+        for effect in self.effects:
+            self.view(memory, f"state:{effect.name}")[...] = 0.0
+        by_chain = (*memory.shape[:-1], self.topology.chains, len(self.topology.leader))
+        rows = self.view(memory, "signals")
+        for row, key in _STARTING_ROWS.items():
+            rows[..., row, :] = self.view(memory, key).reshape(by_chain)
+
+    def _fill_header(self, memory: Array) -> None:
+        first_state, _ = self.layout.entries["trace"]
+        header = {"size": self.size, "dt": self.dt, "trace_rows": self.trace_rows, "trace_offset": first_state}
+        for key, value in header.items():
+            self.view(memory, key)[...] = value
+        states = [self.layout.entries[f"state:{effect.name}"] for effect in self.effects]
+        self.view(memory, "state_offset")[...] = [offset for offset, _ in states]
+        self.view(memory, "state_size")[...] = [shape[1] for _, shape in states]
+
+    def _per_joint(self, value: Array, key: str) -> Array:
+        count, every = len(self.topology.leader), self.topology.joints
+        if value.ndim and value.shape[-1] not in (count, every):
+            raise InputError(f"drivetrain {key} has {value.shape[-1]} values for {count} joints; give one or one each")
+        return np.tile(value, self.topology.chains) if value.ndim and value.shape[-1] == count else value
+
+    def _index(self, joint: str) -> int:
+        if joint not in self.joint_names:
+            raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(self.joint_names)}")
+        return self.joint_names.index(joint)
+
+    def _check_known(self, effect: EffectClass) -> None:
+        if effect not in self.effects:
+            raise InputError(f"effect '{effect.name}' is not among this plant's effects; name it when it is built")
+
+
+def _common_topology(trees: Sequence[RigidBodyTree]) -> Topology:
+    found = [_topology(tree, len(trees)) for tree in trees]
+    if not found or any(topology != found[0] for topology in found):
+        raise InputError(f"a plant needs chains of equal structure; got {len(found)} that differ; use one tree for all")
+    return found[0]
+
+
+def _topology(tree: RigidBodyTree, chains: int) -> Topology:
+    leader = tuple(tree.dof_names.index(name) for name in tree.joint_names)
+    parts = (tuple(int(k) for k in part) for part in (tree.parent, tree.prismatic, tree.follow))
+    return Topology(chains, *parts, leader)
+
+
+def _joint_names(trees: Sequence[RigidBodyTree], names: Sequence[str] | None) -> tuple[str, ...]:
+    chains = enumerate(trees)
+    own = [name if len(trees) == 1 else f"{c}/{name}" for c, tree in chains for name in tree.joint_names]
+    if names is not None and len(names) != len(own):
+        raise InputError(f"{len(names)} joint names for {len(own)} actuated joints; name each once")
+    return tuple(names) if names is not None else tuple(own)

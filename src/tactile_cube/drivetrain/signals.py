@@ -1,0 +1,36 @@
+"""What a law of the drivetrain can see of its finger: rows of `x` (ROWS, n), one column a joint.
+
+A step fills the rows in this order; a law that runs before a row is filled sees the previous step's value.
+"""
+
+POSITION = 0
+"""q: link side of the drive [rad]."""
+VELOCITY = 1
+"""Speed of the joint [rad/s]."""
+ACCELERATION = 2
+"""Acceleration in the previous step [rad/s^2]."""
+CONTACT = 3
+"""Torque from outside on the joint: contacts, known loads [N m]."""
+LOAD = 4
+"""Gravity, Coriolis and coupling torque less CONTACT: what the drive has to hold [N m]."""
+TIME = 5
+"""Time since the start of the recording or episode [s]."""
+COMMAND = 6
+"""q_d: desired position that reaches the controller [rad]."""
+MEASURED_VELOCITY = 7
+"""Speed that the controller damps with [rad/s]."""
+CONTROLLER_TORQUE = 8
+"""Torque that the controller asks for, within the torque limit [N m]."""
+TORQUE = 9
+"""Torque that the motor gives to the drive [N m]."""
+DEFLECTION = 10
+"""q_m - q: what the drive's elasticity (and play) adds [rad]."""
+MOTOR_POSITION = 11
+"""q_m: position that the sensor on the motor side reports [rad]."""
+JOINT_TORQUE = 12
+"""Further torque on the joint that depends smoothly on its motion [N m]."""
+DIRECTION = 13
+"""Sign of the speed; at rest, the sign of the torque that pushes the joint."""
+FRICTION = 14
+"""Largest dry-friction torque against DIRECTION, zero or more [N m]."""
+ROWS = 15
