@@ -1,0 +1,1 @@
+"""Soft actor-critic with an asymmetric critic: networks, losses and optimisers behind one `update(batch)`."""

@@ -1,0 +1,75 @@
+"""Actor and critic of the paper: two hidden layers of 512, the actor without any privileged input."""
+
+import math
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.settings import AgentSettings
+
+LOG_SCALE_LOW, LOG_SCALE_HIGH = -5.0, 2.0
+"""Bounds of log sigma; an untrained actor starts in the middle with sigma = 0.22."""
+
+
+def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:
+    """Linear layers with ReLU between them, e.g. sizes (120, 512, 512, 24)."""
+    layers: list[nn.Module] = []
+    for fan_in, fan_out in zip(sizes[:-2], sizes[1:-1], strict=True):
+        layers.append(nn.Linear(fan_in, fan_out))
+        if layer_norm:
+            # No scale and shift: the next layer has both.
+            layers.append(nn.LayerNorm(fan_out, elementwise_affine=False))
+        layers.append(nn.ReLU())
+    return nn.Sequential(*layers, nn.Linear(sizes[-2], sizes[-1]))
+
+
+def log_scale(raw: Tensor) -> Tensor:
+    """Squash the network's second half to log sigma in [LOG_SCALE_LOW, LOG_SCALE_HIGH]."""
+    return LOG_SCALE_LOW + 0.5 * (LOG_SCALE_HIGH - LOG_SCALE_LOW) * (torch.tanh(raw) + 1.0)
+
+
+def squashed_log_prob(noise: Tensor, log_sigma: Tensor, pre_tanh: Tensor) -> Tensor:
+    """Log density of a = tanh(mu + sigma * noise) under the tanh-normal policy, summed over joints, (batch, 1)."""
+    normal = -0.5 * noise.square() - log_sigma - 0.5 * math.log(2.0 * math.pi)
+    jacobian = 2.0 * (math.log(2.0) - pre_tanh - nn.functional.softplus(-2.0 * pre_tanh))
+    return (normal - jacobian).sum(-1, keepdim=True)
+
+
+class Actor(nn.Module):
+    """Gaussian policy squashed by tanh to actions in [-1, 1]; it sees the stacked observation and nothing else."""
+
+    def __init__(self, sizes: Sizes, hidden: Sequence[int]):
+        super().__init__()
+        self.body = perceptron((sizes.observation, *hidden, 2 * sizes.action))
+
+    def forward(self, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and scale of the Gaussian before tanh, each (batch, action)."""
+        mean, raw = self.body(observation).chunk(2, -1)
+        return mean, log_scale(raw).exp()
+
+    def deterministic(self, observation: Tensor) -> Tensor:
+        """The policy without exploration: tanh of the mean, (batch, action)."""
+        mean: Tensor = self.forward(observation)[0]
+        return torch.tanh(mean)
+
+
+class Critic(nn.Module):
+    """Q(observation, privileged, action) -> (batch, 1)."""
+
+    def __init__(self, sizes: Sizes, hidden: Sequence[int], layer_norm: bool = False):
+        super().__init__()
+        self.body = perceptron((sizes.critic, *hidden, 1), layer_norm)
+
+    def forward(self, observation: Tensor, privileged: Tensor, action: Tensor) -> Tensor:
+        """State-action value (batch, 1)."""
+        value: Tensor = self.body(torch.cat((observation, privileged, action), -1))
+        return value
+
+
+def build_networks(sizes: Sizes, settings: AgentSettings) -> tuple[Actor, Critic, Critic]:
+    """Actor and twin critics with torch's default initialisation, drawn in this order from torch's generator."""
+    actor = Actor(sizes, settings.hidden)
+    critics = [Critic(sizes, settings.hidden, settings.layer_norm) for _ in range(2)]
+    return actor, critics[0], critics[1]

@@ -1,0 +1,127 @@
+"""The readable composition: TorchRL's SACLoss, one fused AdamW, soft target updates."""
+
+import copy
+from typing import Any
+
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import Tensor
+from torchrl.data import Bounded
+from torchrl.modules import ProbabilisticActor, TanhNormal, ValueOperator
+from torchrl.objectives import SACLoss, SoftUpdate
+
+from tactile_cube.agent.batch import Batch, Sizes
+from tactile_cube.agent.networks import Actor, build_networks
+from tactile_cube.agent.settings import AgentSettings
+from tactile_cube.errors import InputError
+
+CRITIC_KEYS = ["observation", "privileged", "action"]
+
+
+def stochastic_actor(actor: Actor, action_size: int) -> ProbabilisticActor:
+    """The actor as TorchRL's tanh-normal policy: reads "observation" only, writes "action"."""
+    return ProbabilisticActor(
+        module=TensorDictModule(actor, in_keys=["observation"], out_keys=["loc", "scale"]),
+        in_keys=["loc", "scale"],
+        spec=Bounded(-1.0, 1.0, (action_size,)),
+        distribution_class=TanhNormal,
+        return_log_prob=False,
+    )
+
+
+class Sac:
+    """Soft actor-critic from TorchRL's parts."""
+
+    def __init__(self, sizes: Sizes, **settings: Any):
+        self.sizes = sizes
+        self.settings = AgentSettings(**settings)
+        if self.settings.precision != "fp32":
+            raise InputError(f"agent.precision={self.settings.precision}: agent=sac computes in fp32; use agent=sac_fast")
+        self.device = torch.device(self.settings.device)
+        self.actor, *critics = build_networks(sizes, self.settings)
+        self.loss = self._build_loss(critics).to(self.device)
+        self.targets = SoftUpdate(self.loss, tau=self.settings.tau)
+        self.optimizer = self._build_optimizer()
+
+    def _build_loss(self, critics: list[Any]) -> SACLoss:
+        loss = SACLoss(
+            actor_network=stochastic_actor(self.actor, self.sizes.action),
+            qvalue_network=[ValueOperator(critic, in_keys=CRITIC_KEYS) for critic in critics],
+            loss_function="l2",
+            alpha_init=self.settings.alpha_init,
+            target_entropy=self.settings.target_entropy,
+            deactivate_vmap=True,  # a plain loop over two critics is faster than vmap on a CPU
+        )
+        loss.make_value_estimator(gamma=self.settings.gamma)
+        return loss
+
+    def _build_optimizer(self) -> torch.optim.AdamW:
+        networks = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
+        temperature = {"params": [self.loss.log_alpha], "lr": self.settings.temperature_learning_rate, "weight_decay": 0.0}
+        return torch.optim.AdamW(
+            [{"params": networks}, temperature],
+            lr=self.settings.learning_rate,
+            weight_decay=self.settings.weight_decay,
+            fused=True,
+        )
+
+    def losses(self, batch: Batch) -> TensorDict:
+        """SACLoss on a batch: loss_qvalue, loss_actor, loss_alpha, alpha, entropy."""
+        return self.loss(self._tensordict(batch.to(self.device)))
+
+    def update(self, batch: Batch) -> dict[str, Tensor]:
+        """One step of critics, actor and temperature, then of the target critics."""
+        losses = self.losses(batch)
+        (losses["loss_qvalue"] + losses["loss_actor"] + losses["loss_alpha"]).backward()
+        self.optimizer.step()
+        self.optimizer.zero_grad()
+        self.targets.step()
+        return {
+            "critic_loss": losses["loss_qvalue"].detach(),
+            "actor_loss": losses["loss_actor"].detach(),
+            "alpha": losses["alpha"],
+            "entropy": losses["entropy"],
+            # E[alpha log pi - Q] is the actor's loss, so the value of its actions follows from it.
+            "value": -losses["loss_actor"].detach() - losses["alpha"] * losses["entropy"],
+        }
+
+    def _tensordict(self, batch: Batch) -> TensorDict:
+        terminated = batch.terminated > 0.5
+        following = {
+            "observation": batch.next_observation,
+            "privileged": batch.next_privileged,
+            "reward": batch.reward,
+            "done": terminated,
+            "terminated": terminated,
+        }
+        current = {key: getattr(batch, key) for key in CRITIC_KEYS}
+        return TensorDict(
+            {**current, "steps_to_next_obs": batch.steps, "next": following}, batch_size=batch.reward.shape[:1]
+        )
+
+    def policy(self) -> Actor:
+        """A copy of the actor on the CPU, detached from the learner."""
+        return copy.deepcopy(self.actor).cpu().requires_grad_(False)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Networks, targets, temperature and optimiser."""
+        return {"loss": self.loss.state_dict(), "optimizer": self.optimizer.state_dict()}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Inverse of `state_dict`."""
+        self.loss.load_state_dict(state["loss"])
+        self.optimizer.load_state_dict(state["optimizer"])
+
+    def load_networks(self, state: dict[str, Any]) -> None:
+        """Warm start: networks and targets of a state, fresh optimiser and temperature."""
+        kept = {name: value for name, value in state["loss"].items() if name != "log_alpha"}
+        self.loss.load_state_dict(kept, strict=False)
+
+    def load_actor(self, actor: Actor) -> None:
+        """Warm start of the actor alone."""
+        self.actor.load_state_dict(actor.state_dict())
+
+    def approximations(self) -> list[str]:
+        """None: float32 throughout."""
+        return []

@@ -1,0 +1,48 @@
+"""Every number of the learning algorithm, checked once."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
+
+
+class AgentSettings(BaseModel):
+    """Hyperparameters of SAC; the defaults are the paper's first training where it publishes them.
+
+    Attributes:
+        hidden: widths of the hidden layers of the actor and of each critic.
+        layer_norm: normalise the critics' hidden layers (without scale and shift).
+        gamma: discount a policy step.
+        learning_rate: of actor and critics (not published; 3e-4 is the usual choice).
+        alpha_learning_rate: of the temperature's logarithm; None takes learning_rate.
+        weight_decay: decoupled decay (AdamW) of actor and critics, not of the temperature.
+        tau: share of the online critics that flows into the targets at each update (not published).
+        alpha_init: temperature at the start.
+        target_entropy: entropy [nat] the temperature is tuned towards.
+        n_step: rewards summed before bootstrapping.
+        batch_size: replayed transitions an update.
+        precision: arithmetic of the matrix products; bf16 is for `sac_fast` only.
+        device: "cpu", "cuda" or "cuda:0"; collection stays on the CPU.
+
+    Source: website table of the paper.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    hidden: tuple[PositiveInt, ...] = Field(default=(512, 512), min_length=1)
+    layer_norm: bool = False
+    gamma: float = Field(default=0.9, gt=0.0, lt=1.0)
+    learning_rate: PositiveFloat = 3e-4
+    alpha_learning_rate: PositiveFloat | None = None
+    weight_decay: float = Field(default=2.5e-4, ge=0.0)
+    tau: float = Field(default=0.005, gt=0.0, le=1.0)
+    alpha_init: PositiveFloat = 0.2
+    target_entropy: float = -6.0
+    n_step: PositiveInt = 1
+    batch_size: PositiveInt = 256
+    precision: Literal["fp32", "bf16"] = "fp32"
+    device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?)$")
+
+    @property
+    def temperature_learning_rate(self) -> float:
+        """Learning rate of log alpha."""
+        return self.alpha_learning_rate or self.learning_rate

@@ -1,0 +1,184 @@
+"""The wrapper that all verbs share: quick help, configuration by Hydra, and errors in one line.
+
+A verb is a module of this package with a function decorated by `verb`; it imports nothing slow at its top, so that `--help`
+and `--cfg job` answer at once.
+"""
+
+import ast
+import functools
+import os
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import yaml
+
+from tactile_cube.errors import InputError
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+CONFIG = Path(__file__).parent / "conf"
+"""The configuration tree; in a checkout a link to conf/ at the top."""
+
+USAGE_ERROR = 2
+
+
+def verb(name: str) -> Callable[[Callable[["DictConfig"], None]], Callable[[], None]]:
+    """Make a function of a configuration a command line of its own.
+
+    Args:
+        name: of the verb; its configuration is conf/<name>.yaml.
+
+    Example:
+        >>> @verb("train")
+        ... def main(config: DictConfig) -> None: ...
+    """
+
+    def decorate(function: Callable[["DictConfig"], None]) -> Callable[[], None]:
+        @functools.wraps(function)
+        def command() -> None:
+            if {"--help", "-h"} & set(sys.argv[1:]):
+                print(help_text(name))
+                return
+            _run(name, function)
+
+        return command
+
+    return decorate
+
+
+def _run(name: str, function: Callable[["DictConfig"], None]) -> None:
+    import hydra
+    from hydra.errors import HydraException
+    from omegaconf.errors import OmegaConfBaseException
+    from pydantic import ValidationError
+
+    wants_traceback = bool(os.environ.get("HYDRA_FULL_ERROR", "0") != "0")
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra would print errors in its own way and exit with status 1
+    try:
+        hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(function)()
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        sys.exit(130)
+    except Exception as error:
+        if wants_traceback:
+            raise
+        cause = _find(error, InputError) or _find(error, ValidationError)
+        cause = cause or _find(error, (HydraException, OmegaConfBaseException))
+        if cause is None:
+            raise
+        fail(_one_line(cause))
+
+
+def fail(message: str) -> NoReturn:
+    """One line on stderr, exit code 2."""
+    print(f"error: {message}", file=sys.stderr)
+    sys.exit(USAGE_ERROR)
+
+
+def _find(error: BaseException | None, kinds: Any) -> BaseException | None:
+    """The first error of some kind among an error and its causes."""
+    while error is not None:
+        if isinstance(error, kinds):
+            return error
+        error = error.__cause__ or error.__context__
+    return None
+
+
+def _one_line(error: BaseException) -> str:
+    from pydantic import ValidationError
+
+    if isinstance(error, ValidationError):
+        return "; ".join(_describe(error.title, dict(entry)) for entry in error.errors())
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return " ".join(lines) or type(error).__name__
+
+
+def _describe(title: str, entry: dict[str, Any]) -> str:
+    group = title.removesuffix("Settings").lower()
+    key = ".".join([group, *(str(part) for part in entry["loc"])])
+    message = str(entry["msg"]).removeprefix("Value error, ")
+    if entry["type"] == "extra_forbidden":
+        return f"{key}: no such setting"
+    return f"{key}={entry['input']}: {message}" if entry["loc"] else f"{group}: {message}"
+
+
+def help_text(name: str) -> str:
+    """What `--help` prints: the verbs, and the groups and keys of this one."""
+    lines = [f"python -m tactile_cube.{name}: {_verbs().get(name, '')}", "", "Verbs:"]
+    lines += [f"  python -m tactile_cube.{other:<10} {summary}" for other, summary in _verbs().items()]
+    path = CONFIG / f"{name}.yaml"
+    if path.is_file():
+        lines += ["", "Groups (choose with group=option):", *_group_lines(path)]
+        lines += ["", "Keys (set with key=value):", *_key_lines(path)]
+    lines += [
+        "",
+        "--cfg job shows the configuration; -m runs every combination of comma-separated values; "
+        "--hydra-help shows Hydra's own options.",
+    ]
+    return "\n".join(lines)
+
+
+def _verbs() -> dict[str, str]:
+    """Verbs of the package and the first line of what they say about themselves, without importing them."""
+    result = {}
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        text = path.read_text()
+        if f'@verb("{path.stem}")' in text:
+            docstring = ast.get_docstring(ast.parse(text)) or ""
+            result[path.stem] = docstring.partition("\n")[0]
+    return result
+
+
+def _group_lines(path: Path) -> list[str]:
+    lines = []
+    for group, default in _groups(path).items():
+        files = sorted((CONFIG / group).glob("*.yaml"))
+        for index, file in enumerate(files):
+            mark = "*" if file.stem == default else " "
+            head = f"{group}=" if index == 0 else ""
+            lines.append(f"  {head:<16}{mark}{file.stem:<12} {_summary(file)}")
+    return [*lines, "  (* is the default; an experiment is added with +experiment=<option>)"]
+
+
+def _summary(file: Path) -> str:
+    """The first sentence of the comment that a configuration file begins with."""
+    comment = []
+    for line in file.read_text().splitlines():
+        if not line.startswith("#"):
+            break
+        if "@package" not in line:
+            comment.append(line.lstrip("# ").strip())
+    text = " ".join(comment)
+    return re.split(r"(?<=[.:;]) ", text)[0].rstrip(":;") if text else ""
+
+
+def _groups(path: Path) -> dict[str, str | None]:
+    groups: dict[str, str | None] = {}
+    for entry in yaml.safe_load(path.read_text()).get("defaults", []):
+        if isinstance(entry, dict):
+            ((group, option),) = entry.items()
+            name = group.removeprefix("override ").removeprefix("optional ").split("@")[0].strip("/ ")
+            if (CONFIG / name).is_dir() and name != "hydra":
+                groups[name] = option
+    if (CONFIG / "experiment").is_dir():
+        groups["experiment"] = None
+    return groups
+
+
+def _key_lines(path: Path) -> list[str]:
+    """Top-level keys of a verb's file with the comments behind them, as written there."""
+    lines = path.read_text().splitlines()
+    inside = False
+    kept = []
+    for line in lines:
+        if line.startswith("defaults:"):
+            inside = True
+        elif inside and (not line or line[0] not in " #-"):
+            inside = False
+        if not inside and line and line[0] not in " #":
+            kept.append(f"  {line}")
+    return kept

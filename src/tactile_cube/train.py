@@ -1,0 +1,55 @@
+"""Train a policy, or go on training it: the same command resumes.
+
+What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and policy_best.safetensors,
+checkpoint.pt (to go on from), ledger.json (CPU-hours), .hydra/ (configuration) and train.log.
+"""
+
+from typing import TYPE_CHECKING
+
+from tactile_cube.cli import verb
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+
+@verb("train")
+def main(config: "DictConfig") -> None:
+    """Compose, build, train, say where the result is."""
+    import sys
+    from pathlib import Path
+
+    from hydra.core.hydra_config import HydraConfig
+    from hydra.utils import instantiate
+    from omegaconf import OmegaConf
+
+    from tactile_cube.training.build import build_run
+    from tactile_cube.training.collection import CollectionError
+    from tactile_cube.training.environment import as_environment
+    from tactile_cube.training.settings import CollectorSettings, TrainingSettings
+
+    plain = OmegaConf.to_container(config, resolve=True)
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    try:
+        run = build_run(
+            folder=folder,
+            seed=config.seed,
+            environment=as_environment(instantiate(config.env)),
+            make_agent=instantiate(config.agent, _partial_=True),
+            collector=CollectorSettings(**plain["collector"]),
+            training=TrainingSettings(**plain["training"]),
+            loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
+            config=plain,
+        )
+        run.announce()
+        reason = run.train()
+    except CollectionError as error:
+        print(f"error: {error}; the same command goes on from the last checkpoint in {folder}", file=sys.stderr)
+        sys.exit(1)
+    finally:
+        if "run" in locals():
+            run.close()
+    run.conclude(reason)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,128 @@
+"""Put a run together: fresh, or where it was."""
+
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.policy_file import load_policy, require_sizes
+from tactile_cube.errors import InputError
+from tactile_cube.training.checkpoint import FILE, load_checkpoint, require_same_settings
+from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
+from tactile_cube.training.environment import Environment
+from tactile_cube.training.episodes import EpisodeStatistics
+from tactile_cube.training.ledger import LEDGER, Ledger
+from tactile_cube.training.loggers import Loggers, MetricLogger
+from tactile_cube.training.loop import Learner
+from tactile_cube.training.replay import Replay
+from tactile_cube.training.run import Run
+from tactile_cube.training.settings import CollectorSettings, TrainingSettings
+
+MakeLogger = Callable[..., MetricLogger]
+
+
+def build_run(
+    folder: Path,
+    seed: int,
+    environment: Environment,
+    make_agent: Callable[[Sizes], Agent],
+    collector: CollectorSettings,
+    training: TrainingSettings,
+    loggers: Mapping[str, MakeLogger],
+    config: dict[str, Any],
+) -> Run:
+    """A run in `folder`: gone on with where its checkpoint says, or new.
+
+    Args:
+        folder: run folder; made if need be.
+        seed: of everything random.
+        environment: the worlds.
+        make_agent: builds the agent for the environment's sizes.
+        collector: how worlds are spread over processes.
+        training: schedule.
+        loggers: makers of loggers by name, called with `folder` and `resumed_at`.
+        config: the resolved configuration, as plain data.
+
+    Raises:
+        InputError: a checkpoint that is damaged or made with other settings, an unusable `init_from`.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(training.threads)
+    torch.manual_seed(seed)
+    saved = _saved_state(folder, training, config)
+    agent = make_agent(environment.sizes)
+    if saved is None and training.init_from:
+        warm_start(agent, Path(training.init_from))
+    collection = build_collection(environment, agent.policy(), collector, training)
+    learner = Learner(
+        agent=agent,
+        replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
+        collection=collection,
+        episodes=EpisodeStatistics(environment.outcomes),
+        settings=training,
+        reward_weights=environment.reward_weights,
+        seed=seed,
+    )
+    if saved is not None:
+        learner.load_state_dict(saved["learner"])
+    in_process = isinstance(collection, SingleCollection)
+    processes = 1 if in_process else collector.workers + 1
+    ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
+    made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
+    run = Run(learner, folder, config, Loggers(made), ledger)
+    run.best_angle = saved["best_angle"] if saved is not None else 0.0
+    return run
+
+
+def build_collection(
+    environment: Environment, actor: Actor, collector: CollectorSettings, training: TrainingSettings
+) -> Collection:
+    """Worker processes, or this one."""
+    if collector.kind == "single":
+        return SingleCollection(environment.make, actor, collector.worlds, training.steps_per_iteration)
+    return MultiSyncCollection(
+        environment.make,
+        actor,
+        collector.worlds,
+        training.steps_per_iteration,
+        collector.workers,
+        collector.timeout,
+        collector.start_method,
+    )
+
+
+def warm_start(agent: Agent, path: Path) -> None:
+    """Begin from the networks of a checkpoint, or from a policy file's actor."""
+    if path.suffix == ".safetensors":
+        actor, info = load_policy(path)
+        require_sizes(path, info, agent.sizes.observation, agent.sizes.action)
+        _fit(path, lambda: agent.load_actor(actor))
+    else:
+        state = load_checkpoint(path)
+        _fit(path, lambda: agent.load_networks(state["learner"]["agent"]))
+
+
+def _fit(path: Path, load: Callable[[], None]) -> None:
+    try:
+        load()
+    except (RuntimeError, KeyError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"training.init_from={path}: networks of other shape or kind than agent.* asks for ({reason})") from error
+
+
+def _saved_state(folder: Path, training: TrainingSettings, config: dict[str, Any]) -> dict[str, Any] | None:
+    path = folder / FILE
+    if training.resume == "never":
+        path.unlink(missing_ok=True)
+        (folder / LEDGER).unlink(missing_ok=True)
+        shutil.rmtree(folder / "tensorboard", ignore_errors=True)
+    if not path.is_file():
+        return None
+    saved = load_checkpoint(path)
+    require_same_settings(path, saved["config"], config)
+    return saved

@@ -1,0 +1,264 @@
+"""Collect experience: in worker processes while the learner works, or in this process.
+
+Both give the same numbers for the same seed and division of worlds: everything random in a worker comes from torch's
+generator and the worlds' own, and `restart` sets both.
+"""
+
+import copy
+import os
+import signal
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, TimeoutError
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torchrl.collectors import Collector, MultiSyncCollector
+from torchrl.envs import EnvBase
+
+from tactile_cube.agent.behaviour import Behaviour
+from tactile_cube.agent.networks import Actor
+from tactile_cube.training.background import Background
+
+MakeEnv = Callable[..., EnvBase]
+"""make_env(worlds=n, seed=s) -> batched environment of n worlds with a method set_progress(steps, performance)."""
+
+Progress = tuple[int, float]
+"""What a curriculum goes by: environment steps so far, and mean final angle [rad] of the last episodes."""
+
+
+class CollectionError(RuntimeError):
+    """A simulation worker died, got stuck or failed; the run can go on from its last checkpoint."""
+
+
+class Collection(Protocol):
+    """A source of blocks of experience (worlds, steps)."""
+
+    def restart(self, seed: int, progress: Progress) -> None:
+        """Reset all worlds and seed everything random in them."""
+
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> dict[str, float]:
+        """Begin collecting one block with these weights; gives the curriculum's values in force, e.g. {"T_s": 0.2}."""
+
+    def take(self) -> TensorDictBase:
+        """Wait for the block begun last; it is the caller's to keep."""
+
+    def cpu_seconds(self) -> float:
+        """CPU time spent simulating so far [s]."""
+
+    def close(self) -> None:
+        """End the workers."""
+
+
+class SingleCollection:
+    """All worlds in this process, stepped before the learner's updates: nothing overlaps, everything is in reach.
+
+    Args:
+        make_env: see `MakeEnv`.
+        actor: any actor of the right sizes.
+        worlds: number of worlds.
+        steps: environment steps a world and block.
+    """
+
+    def __init__(self, make_env: MakeEnv, actor: Actor, worlds: int, steps: int):
+        self._behaviour = Behaviour(copy.deepcopy(actor))
+        with torch.random.fork_rng(devices=[]):  # worlds seed torch's generator, which here is the learner's too
+            self._env = make_env(worlds=worlds, seed=0)
+            self._collector = Collector(
+                self._env,
+                self._behaviour,
+                frames_per_batch=worlds * steps,
+                total_frames=-1,
+                trust_policy=True,
+                auto_register_policy_transforms=False,
+            )
+            self._random_state = torch.get_rng_state()
+        self._blocks = iter(self._collector)
+        self._block: TensorDictBase | None = None
+        self._cpu = 0.0
+
+    def restart(self, seed: int, progress: Progress) -> None:
+        """Reset all worlds and seed everything random in them."""
+        self._env.set_progress(*progress)
+        self._aside(partial(self._seed_and_reset, seed))
+
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> dict[str, float]:
+        """Collect one block."""
+        conditions: dict[str, float] = self._env.set_progress(*progress)
+        self._behaviour.actor.load_state_dict(actor.state_dict())
+        self._behaviour.random.fill_(float(random))
+        self._block = self._aside(lambda: next(self._blocks).clone())
+        return conditions
+
+    def take(self) -> TensorDictBase:
+        """The block collected last."""
+        assert self._block is not None, "launch first"
+        return self._block
+
+    def cpu_seconds(self) -> float:
+        """CPU time spent simulating so far [s]."""
+        return self._cpu
+
+    def close(self) -> None:
+        """Close the worlds."""
+        self._collector.shutdown()
+
+    def _seed_and_reset(self, seed: int) -> None:
+        self._collector.set_seed(seed)
+        torch.manual_seed(seed)
+        self._collector.reset()
+
+    def _aside(self, call: Callable[[], Any]) -> Any:
+        """Run a call on the collection's own random state, as if it were another process."""
+        learner_state, started = torch.get_rng_state(), time.thread_time()
+        torch.set_rng_state(self._random_state)
+        try:
+            return call()
+        finally:
+            self._random_state = torch.get_rng_state()
+            torch.set_rng_state(learner_state)
+            self._cpu += time.thread_time() - started
+
+
+class MultiSyncCollection:
+    """Worker processes that host several worlds each and step them while the learner updates.
+
+    Args:
+        make_env: see `MakeEnv`.
+        actor: any actor of the right sizes.
+        worlds: number of worlds in all.
+        steps: environment steps a world and block.
+        processes: worker processes; divides `worlds`.
+        timeout: longest wait for a block or a start [s]; then the workers count as stuck.
+        start_method: "fork" (Linux, fast) or "spawn".
+    """
+
+    def __init__(
+        self, make_env: MakeEnv, actor: Actor, worlds: int, steps: int, processes: int, timeout: float, start_method: str
+    ):
+        self._timeout = timeout
+        self._behaviour = Behaviour(copy.deepcopy(actor))
+        self._thread = Background()
+        self._block: Future[TensorDictBase] | None = None
+        self._final_cpu: float | None = None
+        self._processes: list[Any] = []
+        per_process = worlds // processes
+        build = partial(self._build, make_env, per_process, processes, worlds * steps, start_method)
+        self._collector, self._blocks = self._wait(self._thread.submit(build), "start")
+        self._processes = self._collector.procs
+
+    def _build(
+        self, make_env: MakeEnv, worlds: int, processes: int, frames: int, start_method: str
+    ) -> tuple[MultiSyncCollector, Any]:
+        torch.multiprocessing.set_start_method(start_method, force=True)
+        threads = torch.get_num_threads()
+        collector = MultiSyncCollector(
+            [make_env] * processes,
+            self._behaviour,
+            create_env_kwargs=[{"worlds": worlds, "seed": index} for index in range(processes)],
+            frames_per_batch=frames,
+            total_frames=-1,
+            cat_results="stack",
+            num_threads=threads,
+            num_sub_threads=1,
+            trust_policy=True,
+            auto_register_policy_transforms=False,
+            init_fn=_prepare_worker,
+        )
+        torch.set_num_threads(threads)
+        return collector, iter(collector)
+
+    def restart(self, seed: int, progress: Progress) -> None:
+        """Reset all worlds and seed everything random in them."""
+        self._set_progress(progress)
+        self._wait(self._thread.submit(partial(self._collector.set_seed, seed)), "restart")
+
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> dict[str, float]:
+        """Hand the weights to the workers and let them collect one block."""
+        conditions = self._set_progress(progress)
+        self._behaviour.actor.load_state_dict(actor.state_dict())
+        self._behaviour.random.fill_(float(random))
+        weights = TensorDict.from_module(self._behaviour).data.clone()
+        self._block = self._thread.submit(partial(self._collect, weights))
+        return conditions
+
+    def _set_progress(self, progress: Progress) -> dict[str, float]:
+        call = partial(self._collector.map_fn, "env.set_progress", [progress] * len(self._processes))
+        conditions: dict[str, float] = self._wait(self._thread.submit(call), "set the curriculum")[0]
+        return conditions
+
+    def _collect(self, weights: TensorDictBase) -> TensorDictBase:
+        self._check_alive()
+        self._collector.update_policy_weights_(weights)
+        block: TensorDictBase = next(self._blocks).flatten(0, 1).clone()
+        return block
+
+    def take(self) -> TensorDictBase:
+        """Wait for the block begun last."""
+        assert self._block is not None, "launch first"
+        return self._wait(self._block, "collect")
+
+    def cpu_seconds(self) -> float:
+        """CPU time of all workers since they started [s]; 0 where the system does not tell."""
+        if self._final_cpu is not None:
+            return self._final_cpu
+        return sum(_process_cpu_seconds(process.pid) for process in self._processes)
+
+    def close(self) -> None:
+        """End the workers; kill those that do not listen."""
+        self._final_cpu = self.cpu_seconds()
+        closing = self._thread.submit(partial(self._collector.shutdown, timeout=5.0, raise_on_error=False))
+        try:
+            closing.result(timeout=8.0)
+        except Exception:  # a worker that cannot be asked is killed below
+            self._kill()
+        self._thread.close()
+
+    def _wait(self, future: "Future[Any]", doing: str) -> Any:
+        try:
+            return future.result(timeout=self._timeout)
+        except TimeoutError:
+            self._kill()
+            raise CollectionError(
+                f"no simulation worker answered within collector.timeout={self._timeout:g} s (to {doing})"
+            ) from None
+        except Exception as error:
+            self._kill()
+            raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
+
+    def _check_alive(self) -> None:
+        # torchrl would hang sending weights to a dead worker
+        for index, process in enumerate(self._processes):
+            if not process.is_alive():
+                raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
+
+    def _kill(self) -> None:
+        for process in self._processes:
+            try:
+                process.kill()
+            except (ValueError, AttributeError):  # already closed
+                continue
+
+
+def _prepare_worker() -> None:
+    """Leave Ctrl-C to the main process, and end with it even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    torch.set_num_threads(1)
+    if os.uname().sysname == "Linux":
+        import ctypes
+
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)
+
+
+def _process_cpu_seconds(pid: int) -> float:
+    """User and system time of a running process [s], from /proc."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+

@@ -1,0 +1,54 @@
+"""What training needs to know about an environment besides how to make one."""
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from tactile_cube.agent.batch import Sizes
+from tactile_cube.env import OUTCOMES, REWARD_TERMS
+from tactile_cube.env.rotation import JOINTS, OBJECT_STATE
+from tactile_cube.training.collection import MakeEnv
+from tactile_cube.transforms import EnvConfig, make_env
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A family of equal worlds.
+
+    Attributes:
+        make: makes a batch of worlds, in whichever process.
+        sizes: widths of observation, privileged state and action.
+        reward_terms: number of reward terms.
+        reward_weights: weights of the terms (terms,) under the curriculum's values in force.
+        outcomes: names of the codes in the key "outcome".
+    """
+
+    make: MakeEnv
+    sizes: Sizes
+    reward_terms: int
+    reward_weights: Callable[[dict[str, float]], Tensor]
+    outcomes: tuple[str, ...] = ()
+
+
+def rotation_environment(config: EnvConfig) -> Environment:
+    """The rotation task as configured."""
+    return Environment(
+        make=functools.partial(make_env, config),
+        sizes=Sizes(2 * JOINTS * config.stack, OBJECT_STATE, JOINTS),
+        reward_terms=len(REWARD_TERMS),
+        reward_weights=functools.partial(_weights, config),
+        outcomes=tuple(OUTCOMES),
+    )
+
+
+def _weights(config: EnvConfig, conditions: dict[str, Any]) -> Tensor:
+    return torch.from_numpy(config.reward.weights(conditions.get("penalty", 1.0)))
+
+
+def as_environment(made: Any) -> Environment:
+    """What `env` in the configuration stands for: an environment, or the rotation task's configuration."""
+    return made if isinstance(made, Environment) else rotation_environment(made)

@@ -1,0 +1,72 @@
+"""What a run costs: CPU-hours simulating and learning, and core-hours reserved but waiting."""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+
+LEDGER = "ledger.json"
+
+
+@dataclass
+class Costs:
+    """Seconds of one run, over all its sessions.
+
+    Attributes:
+        simulating: CPU time of the workers [s].
+        learning: CPU time of the learner [s].
+        waiting: core time [s] of workers and learner in which neither did anything.
+        wall: time on the clock [s].
+    """
+
+    simulating: float = 0.0
+    learning: float = 0.0
+    waiting: float = 0.0
+    wall: float = 0.0
+
+
+class Ledger:
+    """Book-keeping of a session on top of what earlier sessions of the run spent.
+
+    Args:
+        path: ledger.json of the run folder.
+        processes: processes the run occupies, the learner included.
+        simulating: CPU seconds simulated in this session so far.
+        in_process: whether simulation runs in the learner's process, and its time is contained in the learner's.
+    """
+
+    def __init__(self, path: Path, processes: int, simulating: Callable[[], float], in_process: bool):
+        self.path = path
+        self.before = _read(path)
+        self._processes = processes
+        self._simulating = simulating
+        self._in_process = in_process
+        self._wall, self._cpu = time.perf_counter(), time.process_time()
+
+    def costs(self) -> Costs:
+        """Spent by this run until now."""
+        wall = time.perf_counter() - self._wall
+        simulating = self._simulating()
+        learning = time.process_time() - self._cpu - (simulating if self._in_process else 0.0)
+        waiting = max(self._processes * wall - simulating - learning, 0.0)
+        return Costs(
+            self.before.simulating + simulating,
+            self.before.learning + learning,
+            self.before.waiting + waiting,
+            self.before.wall + wall,
+        )
+
+    def write(self, steps: int) -> None:
+        """Put the costs into the run folder, in hours as in the paper."""
+        costs = self.costs()
+        hours = {f"{name}_hours": round(value / 3600, 4) for name, value in asdict(costs).items()}
+        self.path.write_text(json.dumps({"steps": steps, "seconds": asdict(costs), **hours}, indent=2) + "\n")
+
+
+def _read(path: Path) -> Costs:
+    try:
+        return Costs(**json.loads(path.read_text())["seconds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return Costs()

@@ -1,0 +1,117 @@
+"""The algorithm: soft actor-critic that collects one iteration ahead of learning.
+
+In each iteration the workers collect a block with the actor as it is while the learner makes its updates on the replay as it
+was one iteration before; so both overlap completely, and nothing depends on which of them is faster (paper, section III).
+At barriers all worlds are reset from a seed that follows from the run's seed and the iteration. That is the only place at
+which a run can be saved and resumed bit for bit, because the state of a simulator cannot be saved.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from tactile_cube.agent.interface import Agent
+from tactile_cube.training.collection import Collection
+from tactile_cube.training.episodes import EpisodeStatistics
+from tactile_cube.training.replay import Replay
+from tactile_cube.training.settings import TrainingSettings
+from tactile_cube.training.transitions import TransitionAssembler
+
+RewardWeights = Callable[[dict[str, float]], Tensor]
+"""Weights of the reward terms (terms,) under the curriculum's values in force."""
+
+
+@dataclass
+class Learner:
+    """Agent, experience and counters: all that a run learns and remembers.
+
+    Attributes:
+        agent: networks and their update.
+        replay: experience.
+        collection: source of experience.
+        episodes: statistics of the last episodes.
+        settings: schedule of the run.
+        reward_weights: how reward terms are weighed under the curriculum's values.
+        seed: of the run.
+    """
+
+    agent: Agent
+    replay: Replay
+    collection: Collection
+    episodes: EpisodeStatistics
+    settings: TrainingSettings
+    reward_weights: RewardWeights
+    seed: int
+    iteration: int = 0
+    steps: int = 0
+    updates: int = 0
+    conditions: dict[str, float] = field(default_factory=dict)
+    metrics: dict[str, Tensor] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        agent = self.agent.settings
+        self.assembler = TransitionAssembler(agent.n_step, agent.gamma)
+
+    def run_to_barrier(self, after_iteration: Callable[[], None]) -> None:
+        """Reset all worlds, then collect and learn up to the next barrier."""
+        self.collection.restart(barrier_seed(self.seed, self.iteration), self._progress())
+        for _ in range(self.settings.barrier_iterations):
+            self.iterate()
+            after_iteration()
+        self._store(self.assembler.flush())
+
+    def iterate(self) -> None:
+        """Collect a block and, meanwhile, learn from what was there before."""
+        random = self.steps < self.settings.random_steps
+        self.conditions = self.collection.launch(self.agent.policy(), random, self._progress())
+        if self.steps >= self.settings.learning_starts:
+            self._learn()
+        block = self.collection.take()
+        self._store(self.assembler.add(block))
+        self.episodes.add(block)
+        self.steps += block.numel()
+        self.iteration += 1
+
+    def _learn(self) -> None:
+        weights = self.reward_weights(self.conditions)
+        for _ in range(self.settings.updates_per_iteration):
+            self.metrics = self.agent.update(self.replay.sample(self.agent.settings.batch_size, weights))
+        self.updates += self.settings.updates_per_iteration
+
+    def _store(self, transitions: dict[str, Tensor]) -> None:
+        if transitions:
+            self.replay.extend(transitions)
+
+    def _progress(self) -> tuple[int, float]:
+        return self.steps, self.episodes.mean_angle
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything that a resumed run needs; valid at barriers only."""
+        return {
+            "agent": self.agent.state_dict(),
+            "replay": self.replay.state_dict(),
+            "episodes": self.episodes.state_dict(),
+            "counters": {"iteration": self.iteration, "steps": self.steps, "updates": self.updates},
+            "random_state": torch.get_rng_state(),
+            "cuda_random_state": torch.cuda.get_rng_state_all() if torch.cuda.is_available() else [],
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Inverse of `state_dict`."""
+        self.agent.load_state_dict(state["agent"])
+        self.replay.load_state_dict(state["replay"])
+        self.episodes.load_state_dict(state["episodes"])
+        for name, value in state["counters"].items():
+            setattr(self, name, value)
+        torch.set_rng_state(state["random_state"])
+        if torch.cuda.is_available() and state["cuda_random_state"]:
+            torch.cuda.set_rng_state_all(state["cuda_random_state"])
+
+
+def barrier_seed(seed: int, iteration: int) -> int:
+    """Seed of the worlds from the barrier at `iteration` on, below 2^31."""
+    return int(np.random.SeedSequence([seed, iteration]).generate_state(1)[0] >> 1)

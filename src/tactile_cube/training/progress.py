@@ -1,0 +1,61 @@
+"""The line that says how training goes."""
+
+import sys
+import time
+from collections.abc import Mapping
+from typing import TextIO
+
+INTERVAL = 5.0
+"""Seconds between two lines."""
+
+
+class ProgressLine:
+    """Prints steps, speed, mean final angle, curriculum and time left; in place on a terminal, line by line elsewhere.
+
+    Args:
+        total: environment steps of the whole run.
+        steps: steps done before this session.
+        updates: gradient steps done before this session.
+        stream: where to print.
+    """
+
+    def __init__(self, total: int, steps: int, updates: int, stream: TextIO | None = None):
+        self._total = total
+        self._stream = stream or sys.stdout
+        self._printed = time.perf_counter()
+        self._at_print = (steps, updates)
+
+    def show(self, steps: int, updates: int, summary: Mapping[str, float], conditions: Mapping[str, float]) -> None:
+        """Print if the last line is old enough.
+
+        Args:
+            steps: environment steps so far.
+            updates: gradient steps so far.
+            summary: statistics of episodes, see EpisodeStatistics.summary.
+            conditions: the curriculum's values in force.
+        """
+        now = time.perf_counter()
+        if now - self._printed < INTERVAL:
+            return
+        elapsed = now - self._printed
+        step_rate = (steps - self._at_print[0]) / elapsed
+        update_rate = (updates - self._at_print[1]) / elapsed
+        self._printed, self._at_print = now, (steps, updates)
+        left = (self._total - steps) / max(step_rate, 1e-9)
+        values = " ".join(f"{key} {value:.3g}" for key, value in conditions.items())
+        line = (
+            f"{steps / 1e3:8.1f} k of {self._total / 1e3:.0f} k steps | {step_rate:4.0f} steps/s {update_rate:4.0f} updates/s"
+            f" | final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps"
+            f" | {values} | {_clock(left)} left"
+        )
+        self.say(line, in_place=self._stream.isatty())
+
+    def say(self, text: str, in_place: bool = False) -> None:
+        """Print a line of its own, or over the last one."""
+        clear = "\r\x1b[K" if self._stream.isatty() else ""
+        print(f"{clear}{text}", end="" if in_place else "\n", file=self._stream, flush=True)
+
+
+def _clock(seconds: float) -> str:
+    hours, minutes = int(seconds // 3600), int(seconds % 3600 // 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {int(seconds % 60):02d} s"

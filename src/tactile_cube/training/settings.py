@@ -1,0 +1,86 @@
+"""The schedule of a run and how it is collected, checked once."""
+
+import os
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+
+
+class CollectorSettings(BaseModel):
+    """How many worlds are stepped where.
+
+    Attributes:
+        kind: "multi_sync" (worker processes beside the learner) or "single" (this process, in turns with the learner).
+        worlds: worlds in all. Source: the paper's 12 workers.
+        processes: worker processes; None takes one for each core beside the learner's, as far as it divides `worlds`.
+        timeout: longest wait for the workers [s].
+        start_method: how worker processes start; fork takes under a second, spawn about 3 s a worker.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: Literal["multi_sync", "single"] = "multi_sync"
+    worlds: PositiveInt = 12
+    processes: PositiveInt | None = None
+    timeout: PositiveFloat = 120.0
+    start_method: Literal["fork", "spawn", "forkserver"] = "fork"
+
+    @model_validator(mode="after")
+    def _divides(self) -> Self:
+        if self.processes is not None and self.worlds % self.processes:
+            raise ValueError(f"processes={self.processes} does not divide worlds={self.worlds}; choose a divisor")
+        return self
+
+    @property
+    def workers(self) -> int:
+        """Worker processes used: as asked, or from the machine."""
+        if self.processes is not None:
+            return self.processes
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        wanted = max(1, min(cores - 1, self.worlds))
+        return max(n for n in range(1, wanted + 1) if self.worlds % n == 0)
+
+
+class TrainingSettings(BaseModel):
+    """The schedule of a run, in environment steps unless said otherwise.
+
+    Attributes:
+        steps: length of the run.
+        steps_per_iteration: steps a world and iteration.
+        updates_per_iteration: gradient steps an iteration.
+        learning_starts: no update before.
+        random_steps: uniform random actions before.
+        replay_size: transitions kept.
+        barrier_iterations: iterations between two resets of all worlds. A run can be saved and resumed bit for bit there
+            and nowhere else, since the state of a simulator cannot be saved.
+        checkpoint_barriers: barriers from one checkpoint to the next.
+        policy_every: keep a separate policy file each so many steps; 0 keeps only latest and best.
+        log_iterations: iterations from one row of metrics to the next.
+        resume: "auto" goes on from the newest checkpoint of this run folder; "never" starts over.
+        init_from: checkpoint (.pt) or policy (.safetensors) whose networks the run starts from.
+        stop_if_no_regrasp_by: give up when the mean final angle is still below `regrasp_angle` after so many steps.
+        regrasp_angle: angle [rad] no single twist reaches, so that beyond it the fingers must have regrasped.
+        stop_when_angle_above: finish early at this mean final angle [rad].
+        threads: torch threads of the learner; results differ in the last bits between thread counts.
+
+    Source: website table of the paper for the schedule.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    steps: PositiveInt = 6_500_000
+    steps_per_iteration: PositiveInt = 25
+    updates_per_iteration: NonNegativeInt = 100
+    learning_starts: NonNegativeInt = 2_000
+    random_steps: NonNegativeInt = 10_000
+    replay_size: PositiveInt = 150_000
+    barrier_iterations: PositiveInt = 25
+    checkpoint_barriers: PositiveInt = 4
+    policy_every: NonNegativeInt = 0
+    log_iterations: PositiveInt = 5
+    resume: Literal["auto", "never"] = "auto"
+    init_from: str | None = None
+    stop_if_no_regrasp_by: PositiveInt | None = None
+    regrasp_angle: PositiveFloat = 2.0
+    stop_when_angle_above: PositiveFloat | None = None
+    threads: PositiveInt = Field(default=1)
