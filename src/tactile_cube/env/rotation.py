@@ -100,6 +100,7 @@ class RotationEnv:
         self.start_poses = start
         self.conditions = task.conditions()
         self.constants = self.nominal
+        self.target = np.asarray(hand.start_angles, dtype=np.float64)
         self._middle = 0.5 * (np.asarray(hand.action_lower) + np.asarray(hand.action_upper))
         self._half_range = 0.5 * (np.asarray(hand.action_upper) - np.asarray(hand.action_lower))
         self.seed(0)
@@ -130,7 +131,8 @@ class RotationEnv:
 
         Faulty physics ends the episode with the last sound state once more and no reward.
         """
-        self.world.step(self._middle + self._half_range * action)
+        self.target = self._middle + self._half_range * action
+        self.world.step(self.target)
         step = self._moment.step + 1
         if self.world.healthy:
             before = self._pose

@@ -45,7 +45,7 @@ class EpisodeRecord:
         theta: angle about the vertical, unwrapped, positive in the rewarded direction `(n + 1,)` [rad].
         joint_position: q, true link angles `(n + 1, 12)` [rad].
         filtered_target: q_f `(n + 1, 12)` [rad].
-        target: q_n that reached the hand in each step `(n, 12)` [rad].
+        target: q_n that reached the hand in each step, in the encoders' coordinates `(n, 12)` [rad].
         cube_position: `(n + 1, 3)` [m].
         cube_quaternion: x, y, z, w `(n + 1, 4)`.
         reward: `(n,)`.

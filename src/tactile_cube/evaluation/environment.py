@@ -1,0 +1,66 @@
+"""The environment a policy is tried in: the one it was trained in, with what the user asks to be different."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import hydra.utils
+from hydra.core.hydra_config import HydraConfig
+from omegaconf import DictConfig, OmegaConf
+
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.transforms import EnvConfig
+
+GROUPS = ("task", "reward", "randomization", "start")
+TRUSTED = "tactile_cube."
+"""A policy file is data from somewhere: of the classes it names, only the package's own are made."""
+
+
+def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
+    """Return the environment of `source` with the overrides of the command line.
+
+    A group chosen on the command line (`task=full`) replaces the policy's; single values (`+task.filter_time=0.3`,
+    `+env.simulation.solver_iterations=100`) change it.
+
+    Raises:
+        InputError: the policy file's configuration cannot be used.
+    """
+    trained = source.config.get("env")
+    if trained is None:
+        settings = OmegaConf.create(OmegaConf.to_container(config.untrained, resolve=True))
+    else:
+        settings = OmegaConf.create({**_checked(trained, source.label), "curriculum": None, "exploration": None})
+    choices = HydraConfig.get().runtime.choices
+    for group in GROUPS:
+        if group in config:
+            chosen = choices.get(group) not in (None, "null")
+            settings[group] = config[group] if chosen else OmegaConf.merge(settings[group], config[group])
+    settings = OmegaConf.merge(
+        settings, config.get("env") or {}, {} if source.stack is None else {"stack": source.stack}
+    )
+    try:
+        made = hydra.utils.instantiate(settings)
+    except hydra.errors.InstantiationException as error:
+        raise InputError(f"policy={source.label}: its environment cannot be made again: {error}") from error
+    if not isinstance(made, EnvConfig):
+        raise InputError(f"policy={source.label}: its configuration has no environment of this package")
+    return made
+
+
+def _checked(config: Mapping[str, Any], label: str) -> dict[str, Any]:
+    """Return the configuration as plain data after making sure that it names no foreign class."""
+    for target in _targets(config):
+        if not str(target).startswith(TRUSTED):
+            raise InputError(f"policy={label}: its configuration names {target!r}; only {TRUSTED}* is made from a file")
+    return dict(config)
+
+
+def _targets(value: Any) -> list[Any]:
+    if isinstance(value, Mapping):
+        own = [value["_target_"]] if "_target_" in value else []
+        return own + [target for part in value.values() for target in _targets(part)]
+    if isinstance(value, list | tuple):
+        return [target for part in value for target in _targets(part)]
+    return []

@@ -1,0 +1,122 @@
+"""Try a policy as a protocol says: every variant with the same seeds, one verdict an episode."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from torchrl.envs import TransformedEnv
+
+from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.policies import Policy, ReplayPolicy
+from tactile_cube.evaluation.protocol import Protocol
+from tactile_cube.evaluation.replay import NearlyEqualStart
+from tactile_cube.evaluation.rollout import Interference, run_episode
+from tactile_cube.evaluation.summary import Summary, succeeded, summarise
+from tactile_cube.evaluation.variant import Variant
+from tactile_cube.evaluation.verdict import EpisodeResult, judge
+from tactile_cube.transforms import EnvConfig, make_env
+
+Report = Callable[[str, EpisodeResult], None]
+"""Told the variant's name and the result of each episode as it ends."""
+
+
+@dataclass(frozen=True)
+class VariantResult:
+    """What came of one variant."""
+
+    variant: Variant
+    results: list[EpisodeResult]
+    summary: Summary
+    success_share: float | None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return plain data for JSON."""
+        flags = succeeded(self.results, self.success_share)
+        episodes = [{**result.as_dict(), "success": flag} for result, flag in zip(self.results, flags, strict=True)]
+        return {
+            "variant": dataclasses.asdict(self.variant),
+            "summary": self.summary.as_dict(),
+            "episodes": episodes,
+        }
+
+
+class Evaluation:
+    """One policy in one environment under one protocol.
+
+    Args:
+        config: the environment; the protocol's time limit and variants are put on top.
+        policy: what decides.
+        protocol: how it is tried.
+        seed: the episodes' seeds are made of it and their number, so equal seeds see equal episodes.
+    """
+
+    def __init__(self, config: EnvConfig, policy: Policy, protocol: Protocol, seed: int) -> None:
+        self._config = _with_time_limit(config, protocol.seconds)
+        self._policy, self._protocol, self._seed = policy, protocol, seed
+
+    def run(self, report: Report) -> list[VariantResult]:
+        """Run all episodes."""
+        results = [self._run_variant(variant, report) for variant in self._protocol.conditions]
+        if self._protocol.replay:
+            results.append(self._run_replay(results[0].results, report))
+        return results
+
+    def record(self, variant: Variant, result: EpisodeResult) -> EpisodeRecord:
+        """Run one episode of `run` again, bit for bit, and keep its trace at the physics rate."""
+        config = variant.apply(self._config)
+        traced = dataclasses.replace(config.simulation, trace=self._protocol.trace)
+        env = make_env(dataclasses.replace(config, simulation=traced), 1, self._seed, evaluation=True)
+        return self._closing(env, self._policy, result.seed, variant.pull)
+
+    def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
+        env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
+        results = []
+        for episode in range(self._protocol.episodes):
+            seed = episode_seed(self._seed, episode)
+            results.append(judge(run_episode(env, self._policy, seed, variant.pull), episode, seed))
+            report(variant.name, results[-1])
+        env.close()
+        return self._variant_result(variant, results)
+
+    def _run_replay(self, results: list[EpisodeResult], report: Report) -> VariantResult:
+        """Replay the best episode's targets open loop, from starts that differ a little."""
+        best = max(results, key=lambda result: result.final_angle)
+        replay = ReplayPolicy(self.record(self._protocol.variants[0], best).target)
+        # The recorded targets hold the repeated actions already.
+        undisturbed = dataclasses.replace(self._config.randomization, sticky_probability=0.0)
+        config = self._protocol.variants[0].apply(dataclasses.replace(self._config, randomization=undisturbed))
+        env = make_env(config, 1, self._seed, evaluation=True)
+        variant = Variant(name="replay of the best episode, start displaced a little")
+        replays = []
+        for episode in range(self._protocol.episodes):
+            displaced = NearlyEqualStart(episode_seed(self._seed, episode))
+            replays.append(judge(run_episode(env, replay, best.seed, displaced), episode, best.seed))
+            report(variant.name, replays[-1])
+        env.close()
+        return self._variant_result(variant, replays)
+
+    def _variant_result(self, variant: Variant, results: list[EpisodeResult]) -> VariantResult:
+        share = self._protocol.success_share
+        return VariantResult(variant, results, summarise(results, share), share)
+
+    def _closing(
+        self, env: TransformedEnv, policy: Policy, seed: int, interference: Interference | None
+    ) -> EpisodeRecord:
+        try:
+            return run_episode(env, policy, seed, interference)
+        finally:
+            env.close()
+
+
+def episode_seed(seed: int, episode: int) -> int:
+    """Return the seed of an episode; ranges of different seeds do not overlap below 10 000 episodes."""
+    return 10_000 * seed + episode
+
+
+def _with_time_limit(config: EnvConfig, seconds: float | None) -> EnvConfig:
+    if seconds is None:
+        return config
+    steps = round(seconds / config.simulation.policy_dt)
+    return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_steps=steps))

@@ -1,0 +1,57 @@
+"""How a policy is tried: how many episodes, how long, under which conditions, and what counts as success."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.variant import Variant
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """A protocol, one file of conf/protocol each.
+
+    Attributes:
+        name: label in tables and files.
+        episodes: number of episodes per variant.
+        seconds: time limit of an episode [s]; None: the task's own.
+        success_share: an episode succeeds when it reaches this share of the best episode's angle. Source: paper,
+            section IV: 80 %. None: when its verdict is regrasping.
+        variants: conditions, each tried with the same seeds.
+        catalogue: add a variant for each effect of the drivetrain's catalogue at its typical size.
+        replay: replay the targets of the best episode of the policy from these episodes' starts.
+        film: number of episodes, the best first, that are filmed and recorded for Rerun.
+        trace: keep the signals of every physics step in the recorded episodes.
+    """
+
+    name: str
+    episodes: int = 20
+    seconds: float | None = None
+    success_share: float | None = None
+    variants: Sequence[Variant] = field(default_factory=lambda: (Variant(),))
+    catalogue: bool = False
+    replay: bool = False
+    film: int = 1
+    trace: bool = True
+
+    def __post_init__(self) -> None:
+        if self.episodes < 1:
+            raise InputError(f"protocol.episodes is {self.episodes}; give at least 1")
+        if self.seconds is not None and not self.seconds > 0:
+            raise InputError(f"protocol.seconds is {self.seconds}; give a time above 0 s or null")
+        if self.success_share is not None and not 0 < self.success_share <= 1:
+            raise InputError(f"protocol.success_share is {self.success_share}; give a number in (0, 1] or null")
+        if not self.variants:
+            raise InputError("protocol.variants is empty; give at least one, {name: nominal}")
+        if self.film < 0:
+            raise InputError(f"protocol.film is {self.film}; give 0 or more")
+
+    @property
+    def conditions(self) -> tuple[Variant, ...]:
+        """All variants, those of the catalogue included."""
+        if not self.catalogue:
+            return tuple(self.variants)
+        return (*self.variants, *(Variant(name=effect.replace("_", " "), effects=(effect,)) for effect in catalogue()))

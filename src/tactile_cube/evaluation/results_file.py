@@ -1,0 +1,73 @@
+"""The results of a protocol as JSON: what was run, on what, and every episode."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from tactile_cube.agent.policy_file import current_commit
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.evaluation import VariantResult
+from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.protocol import Protocol
+
+FORMAT = "tactile_cube results 1"
+
+
+@dataclass(frozen=True)
+class Run:
+    """What was run.
+
+    Attributes:
+        protocol: how.
+        source: which policy.
+        seed: of the evaluation.
+        command: the words of the command line.
+        cpu_hours: processor time it took [h].
+    """
+
+    protocol: Protocol
+    source: PolicySource
+    seed: int
+    command: str
+    cpu_hours: float
+
+
+def write_results(path: Path, run: Run, variants: list[VariantResult]) -> None:
+    """Write the results file."""
+    data = {
+        "format": FORMAT,
+        "protocol": run.protocol.name,
+        "seconds": run.protocol.seconds,
+        "success_share": run.protocol.success_share,
+        "policy": {"label": run.source.label, **run.source.provenance},
+        "seed": run.seed,
+        "command": run.command,
+        "cpu_hours": run.cpu_hours,
+        "version": metadata.version("tactile-cube"),
+        "commit": current_commit(),
+        "variants": [variant.as_dict() for variant in variants],
+    }
+    path.write_text(json.dumps(data, indent=1, default=_plain), encoding="utf-8")
+
+
+def read_results(path: Path) -> dict[str, Any]:
+    """Read a results file.
+
+    Raises:
+        InputError: it is missing, damaged or something else.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: not a results file of evaluate: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError(f"{path}: not a results file of evaluate (expected format {FORMAT!r})")
+    return data
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else str(value)

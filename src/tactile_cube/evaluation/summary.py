@@ -1,0 +1,115 @@
+"""Many episodes in a few numbers: success with an interval, angles, verdicts, and the table on the terminal."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from tactile_cube.evaluation.verdict import EpisodeResult, Verdict
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a set of episodes comes to.
+
+    Attributes:
+        episodes: how many.
+        mean_angle: mean final angle [rad].
+        std_angle: its standard deviation over the episodes [rad].
+        best_angle: largest final angle [rad].
+        successes: episodes that succeeded.
+        success_low: lower end of the 95 % interval of the success rate.
+        success_high: upper end.
+        kept: episodes that ended with the cube in the hand.
+        rate: mean of final angle over duration [rad/s].
+        finger_lifts: mean number of finger lifts an episode.
+        verdicts: how often each verdict was given.
+        exploits: how often each exploit was found.
+    """
+
+    episodes: int
+    mean_angle: float
+    std_angle: float
+    best_angle: float
+    successes: int
+    success_low: float
+    success_high: float
+    kept: int
+    rate: float
+    finger_lifts: float
+    verdicts: dict[str, int]
+    exploits: dict[str, int]
+
+    def as_dict(self) -> dict[str, object]:
+        """Return plain data for JSON."""
+        return asdict(self)
+
+
+def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> Summary:
+    """Reduce episodes to a summary; `success_share` as in `Protocol`."""
+    angles = np.array([result.final_angle for result in results])
+    successes = sum(succeeded(results, success_share))
+    low, high = wilson_interval(successes, len(results))
+    return Summary(
+        episodes=len(results),
+        mean_angle=float(angles.mean()),
+        std_angle=float(angles.std()),
+        best_angle=float(angles.max()),
+        successes=successes,
+        success_low=low,
+        success_high=high,
+        kept=sum(result.kept for result in results),
+        rate=float(np.mean([result.final_angle / max(result.duration, 1e-9) for result in results])),
+        finger_lifts=float(np.mean([sum(result.finger_lifts) for result in results])),
+        verdicts={verdict.value: sum(result.verdict == verdict for result in results) for verdict in Verdict},
+        exploits=dict(Counter(name for result in results for name in result.exploits)),
+    )
+
+
+def succeeded(results: Sequence[EpisodeResult], success_share: float | None) -> list[bool]:
+    """Tell which episodes succeeded: the paper's share of the best one, or the verdict regrasping."""
+    if success_share is None:
+        return [result.verdict == Verdict.REGRASPING for result in results]
+    best = max(result.final_angle for result in results)
+    return [best > 0 and result.final_angle >= success_share * best for result in results]
+
+
+def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
+    """Return the 95 % interval of a rate; unlike the normal one it is right at 0 and 1, and for few trials.
+
+    Source: Wilson, J. Am. Stat. Assoc. 22 (1927).
+    """
+    rate, square = successes / trials, z * z / trials
+    middle = (rate + square / 2) / (1 + square)
+    half = z / (1 + square) * math.sqrt(rate * (1 - rate) / trials + square / (4 * trials))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+HEADER = (
+    f"{'run':>4} {'angle':>8} {'time':>7}  {'verdict':<17}{'ending':<12}{'lifts':>6}{'faces':>9}{'tilt':>7}"
+    "  exploits    (angle [rad], time [s], tilt [deg])"
+)
+
+
+def row(result: EpisodeResult, name: str = "nominal") -> str:
+    """Return an episode as a line of text; the variant's name is added when it is not the nominal one."""
+    faces = "/".join(str(count) for count in result.faces_visited)
+    return (
+        f"{result.episode:4d} {result.final_angle:8.2f} {result.duration:7.1f}  {result.verdict.value:<17}"
+        f"{result.ending:<12}{sum(result.finger_lifts):6d}{faces:>9}{math.degrees(result.max_tilt):7.1f}"
+        f"  {', '.join(result.exploits) or '-'}{'' if name == 'nominal' else f'   [{name}]'}"
+    )
+
+
+def sentence(name: str, summary: Summary) -> str:
+    """Return a summary in one line."""
+    verdicts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in summary.verdicts.items() if count)
+    return (
+        f"{name}: {summary.mean_angle:.2f} +- {summary.std_angle:.2f} rad (best {summary.best_angle:.2f}), "
+        f"{summary.successes}/{summary.episodes} successful (95 %: {100 * summary.success_low:.0f} to "
+        f"{100 * summary.success_high:.0f} %), {summary.kept} kept the cube, {summary.finger_lifts:.1f} finger lifts; {verdicts}"
+    )

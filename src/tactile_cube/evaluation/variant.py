@@ -1,0 +1,109 @@
+"""A change of the world that a policy is tried in: other constants, another solver, an effect, a pull at a finger."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tactile_cube.drivetrain.effects import Effect, resolve
+from tactile_cube.env import RotationEnv
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.touch import FINGERS
+from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions
+from tactile_cube.transforms import EnvConfig
+
+CONSTANTS = tuple(field.name for field in dataclasses.fields(EpisodeConstants))
+OPTIONS = tuple(field.name for field in dataclasses.fields(SimulationOptions))
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A force on one fingertip, as when somebody pulls at the finger.
+
+    Attributes:
+        finger: ring, middle, fore or thumb.
+        force: away from the cube's axis, horizontally [N].
+        start: when it begins [s].
+        duration: how long it lasts [s].
+    """
+
+    finger: str
+    force: float
+    start: float = 3.0
+    duration: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.finger not in FINGERS:
+            raise InputError(f"pull.finger is {self.finger!r}; choose one of {', '.join(FINGERS)}")
+
+    def __call__(self, env: RotationEnv, step: int) -> None:
+        """Pull, or let go, before the policy step that comes."""
+        time = step * env.world.options.policy_dt
+        finger = FINGERS.index(self.finger)
+        tip = env.world.tip_positions[finger]
+        outward = tip * [1.0, 1.0, 0.0] / np.linalg.norm(tip[:2])
+        acting = self.start <= time < self.start + self.duration
+        env.world.pull_finger(finger, self.force * outward if acting else np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One condition of a protocol.
+
+    Attributes:
+        name: label in tables.
+        axis: what is varied, e.g. "cube size [mm]"; variants of one axis form a line of the robustness map.
+        value: the number on that axis.
+        constants: replaced constants of the episode (fields of EpisodeConstants); their randomisation is centred on
+            the new value, or dropped where it would have replaced it.
+        simulation: replaced options of the world (fields of SimulationOptions).
+        effects: effects of the drivetrain, by catalogue name or dotted path, at their typical size on every joint.
+        pull: a pull at a finger, or none.
+    """
+
+    name: str = "nominal"
+    axis: str = ""
+    value: float = 0.0
+    constants: Mapping[str, Any] = field(default_factory=dict)
+    simulation: Mapping[str, Any] = field(default_factory=dict)
+    effects: tuple[str, ...] = ()
+    pull: Pull | None = None
+
+    def __post_init__(self) -> None:
+        for group, known in (("constants", CONSTANTS), ("simulation", OPTIONS)):
+            for key in getattr(self, group):
+                if key not in known:
+                    raise InputError(f"variant {self.name}: {group}.{key} is unknown; choose from {', '.join(known)}")
+
+    def apply(self, config: EnvConfig) -> EnvConfig:
+        """Return the environment with this change."""
+        constants = {key: _plain(value) for key, value in self.constants.items()}
+        values = {key: value for key, value in config.randomization.values.items() if key not in constants}
+        return dataclasses.replace(
+            config,
+            constants=dataclasses.replace(config.constants, **constants),
+            randomization=dataclasses.replace(config.randomization, values=values),
+            simulation=dataclasses.replace(config.simulation, **self.simulation),
+            effects=[*config.effects, *(effect for name in self.effects for effect in typical_effects(name))],
+        )
+
+
+def typical_effects(name: str, hand: HandModel = DLR_HAND2) -> list[Effect]:
+    """Return an effect at its typical size, one for each joint `name` matches (all of them without an `@`)."""
+    return [
+        effect(joint, **{parameter.name: parameter.typical for parameter in effect.parameters})
+        for effect, joint in resolve([name], hand.joint_names)
+    ]
+
+
+def _plain(value: Any) -> Any:
+    return (
+        tuple(float(part) for part in value)
+        if isinstance(value, (list, tuple)) or hasattr(value, "__iter__")
+        else value
+    )
