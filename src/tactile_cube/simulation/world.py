@@ -10,7 +10,8 @@ import pybullet
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, Effect
+from tactile_cube.drivetrain.effects import Effect
+from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, TORQUE
 from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
 from tactile_cube.hand.model import JOINTS_PER_FINGER, LINKS_PER_FINGER
 from tactile_cube.hand.rigid_body import RigidBodyTree
@@ -21,6 +22,7 @@ from tactile_cube.simulation.health import find_fault
 from tactile_cube.simulation.loop import OBJECT_STATE, make_loop
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.scene import Scene
+from tactile_cube.simulation.spin_inertia import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia
 
 Array = NDArray[np.float64]
 
@@ -103,7 +105,7 @@ class World:
         """One policy step: `options.substeps` physics steps with the desired joint angles q_n (12,) [rad]."""
         if self.steps == self.constants.gravity_onset:
             self._set_weight(self.constants.gravity_scale)
-        self._plant.view(self._memory, "goal")[:] = q_n - self.constants.joint_offset
+        self._set("goal", q_n - self.constants.joint_offset)
         substeps = self.options.substeps
         self._cube_states = np.empty((substeps + 1, OBJECT_STATE)) if self.options.trace else None
         q, v = self._joints.reshape(2, -1)
@@ -225,10 +227,16 @@ class World:
         self._down = np.asarray(c.gravity_direction) / np.linalg.norm(c.gravity_direction)
         gravity = np.stack([self._in_base(k, c.gravity * self._down) for k in range(len(self.hand.fingers))])
         self._memory[:] = self._plant.memory(drivetrain, gravity=gravity, effects=self._effects)
-        self._plant.view(self._memory, "time_constant")[:] = c.filter_time
-        self._plant.view(self._memory, "command_torque_limit")[:] = c.torque_limit
-        target = start.angles if start.target is None else start.target - c.joint_offset
-        self._plant.reset(self._memory, start.angles, v=start.velocities, goal=target)
+        self._set("time_constant", c.filter_time)
+        self._set("spin_inertia", spin_inertia(np.asarray(c.reflected_inertia)))
+        self._set("tendon_stiffness", TENDON_STIFFNESS)
+        self._set("tendon_damping", TENDON_DAMPING)
+        self._plant.reset(self._memory, start.angles, v=start.velocities)
+        for key in ("filtered", "limited", "goal"):
+            self._set(key, start.angles if start.target is None else start.target - c.joint_offset)
+
+    def _set(self, key: str, value: Array | float) -> None:
+        self._plant.view(self._memory, key)[:] = value
 
     def _set_joints(self, start: Start) -> None:
         for row, values in zip(self._joints, (start.angles, start.velocities), strict=True):
@@ -239,15 +247,14 @@ class World:
         """Gives the cube a share of its weight through Bullet's gravity; the control step keeps the fingers' whole."""
         acceleration = scale * self.constants.gravity * self._down
         self._scene.set_gravity(acceleration)
-        for k, engine in enumerate(self._plant.view(self._memory, "engine_gravity")):
-            engine[:] = self._in_base(k, acceleration)
+        self._set("gravity", np.stack([self._in_base(k, acceleration) for k in range(len(self.hand.fingers))]))
 
     def _sense_once(self) -> None:
         """Computes what the sensors read at the start, without moving anything or changing any state."""
         q, v = self._joints.reshape(2, -1)
         states = self._memory.copy()
         self._plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), states)
-        self._plant.view(self._memory, "signals")[:] = self._plant.view(states, "signals")
+        self._set("signals", self._plant.view(states, "signals"))
 
     def _wrench(self) -> Array | None:
         """Everything that pushes the cube in this policy step, or None."""
