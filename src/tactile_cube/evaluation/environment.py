@@ -28,10 +28,11 @@ def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
         InputError: the policy file's configuration cannot be used.
     """
     trained = source.config.get("env")
+    settings: Any
     if trained is None:
         settings = OmegaConf.create(OmegaConf.to_container(config.untrained, resolve=True))
     else:
-        settings = OmegaConf.create({**_checked(trained, source.label), "curriculum": None, "exploration": None})
+        settings = OmegaConf.create(_checked(trained, source.label) | {"curriculum": None, "exploration": None})
     choices = HydraConfig.get().runtime.choices
     for group in GROUPS:
         if group in config:
@@ -54,7 +55,7 @@ def _checked(config: Mapping[str, Any], label: str) -> dict[str, Any]:
     for target in _targets(config):
         if not str(target).startswith(TRUSTED):
             raise InputError(f"policy={label}: its configuration names {target!r}; only {TRUSTED}* is made from a file")
-    return dict(config)
+    return {str(key): value for key, value in config.items()}
 
 
 def _targets(value: Any) -> list[Any]:

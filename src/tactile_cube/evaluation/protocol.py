@@ -38,6 +38,7 @@ class Protocol:
     trace: bool = True
 
     def __post_init__(self) -> None:
+        """Refuse what cannot be run."""
         if self.episodes < 1:
             raise InputError(f"protocol.episodes is {self.episodes}; give at least 1")
         if self.seconds is not None and not self.seconds > 0:

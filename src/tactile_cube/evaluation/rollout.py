@@ -80,7 +80,7 @@ class Recorder:
         terms = np.array(self._terms).reshape(-1, len(REWARD_TERMS)) * weights
         names = self._trace[0] if self._trace else {}
         return EpisodeRecord(
-            time=np.arange(samples) * task.world.options.policy_dt,
+            time=np.arange(samples, dtype=np.float64) * task.world.options.policy_dt,
             theta=np.array(self._theta),
             joint_position=np.array(self._rows["q"]),
             filtered_target=np.array(self._rows["q_f"]),

@@ -111,5 +111,6 @@ def sentence(name: str, summary: Summary) -> str:
     return (
         f"{name}: {summary.mean_angle:.2f} +- {summary.std_angle:.2f} rad (best {summary.best_angle:.2f}), "
         f"{summary.successes}/{summary.episodes} successful (95 %: {100 * summary.success_low:.0f} to "
-        f"{100 * summary.success_high:.0f} %), {summary.kept} kept the cube, {summary.finger_lifts:.1f} finger lifts; {verdicts}"
+        f"{100 * summary.success_high:.0f} %), {summary.kept} kept the cube, "
+        f"{summary.finger_lifts:.1f} finger lifts; {verdicts}"
     )

@@ -38,6 +38,7 @@ class Pull:
     duration: float = 1.0
 
     def __post_init__(self) -> None:
+        """Refuse unknown fingers."""
         if self.finger not in FINGERS:
             raise InputError(f"pull.finger is {self.finger!r}; choose one of {', '.join(FINGERS)}")
 
@@ -75,6 +76,7 @@ class Variant:
     pull: Pull | None = None
 
     def __post_init__(self) -> None:
+        """Refuse unknown constants and options."""
         for group, known in (("constants", CONSTANTS), ("simulation", OPTIONS)):
             for key in getattr(self, group):
                 if key not in known:

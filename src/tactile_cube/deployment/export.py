@@ -1,0 +1,71 @@
+"""A policy as files that need none of this package: arrays or an ONNX graph, with the contract beside them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from tactile_cube.deployment.interface_contract import interface_contract
+from tactile_cube.deployment.network import Array, Network
+from tactile_cube.errors import InputError
+
+OPSET = 17
+
+
+def export_policy(network: Network, path: Path) -> Path:
+    """Write the network, `.npz` or `.onnx`, and `<name>.contract.json` beside it; return the contract's path.
+
+    Raises:
+        InputError: unknown ending, or ONNX is not installed.
+    """
+    writers = {".npz": _write_npz, ".onnx": _write_onnx}
+    if path.suffix not in writers:
+        raise InputError(f"output={path}: ending {path.suffix!r} is unknown; choose one of {', '.join(writers)}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    writers[path.suffix](network, path)
+    contract = path.with_suffix(".contract.json")
+    contract.write_text(json.dumps(interface_contract(network), indent=1), encoding="utf-8")
+    return contract
+
+
+def _deterministic_layers(network: Network) -> list[tuple[Array, Array]]:
+    """Return weights and biases without the outputs that only exploration uses."""
+    layers = list(zip(network.weights, network.biases, strict=True))
+    weight, bias = layers.pop()
+    return [*layers, (weight[: network.action_size], bias[: network.action_size])]
+
+
+def _write_npz(network: Network, path: Path) -> None:
+    """Write `weight<k>` (out, in) and `bias<k>` (out,); ReLU between layers, tanh after the last."""
+    arrays: dict[str, Array] = {}
+    for index, (weight, bias) in enumerate(_deterministic_layers(network)):
+        arrays |= {f"weight{index}": weight, f"bias{index}": bias}
+    np.savez(path, **arrays)
+
+
+def _write_onnx(network: Network, path: Path) -> None:
+    """Write a graph "observation" (batch, 120) -> "action" (batch, 12)."""
+    try:
+        import onnx
+        from onnx import TensorProto, helper, numpy_helper
+    except ImportError:
+        raise InputError(
+            f"output={path}: ONNX is not installed; pip install 'tactile-cube[onnx]' or export .npz"
+        ) from None
+    layers = _deterministic_layers(network)
+    nodes, weights, signal = [], [], "observation"
+    for index, (weight, bias) in enumerate(layers):
+        last = index == len(layers) - 1
+        weights += [numpy_helper.from_array(weight, f"weight{index}"), numpy_helper.from_array(bias, f"bias{index}")]
+        inputs = [signal, f"weight{index}", f"bias{index}"]
+        signal = "action" if last else f"hidden{index}"
+        nodes.append(helper.make_node("Gemm", inputs, [f"linear{index}"], transB=1))
+        nodes.append(helper.make_node("Tanh" if last else "Relu", [f"linear{index}"], [signal]))
+    observation = helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["batch", network.observation_size])
+    action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["batch", network.action_size])
+    graph = helper.make_graph(nodes, "tactile_cube", [observation], [action], weights)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
+    onnx.checker.check_model(model)
+    onnx.save(model, path)

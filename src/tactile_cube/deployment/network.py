@@ -1,0 +1,82 @@
+"""The actor in numpy: what runs on the robot's computer, without torch."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+
+from tactile_cube.errors import InputError
+
+Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Network:
+    """Linear layers with ReLU between them; the first half of the last layer's outputs, through tanh, is the action.
+
+    Attributes:
+        weights: one matrix `(out, in)` a layer.
+        biases: one vector `(out,)` a layer.
+        info: the policy file's metadata.
+    """
+
+    weights: tuple[Array, ...]
+    biases: tuple[Array, ...]
+    info: dict[str, Any]
+
+    @property
+    def observation_size(self) -> int:
+        """Width of the stacked observation."""
+        return int(self.weights[0].shape[1])
+
+    @property
+    def action_size(self) -> int:
+        """Number of joints commanded; the other half of the outputs is the exploration's scale."""
+        return int(self.weights[-1].shape[0]) // 2
+
+    def __call__(self, observation: Array) -> Array:
+        """Return the action `(..., 12)` in [-1, 1] for observations `(..., 120)`."""
+        signal = observation
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            signal = np.maximum(signal @ weight.T + bias, 0.0)
+        mean = signal @ self.weights[-1][: self.action_size].T + self.biases[-1][: self.action_size]
+        return np.asarray(np.tanh(mean), dtype=np.float32)
+
+
+def read_network(path: Path) -> Network:
+    """Read a policy file.
+
+    Args:
+        path: a file that training wrote: safetensors with `actor.<layer>.weight` and `.bias`.
+
+    Raises:
+        InputError: the file is missing, damaged, or no policy.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such policy file")
+    try:
+        with safe_open(path, framework="np") as file:
+            info = json.loads((file.metadata() or {})["info"])
+            layers = range(len(list(file.keys())) // 2)
+            weights = tuple(file.get_tensor(f"actor.{layer}.weight") for layer in layers)
+            biases = tuple(file.get_tensor(f"actor.{layer}.bias") for layer in layers)
+    except (SafetensorError, OSError, KeyError, ValueError) as error:
+        raise InputError(f"{path}: damaged or not a policy file ({error})") from error
+    _check(path, weights, biases)
+    return Network(weights, biases, info)
+
+
+def _check(path: Path, weights: tuple[Array, ...], biases: tuple[Array, ...]) -> None:
+    """Refuse layers that do not fit one another."""
+    if not weights:
+        raise InputError(f"{path}: holds no layers")
+    outputs = [weight.shape[0] for weight in weights]
+    inputs = [weight.shape[1] for weight in weights[1:]]
+    if outputs[:-1] != inputs or outputs != [len(bias) for bias in biases] or outputs[-1] % 2:
+        raise InputError(f"{path}: layers of shapes {[weight.shape for weight in weights]} do not fit one another")

@@ -1,0 +1,33 @@
+"""Where the policy file lies that a user names: a path, a run's folder, or a policy that ships with the package."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from tactile_cube.errors import InputError
+
+BASELINES = ("hold", "random", "scripted", "replay:EPISODE.npz")
+"""Names that are no files; evaluate knows them."""
+
+
+def policy_path(name: str | None) -> Path:
+    """Return the policy file that a name means."""
+    shipped = Path(str(resources.files("tactile_cube"))) / "policies"
+    if name is None:
+        name = "default"
+    path, packaged = Path(name), shipped / f"{name}.safetensors"
+    if path.is_dir():
+        files = sorted(path.rglob("*.safetensors"), key=lambda file: file.stat().st_mtime)
+        if not files:
+            raise InputError(
+                f"policy={name}: the folder holds no *.safetensors; is the run's first checkpoint written?"
+            )
+        return files[-1]
+    if not path.is_file() and packaged.is_file():
+        return packaged
+    if not path.is_file():
+        known = sorted(file.stem for file in shipped.glob("*.safetensors"))
+        choices = ", ".join([*known, *BASELINES])
+        raise InputError(f"policy={name}: no such file; give a policy file, a run folder, or one of {choices}")
+    return path
