@@ -31,7 +31,10 @@ class EpisodeStatistics:
         faulty = following["faulty"].squeeze(-1)
         self.faulty += int((ended & faulty).sum())
         self.episodes += int(ended.sum())
-        counted = ended & ~faulty & ~following["exploring"].squeeze(-1)
+        exploring = following.get("exploring", None)  # missing where no extra exploration is configured
+        counted = ended & ~faulty
+        if exploring is not None:
+            counted &= ~exploring.squeeze(-1)
         # time first: the deque shall hold the last episodes in the order in which they ended
         last = following.transpose(0, 1)[counted.t()]
         self.angles.extend(last["theta"].flatten().tolist())
