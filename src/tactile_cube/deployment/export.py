@@ -42,7 +42,7 @@ def _write_npz(network: Network, path: Path) -> None:
     arrays: dict[str, Array] = {}
     for index, (weight, bias) in enumerate(_deterministic_layers(network)):
         arrays |= {f"weight{index}": weight, f"bias{index}": bias}
-    np.savez(path, **arrays)
+    np.savez(path, **arrays)  # type: ignore[arg-type]
 
 
 def _write_onnx(network: Network, path: Path) -> None:

@@ -18,12 +18,9 @@ def policy_path(name: str | None) -> Path:
         name = "default"
     path, packaged = Path(name), shipped / f"{name}.safetensors"
     if path.is_dir():
-        files = sorted(path.rglob("*.safetensors"), key=lambda file: file.stat().st_mtime)
-        if not files:
-            raise InputError(
-                f"policy={name}: the folder holds no *.safetensors; is the run's first checkpoint written?"
-            )
-        return files[-1]
+        path /= "policy.safetensors"
+        if not path.is_file():
+            raise InputError(f"policy={name}: the folder holds no {path.name}; is the run's first checkpoint written?")
     if not path.is_file() and packaged.is_file():
         return packaged
     if not path.is_file():
