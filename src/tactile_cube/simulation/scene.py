@@ -14,10 +14,10 @@ import pybullet
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand.model import LINK_NAMES, LINKS_PER_FINGER, HandModel
+from tactile_cube.hand.model import LINKS_PER_FINGER, HandModel
 from tactile_cube.hand.urdf import finger_urdf
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import Contact
+from tactile_cube.simulation.contact import Contact, read_contact
 from tactile_cube.simulation.options import SimulationOptions
 
 Array = NDArray[np.float64]
@@ -111,7 +111,9 @@ class Scene:
 
     def contacts(self) -> list[Contact]:
         """Contacts with the cube and between fingers in the last physics step."""
-        return [self._contact(row) for row in pybullet.getContactPoints(physicsClientId=self.client)]
+        names = {body: finger.name for body, finger in zip(self.fingers, self.hand.fingers, strict=True)}
+        names |= {self.cube: "cube", self.table: "table"}
+        return [read_contact(row, names) for row in pybullet.getContactPoints(physicsClientId=self.client)]
 
     def close(self) -> None:
         """Ends the physics server."""
@@ -191,21 +193,3 @@ class Scene:
             group = 2 if body == self.table else 1
             mask = 1 if body == self.table else _ALL_GROUPS
             pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=self.client)
-
-    def _contact(self, row: tuple[object, ...]) -> Contact:
-        """One row of PyBullet's answer, turned so that the cube (or the later finger) is pushed."""
-        body, other, link, other_link, on_body, on_other, normal, distance, force, f1, d1, f2, d2 = row[1:14]
-        friction = float(f1) * np.array(d1) + float(f2) * np.array(d2)  # type: ignore[arg-type]
-        towards_other = -np.array(normal)
-        position = np.array(on_other)
-        if body == self.cube or other == self.table:
-            body, other, link, other_link = other, body, other_link, link
-            towards_other, friction, position = -towards_other, -friction, np.array(on_body)
-        finger, other_name = self._body_name(int(body)), self._body_name(int(other))  # type: ignore[call-overload]
-        link_name = LINK_NAMES[int(link)] if int(link) >= 0 else ""  # type: ignore[call-overload]
-        return Contact(finger, link_name, other_name, position, towards_other, float(distance), float(force), -friction)  # type: ignore[arg-type]
-
-    def _body_name(self, body: int) -> str:
-        if body == self.cube:
-            return "cube"
-        return "table" if body == self.table else self.hand.fingers[self.fingers.index(body)].name

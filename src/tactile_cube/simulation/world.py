@@ -23,6 +23,7 @@ from tactile_cube.simulation.loop import OBJECT_STATE, make_loop
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.scene import Scene
 from tactile_cube.simulation.spin_inertia import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia
+from tactile_cube.simulation.trace import read_trace
 
 Array = NDArray[np.float64]
 
@@ -38,6 +39,7 @@ class World:
         constants: Constants of the running episode.
         steps: Policy steps since the reset.
         fault: What made the physics unusable, "" while all is well.
+        trace: Signals of every physics step of the last policy step, see `read_trace`; empty unless `options.trace`.
     """
 
     constants: EpisodeConstants
@@ -59,6 +61,7 @@ class World:
         self.options = options or SimulationOptions()
         self.steps = 0
         self.fault = ""
+        self.trace: dict[str, Array] = {}
         self._effects = list(effects)
         self._scene = Scene(hand, self.options)
         tree = RigidBodyTree.from_urdf(finger_urdf(hand))
@@ -74,7 +77,6 @@ class World:
         self._joints = np.zeros((2, len(hand.fingers), LINKS_PER_FINGER))
         self._cube = np.zeros(OBJECT_STATE)
         self._push = np.zeros(6)
-        self._cube_states: Array | None = None
         self._down = np.array([0.0, 0.0, -1.0])
 
     # --- running -------------------------------------------------------------------------------------------------
@@ -90,7 +92,7 @@ class World:
             InputError: The torque loop would be unstable with these constants and this time step.
         """
         self.constants = constants
-        self.steps, self.fault = 0, ""
+        self.steps, self.fault, self.trace = 0, "", {}
         self._push[:] = 0.0
         self._disturbance = Disturbance(constants)
         self._set_drivetrain(constants, start)
@@ -106,10 +108,7 @@ class World:
         if self.steps == self.constants.gravity_onset:
             self._set_weight(self.constants.gravity_scale)
         self._set("goal", q_n - self.constants.joint_offset)
-        substeps = self.options.substeps
-        self._cube_states = np.empty((substeps + 1, OBJECT_STATE)) if self.options.trace else None
-        q, v = self._joints.reshape(2, -1)
-        self._loop.run(substeps, q, v, self._memory, self._scene.cube, self._wrench(), self._cube_states)
+        self._run()
         self.steps += 1
         self._read_cube()
         distances = [row[8] for row in pybullet.getContactPoints(physicsClientId=self._scene.client)]
@@ -122,8 +121,7 @@ class World:
     def pull_finger(self, finger: int, force: Array) -> None:
         """Pulls a fingertip with a force (3,) [N] in the world until changed or reset."""
         joints = slice(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1))
-        load = self._plant.view(self._memory, "external_torque")
-        load[joints] = self._tip_jacobian(finger).T @ force
+        self._plant.view(self._memory, "external_torque")[joints] = self._tip_jacobian(finger).T @ force
 
     def close(self) -> None:
         """Ends the physics server."""
@@ -149,7 +147,7 @@ class World:
     @property
     def q_m(self) -> Array:
         """Measured joint angles (12,) [rad]: motor side of the elasticity, joint offset included, without noise."""
-        return self._plant.signal(self._memory, MOTOR_POSITION) + self.constants.joint_offset
+        return np.asarray(self._plant.signal(self._memory, MOTOR_POSITION) + self.constants.joint_offset)
 
     @property
     def q_f(self) -> Array:
@@ -159,7 +157,7 @@ class World:
     @property
     def q_d(self) -> Array:
         """Target of the impedance law after rate and torque limits (12,) [rad], in what the sensors read."""
-        return self._plant.signal(self._memory, COMMAND) + self.constants.joint_offset
+        return np.asarray(self._plant.signal(self._memory, COMMAND) + self.constants.joint_offset)
 
     @property
     def torque(self) -> Array:
@@ -255,6 +253,17 @@ class World:
         states = self._memory.copy()
         self._plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), states)
         self._set("signals", self._plant.view(states, "signals"))
+
+    def _run(self) -> None:
+        """The physics steps of one policy step, with a trace where wanted."""
+        substeps = self.options.substeps
+        states = np.empty((substeps + 1, OBJECT_STATE)) if self.options.trace else None
+        filtered = self._plant.view(self._memory, "filtered").copy()
+        q, v = self._joints.reshape(2, -1)
+        self._loop.run(substeps, q, v, self._memory, self._scene.cube, self._wrench(), states)
+        if states is not None:
+            offset = np.asarray(self.constants.joint_offset)
+            self.trace = read_trace(self._plant, self._memory, filtered, offset, states, self.time)
 
     def _wrench(self) -> Array | None:
         """Everything that pushes the cube in this policy step, or None."""
