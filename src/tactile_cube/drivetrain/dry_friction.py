@@ -1,8 +1,9 @@
-"""True dry friction in joint space: joints that stick stand still exactly, and nothing creeps.
+"""Dry friction in joint space: joints that stick stand still exactly, and nothing creeps unless it is told to.
 
 The speeds after a step minimise v' M v / 2 - b' v + sum_j limit_j |v_j|: where |v_j| > 0 friction opposes the motion
 with its full size, where v_j = 0 it takes any value up to it. This is implicit Coulomb friction (Moreau; Stewart and
-Trinkle, 1996) without a regularised sign function.
+Trinkle, 1996) without a regularised sign function. A joint with a grip g > 0 creeps instead of standing still: friction
+resists with g v until that reaches its full size.
 """
 
 import numpy as np
@@ -17,7 +18,9 @@ SMALLEST_PIVOT = 1e-14
 
 
 @compiled
-def solve_speeds(M: Array, b: Array, limit: Array, v: Array, side: Array, factor: Array, trial: Array) -> None:
+def solve_speeds(
+    M: Array, b: Array, limit: Array, grip: Array, v: Array, side: Array, factor: Array, trial: Array
+) -> None:
     """Speeds after a step under dry friction.
 
     Guesses which joints move and to which side, solves for their speeds, and accepts if the guess agrees with the
@@ -27,64 +30,78 @@ def solve_speeds(M: Array, b: Array, limit: Array, v: Array, side: Array, factor
         M: (n, n) joint-space inertia, reflected inertia included [kg m^2].
         b: (n,) momentum that the joints would have without friction [N m s].
         limit: (n,) friction impulse of the step, zero or more [N m s].
+        grip: (n,) friction impulse per speed of a joint that sticks [kg m^2]; 0: it stands still.
         v: (n,) speeds before the step; overwritten with those after it [rad/s].
         side: (n,) scratch.
         factor: (n, n) scratch.
         trial: (n,) scratch.
     """
-    for j in range(len(v)):
-        side[j] = np.sign(v[j])
     for _ in range(GUESSES):
-        _solve_moving(M, b, limit, side, factor, trial)
-        if _agrees(M, b, limit, side, trial):
-            v[:] = trial
+        for j in range(len(v)):
+            side[j] = _side(v[j], limit[j], grip[j])
+        _solve_moving(M, b, limit, grip, side, factor, trial)
+        if _agrees(M, b, limit, grip, side, trial):
+            for j in range(len(v)):
+                v[j] = trial[j]
             return
         for _ in range(SWEEPS):
-            _descend(M, b, limit, v)
-        for j in range(len(v)):
-            side[j] = np.sign(v[j])
+            _descend(M, b, limit, grip, v)
     for _ in range(GUESSES * SWEEPS):
-        _descend(M, b, limit, v)
+        _descend(M, b, limit, grip, v)
 
 
 @compiled
-def _solve_moving(M: Array, b: Array, limit: Array, side: Array, factor: Array, v: Array) -> None:
-    """Speeds of the joints that move under full friction against `side`; the others stand (L D L^T)."""
+def _side(v: float, limit: float, grip: float) -> float:
+    """The side to which a joint moves, 0 if it sticks."""
+    return 0.0 if abs(v) * grip < limit and (grip > 0.0 or v == 0.0) else np.sign(v)
+
+
+@compiled
+def _stands(limit: float, grip: float, side: float) -> bool:
+    return limit > 0.0 and side == 0.0 and grip <= 0.0
+
+
+@compiled
+def _solve_moving(M: Array, b: Array, limit: Array, grip: Array, side: Array, factor: Array, v: Array) -> None:
+    """Speeds of the joints that move, under full friction against `side`; the others stand (L D L^T)."""
     n = len(v)
     for i in range(n):
-        if limit[i] > 0.0 and side[i] == 0.0:
-            v[i] = 0.0
+        v[i] = 0.0
+        if _stands(limit[i], grip[i], side[i]):
             continue
         v[i] = b[i] - limit[i] * side[i]
-        pivot = M[i, i]
+        pivot = M[i, i] + (grip[i] if side[i] == 0.0 and limit[i] > 0.0 else 0.0)
         for j in range(i):
-            if limit[j] > 0.0 and side[j] == 0.0:
+            if _stands(limit[j], grip[j], side[j]):
                 continue
             entry = M[i, j]
             for k in range(j):
-                if limit[k] <= 0.0 or side[k] != 0.0:
+                if not _stands(limit[k], grip[k], side[k]):
                     entry -= factor[i, k] * factor[j, k] * factor[k, k]
             factor[i, j] = entry / factor[j, j]
             pivot -= factor[i, j] * entry
             v[i] -= factor[i, j] * v[j]
         factor[i, i] = max(pivot, SMALLEST_PIVOT)
     for i in range(n - 1, -1, -1):
-        if limit[i] > 0.0 and side[i] == 0.0:
+        if _stands(limit[i], grip[i], side[i]):
             continue
         v[i] /= factor[i, i]
         for j in range(i + 1, n):
-            if limit[j] <= 0.0 or side[j] != 0.0:
+            if not _stands(limit[j], grip[j], side[j]):
                 v[i] -= factor[j, i] * v[j]
 
 
 @compiled
-def _agrees(M: Array, b: Array, limit: Array, side: Array, v: Array) -> bool:
-    """Whether moving joints move to their side and standing ones are held within their friction."""
+def _agrees(M: Array, b: Array, limit: Array, grip: Array, side: Array, v: Array) -> bool:
+    """Whether moving joints move to their side and sticking ones are held within their friction."""
     for i in range(len(v)):
         if limit[i] <= 0.0:
             continue
         if side[i] != 0.0:
-            if not v[i] * side[i] > 0.0:
+            if not (v[i] * side[i] > 0.0 and abs(v[i]) * grip[i] >= limit[i] * (grip[i] > 0.0)):
+                return False
+        elif grip[i] > 0.0:
+            if not abs(v[i]) * grip[i] <= limit[i]:
                 return False
         else:
             push = b[i]
@@ -96,12 +113,14 @@ def _agrees(M: Array, b: Array, limit: Array, side: Array, v: Array) -> bool:
 
 
 @compiled
-def _descend(M: Array, b: Array, limit: Array, v: Array) -> None:
+def _descend(M: Array, b: Array, limit: Array, grip: Array, v: Array) -> None:
     """One sweep of coordinate descent: each joint in turn takes its best speed, the others held."""
     for i in range(len(v)):
         push = b[i]
         for j in range(len(v)):
             if j != i:
                 push -= M[i, j] * v[j]
-        held = max(abs(push) - limit[i], 0.0)
-        v[i] = np.sign(push) * held / max(M[i, i], SMALLEST_PIVOT)
+        inertia = max(M[i, i], SMALLEST_PIVOT)
+        v[i] = np.sign(push) * max(abs(push) - limit[i], 0.0) / inertia
+        if grip[i] > 0.0 and abs(push) * grip[i] <= limit[i] * (inertia + grip[i]):
+            v[i] = push / (inertia + grip[i])

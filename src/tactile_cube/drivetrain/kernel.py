@@ -36,6 +36,7 @@ class Kernel:
         rollout: (commands (H + T, n), H, substeps, memory, rows (R,), out (T, R, n)): signals of each command row.
         rollout_batch: (commands (S, L, n), which (B,), lengths (S,), H, substeps, memory (B, size), rows (R,),
             out (B, T, R, n)).
+        segments_batch: as rollout_batch, started anew from measured states every `segment` rows (multiple shooting).
     """
 
     def __init__(self, topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> None:
@@ -44,6 +45,7 @@ class Kernel:
         self.step: Callable[..., None] = self._module.step
         self.rollout: Callable[..., None] = self._module.rollout
         self.rollout_batch: Callable[..., None] = self._module.rollout_batch
+        self.segments_batch: Callable[..., None] = self._module.segments_batch
 
     @cached_property
     def _callback(self) -> object:

@@ -25,7 +25,7 @@ from tactile_cube.drivetrain.dry_friction import solve_speeds
 from tactile_cube.drivetrain.impedance import impedance_torque
 from tactile_cube.drivetrain.signals import *
 from tactile_cube.drivetrain.target_filter import limit_rate, limit_torque, low_pass
-from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, add_spin_inertia, mass_matrix_and_bias
+from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, add_spin_inertia, add_weight, mass_matrix_and_bias
 
 inner = njit(error_model="numpy", nogil=True)
 outer = njit(error_model="numpy", nogil=True, cache=True)
@@ -92,6 +92,19 @@ def drive(x, c, dt, memory):
 
 
 @inner
+def add_midpoint_damping(x, c, dt, memory):
+    """The controller's damping acts on the mean of the speeds before and after the step: second order in dt.
+
+    An explicit K_D dq would act half a step late, which fitting to a measurement takes for a delay.
+    """
+    for j in range(n):
+        a = c * n + j
+        if abs(x[CONTROLLER_TORQUE, j]) < memory[TORQUE_LIMIT + a]:
+            damping = memory[KD + a] / (1.0 + memory[KP + a] * memory[COMPLIANCE + a])
+            memory[JOINT_MASS_MATRIX + j * n + j] += 0.5 * dt * damping
+
+
+@inner
 def next_speeds(x, c, dt, memory):
     """Speeds of chain c after the step, under dry friction, in memory[SPEED]; its accelerations beside them."""
     for j in range(n):
@@ -99,17 +112,20 @@ def next_speeds(x, c, dt, memory):
         net = x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j]
         x[DIRECTION, j] = np.sign(x[VELOCITY, j]) if x[VELOCITY, j] != 0.0 else np.sign(net)
         x[FRICTION, j] = memory[STATIC_FRICTION + a]
-        memory[MOMENTUM + j] = dt * net
         memory[SPEED + j] = x[VELOCITY, j]
-    effects_friction(x, c, dt, memory)
+    effects_friction(x, c, dt, memory)  # such a law may also add to JOINT_TORQUE: bristles take the place of dry friction
+    add_midpoint_damping(x, c, dt, memory)
     for j in range(n):
+        memory[MOMENTUM + j] = dt * (x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j])
         for k in range(n):
             memory[MOMENTUM + j] += memory[JOINT_MASS_MATRIX + j * n + k] * x[VELOCITY, k]
         memory[FRICTION_IMPULSE + j] = dt * (max(x[FRICTION, j], 0.0) + memory[BRAKE + c * n + j])
+        creep = memory[FRICTION_CREEP + c * n + j]
+        memory[GRIP + j] = dt / creep if creep > 0.0 else 0.0
     solve_speeds(
         shaped(memory, JOINT_MASS_MATRIX, n, n), memory[MOMENTUM : MOMENTUM + n],
-        memory[FRICTION_IMPULSE : FRICTION_IMPULSE + n], memory[SPEED : SPEED + n], memory[SIDE : SIDE + n],
-        shaped(memory, FACTOR, n, n), memory[TRIAL : TRIAL + n],
+        memory[FRICTION_IMPULSE : FRICTION_IMPULSE + n], memory[GRIP : GRIP + n], memory[SPEED : SPEED + n],
+        memory[SIDE : SIDE + n], shaped(memory, FACTOR, n, n), memory[TRIAL : TRIAL + n],
     )
     for j in range(n):
         memory[JOINT_ACCELERATION + j] = (memory[SPEED + j] - x[VELOCITY, j]) / dt
@@ -201,6 +217,10 @@ def torques_for_bullet(c, q, v, torque, memory):
         PARENT, PRISMATIC, memory[SPIN_INERTIA + c * N : SPIN_INERTIA + (c + 1) * N],
         shaped(memory, WORK, N + 1, WORK_COLUMNS), M, h,
     )
+    add_weight(
+        PARENT, PRISMATIC, memory[MASS + c * N : MASS + (c + 1) * N], memory[GRAVITY + 3 * c : GRAVITY + 3 * c + 3],
+        memory[ENGINE_GRAVITY + 3 * c : ENGINE_GRAVITY + 3 * c + 3], shaped(memory, WORK, N + 1, WORK_COLUMNS), h,
+    )
     bullet_torques(
         FOLLOW, LEADER, ratio, M, h, memory[JOINT_ACCELERATION : JOINT_ACCELERATION + n],
         memory[CONTACT_TORQUE + c * n : CONTACT_TORQUE + (c + 1) * n], torque,
@@ -247,13 +267,44 @@ def control(i, q, v, torque, memory):
 
 @inner
 def roll(commands, length, history, substeps, memory, rows, out):
+    """Signals of each command row, read at one substep of it: the last one, or memory[READING] if that is earlier."""
+    reading = min(int(memory[READING]), substeps - 1)
     for k in range(history + length):
         for s in range(substeps):
             if k < history:
                 listen(commands[k], memory)
                 continue
             free_step(commands[k], memory)
-            if s == 0:
+            if s == reading:
+                for r in range(len(rows)):
+                    for a in range(C * n):
+                        out[k - history, r, a] = memory[SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+
+
+@inner
+def start_segment(position, speed, nudge, follow_sensor, memory):
+    """Puts the sensor to its measured position and the joints to their measured speed; effects keep their past."""
+    for a in range(C * n):
+        column = a % n
+        x = signals_of(a // n, memory)
+        deflection = x[MOTOR_POSITION, column] - x[POSITION, column] if follow_sensor else 0.0
+        memory[Q + a] = position[a] - deflection + nudge[a]
+        memory[V + a] = speed[a] + nudge[C * n + a]
+
+
+@inner
+def roll_segments(commands, length, history, substeps, segment, position, speed, nudge, memory, rows, out):
+    reading = min(int(memory[READING]), substeps - 1)
+    for k in range(history + length):
+        if k >= history and (k - history) % segment == 0:
+            part = (k - history) // segment
+            start_segment(position[part], speed[part], nudge, part > 0, memory)
+        for s in range(substeps):
+            if k < history:
+                listen(commands[k], memory)
+                continue
+            free_step(commands[k], memory)
+            if s == reading:
                 for r in range(len(rows)):
                     for a in range(C * n):
                         out[k - history, r, a] = memory[SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
@@ -278,6 +329,19 @@ def rollout(commands, history, substeps, memory, rows, out):
 def rollout_batch(commands, which, lengths, history, substeps, memory, rows, out):
     for b in range(len(memory)):
         roll(commands[which[b]], lengths[which[b]], history, substeps, memory[b], rows, out[b])
+
+
+@outer
+def segments_batch(
+    commands, which, lengths, history, substeps, segment, position, speed, nudge, memory, rows, first, last, out
+):
+    """Blocks first..last of a batch, started anew from `position`, `speed` (S, K, n) every `segment` rows."""
+    for b in range(first, last):
+        s = which[b]
+        roll_segments(
+            commands[s], lengths[s], history, substeps, segment, position[s], speed[s], nudge[b], memory[b], rows,
+            out[b],
+        )
 
 
 def control_callback():

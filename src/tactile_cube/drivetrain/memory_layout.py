@@ -85,7 +85,7 @@ def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, 
 
 
 def _header() -> dict[str, Shape]:
-    return {key: (1,) for key in ("size", "dt", "step", "seen", "trace_rows", "trace_offset")}
+    return {key: (1,) for key in ("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading")}
 
 
 def _joint_constants(joints: int) -> dict[str, Shape]:
@@ -99,6 +99,7 @@ def _joint_constants(joints: int) -> dict[str, Shape]:
         "command_torque_limit",
         "rate_limit",
         "brake",
+        "friction_creep",
         "external_torque",
         "goal",
     )
@@ -109,6 +110,7 @@ def _joint_constants(joints: int) -> dict[str, Shape]:
 def _mechanism(chains: int, dofs: int) -> dict[str, Shape]:
     return {
         "gravity": (chains, 3),
+        "engine_gravity": (chains, 3),
         "ratio": (chains, dofs),
         "offset": (chains, dofs),
         "placement_rotation": (chains, dofs, 3, 3),
@@ -145,6 +147,7 @@ def _scratch(dofs: int, joints: int) -> dict[str, Shape]:
         "factor": (joints, joints),
         "momentum": (joints,),
         "friction_impulse": (joints,),
+        "grip": (joints,),
         "speed": (joints,),
         "side": (joints,),
         "trial": (joints,),

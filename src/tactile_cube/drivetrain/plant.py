@@ -36,6 +36,10 @@ CONTACT_TORQUE_LIMIT = 5.0
 """Largest contact torque that is believed [N m]: 30 N at the outstretched tip of a finger."""
 
 
+LAST_SUBSTEP = 1e9
+"""Default of the key `reading`: a rollout reads each row's signals when its command has acted for the whole row."""
+
+
 class Plant:
     """C equal chains of n actuated joints each; every number lies in a flat memory that the caller keeps.
 
@@ -113,7 +117,8 @@ class Plant:
         self._fill_header(memory)
         for key in _TREE_KEYS:
             self.view(memory, key)[...] = np.stack([getattr(tree, key) for tree in self.trees])
-        self.view(memory, "gravity")[...] = gravity
+        for key in ("gravity", "engine_gravity"):
+            self.view(memory, key)[...] = gravity
         self.view(memory, "contact_torque_limit")[...] = CONTACT_TORQUE_LIMIT
         self.set_constants(memory, constants)
         self.view(memory, "command_torque_limit")[...] = self.view(memory, "torque_limit")
@@ -156,7 +161,10 @@ class Plant:
         """Where a joint sits in the plant."""
         a = self._index(joint)
         chain, j = divmod(a, len(self.topology.leader))
-        return Place(joint=a, chain=chain, link=self.topology.leader[j])
+        link = self.topology.leader[j]
+        follow = self.topology.follow
+        followers = tuple(k for k, leader in enumerate(follow) if leader == j and k != link)
+        return Place(joint=a, chain=chain, link=link, followers=followers)
 
     def reset(self, memory: Array, q: npt.ArrayLike, v: npt.ArrayLike = 0.0, time: float = 0.0) -> None:
         """Start anew at positions q and speeds v (..., all joints): filters at q, effects without a past.
@@ -182,7 +190,13 @@ class Plant:
 
     def _fill_header(self, memory: Array) -> None:
         first_state, _ = self.layout.entries["trace"]
-        header = {"size": self.size, "dt": self.dt, "trace_rows": self.trace_rows, "trace_offset": first_state}
+        header = {
+            "size": self.size,
+            "dt": self.dt,
+            "trace_rows": self.trace_rows,
+            "trace_offset": first_state,
+            "reading": LAST_SUBSTEP,
+        }
         for key, value in header.items():
             self.view(memory, key)[...] = value
         states = [self.layout.entries[f"state:{effect.name}"] for effect in self.effects]

@@ -224,3 +224,23 @@ def add_spin_inertia(parent: Integers, prismatic: Integers, spin: Array, work: A
                         M[i, j] += spin[k] * share * _dot(_at(work, j + 1, AXIS), own)
                     j = parent[j]
             i = parent[i]
+
+
+@compiled_once
+def add_weight(
+    parent: Integers, prismatic: Integers, mass: Array, gravity: Array, other: Array, work: Array, h: Array
+) -> None:
+    """Turns the bias h under `gravity` (3,) into that under `other` (3,), after `mass_matrix_and_bias` filled `work`."""
+    change = gravity[0] - other[0], gravity[1] - other[1], gravity[2] - other[2]
+    if change[0] == 0.0 and change[1] == 0.0 and change[2] == 0.0:
+        return
+    for k in range(len(parent)):
+        force, centre = _scaled(change, mass[k]), _at(work, k + 1, CENTRE)
+        i = k
+        while i >= 0:
+            axis = _at(work, i + 1, AXIS)
+            if prismatic[i]:
+                h[i] += _dot(axis, force)
+            else:
+                h[i] += _dot(_cross(axis, _add(centre, _scaled(_at(work, i + 1, ORIGIN), -1.0))), force)
+            i = parent[i]
