@@ -16,12 +16,12 @@ LINK_NAMES = ("knuckle", "proximal", "middle", "distal")
 
 @dataclass(frozen=True)
 class Capsule:
-    """Collision shape of a link: a capsule along the link's x axis.
+    """Collision shape of a link: a capsule along the link's z axis.
 
     Attributes:
         radius: [m].
-        start: Centre of the first half sphere along x [m].
-        end: Centre of the second half sphere along x [m].
+        start: Centre of the first half sphere along z [m].
+        end: Centre of the second half sphere along z [m].
     """
 
     radius: float
@@ -31,13 +31,13 @@ class Capsule:
 
 @dataclass(frozen=True)
 class Link:
-    """One link of a finger; x points along the link, z is the axis of the joint that moves it.
+    """One link of a finger; z points along the link, y is the axis of the joint that moves it.
 
     Attributes:
         name: One of `LINK_NAMES`.
         length: Distance to the next joint axis [m].
         mass: [kg].
-        centre_of_mass: Along x [m].
+        centre_of_mass: Along z [m].
         capsule: Collision shape, or None where nothing can be touched.
     """
 
@@ -48,10 +48,10 @@ class Link:
     capsule: Capsule | None
 
     def inertia(self) -> tuple[float, float, float]:
-        """Principal moments about the centre of mass, of a solid cylinder in the capsule's place [kg m^2]."""
+        """Moments about the centre of mass, of a solid cylinder in the capsule's place (x, y, z) [kg m^2]."""
         radius, length = (0.012, 0.02) if self.capsule is None else (self.capsule.radius, self.length)
         across = self.mass * (3.0 * radius**2 + length**2) / 12.0
-        return 0.5 * self.mass * radius**2, across, across
+        return across, across, 0.5 * self.mass * radius**2
 
 
 @dataclass(frozen=True)

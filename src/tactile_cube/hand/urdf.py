@@ -1,6 +1,7 @@
 """One description of the hand for PyBullet, the rigid-body equations and Rerun: URDF text from a HandModel.
 
-A finger's root link is the frame of q1. Every link's x axis points along the link, joints turn about z.
+A finger's root link is the frame of q1, which turns about its z axis. Every further link's z axis points along the link
+and its joint turns about y.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand.model import Array, Capsule, HandModel, Link
 
-_ACROSS = '<origin xyz="0 0 0" rpy="1.5707963267948966 0 0"/>'
+_AXIS_Y, _AXIS_Z = '<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>'
+_ACROSS = f'<origin xyz="0 0 0" rpy="{np.pi} {-np.pi / 2.0} 0"/>'
+"""From q1's frame to q2's: z along the finger, which is x of the base, y against y of the base."""
 _COLOURS = {"palm": "0.35 0.37 0.40 1", "link": "0.72 0.74 0.78 1", "tip": "0.13 0.15 0.18 1"}
 
 
@@ -49,39 +52,38 @@ def _finger_parts(hand: HandModel, prefix: str, parent: str, base: str) -> list[
     lower, upper = hand.lower[:3], hand.upper[:3]
     mimic = f'<mimic joint="{prefix}q3" multiplier="1" offset="0"/>'
     name = [prefix + link.name for link in hand.links]
-    along = [_origin(np.array([link.length, 0.0, 0.0])) for link in (proximal, middle)]
+    along = [_origin(np.array([0.0, 0.0, link.length])) for link in (proximal, middle)]
     return [
         *(_link(prefix, link) for link in (knuckle, proximal, middle, distal)),
-        _joint(f"{prefix}q1", parent, name[0], base, lower[0], upper[0]),
-        _joint(
-            f"{prefix}q2", name[0], name[1], '<origin xyz="0 0 0" rpy="1.5707963267948966 0 0"/>', lower[1], upper[1]
-        ),
-        _joint(f"{prefix}q3", name[1], name[2], along[0], lower[2], upper[2]),
-        _joint(f"{prefix}q4", name[2], name[3], along[1], lower[2], hand.coupled_upper, mimic),
+        _joint(f"{prefix}q1", parent, name[0], base, _AXIS_Z, lower[0], upper[0]),
+        _joint(f"{prefix}q2", name[0], name[1], _ACROSS, _AXIS_Y, lower[1], upper[1]),
+        _joint(f"{prefix}q3", name[1], name[2], along[0], _AXIS_Y, lower[2], upper[2]),
+        _joint(f"{prefix}q4", name[2], name[3], along[1], _AXIS_Y, lower[2], hand.coupled_upper, mimic),
     ]
 
 
-def _joint(name: str, parent: str, child: str, origin: str, lower: float, upper: float, extra: str = "") -> str:
+def _joint(
+    name: str, parent: str, child: str, origin: str, axis: str, lower: float, upper: float, extra: str = ""
+) -> str:
     ends = f'<parent link="{parent}"/><child link="{child}"/>'
     limit = f'<limit lower="{lower:.10g}" upper="{upper:.10g}" effort="10" velocity="50"/>'
-    return f'<joint name="{name}" type="revolute">{ends}{origin}<axis xyz="0 0 1"/>{limit}{extra}</joint>'
+    return f'<joint name="{name}" type="revolute">{ends}{origin}{axis}{limit}{extra}</joint>'
 
 
 def _link(prefix: str, link: Link) -> str:
     ixx, iyy, izz = link.inertia()
     inertia = f'<inertia ixx="{ixx:.10g}" iyy="{iyy:.10g}" izz="{izz:.10g}" ixy="0" ixz="0" iyz="0"/>'
-    inertial = f'<inertial><origin xyz="{link.centre_of_mass} 0 0"/><mass value="{link.mass}"/>{inertia}</inertial>'
+    inertial = f'<inertial><origin xyz="0 0 {link.centre_of_mass}"/><mass value="{link.mass}"/>{inertia}</inertial>'
     colour = _COLOURS["tip" if link.name == "distal" else "link"]
-    shapes = (
-        "" if link.capsule is None else _collision(link.capsule) + _visual(prefix + link.name, link.capsule, colour)
-    )
-    return f'<link name="{prefix}{link.name}">{inertial}{shapes}</link>'
+    name = prefix + link.name
+    shapes = "" if link.capsule is None else _collision(link.capsule) + _visual(name, link.capsule, colour)
+    return f'<link name="{name}">{inertial}{shapes}</link>'
 
 
 def _collision(capsule: Capsule) -> str:
     length = capsule.end - capsule.start
     geometry = f'<geometry><capsule radius="{capsule.radius}" length="{length:.10g}"/></geometry>'
-    return f"<collision>{_along_x(0.5 * (capsule.start + capsule.end))}{geometry}</collision>"
+    return f"<collision>{_at(0.5 * (capsule.start + capsule.end))}{geometry}</collision>"
 
 
 def _visual(name: str, capsule: Capsule, colour: str) -> str:
@@ -89,9 +91,9 @@ def _visual(name: str, capsule: Capsule, colour: str) -> str:
     material = f'<material name="{name}"><color rgba="{colour}"/></material>'
     cylinder = f'<geometry><cylinder radius="{capsule.radius}" length="{capsule.end - capsule.start:.10g}"/></geometry>'
     middle = 0.5 * (capsule.start + capsule.end)
-    body = f"<visual>{_along_x(middle)}{cylinder}{material}</visual>"
+    body = f"<visual>{_at(middle)}{cylinder}{material}</visual>"
     sphere = f'<geometry><sphere radius="{capsule.radius}"/></geometry>{material}'
-    ends = "".join(f'<visual><origin xyz="{x} 0 0"/>{sphere}</visual>' for x in (capsule.start, capsule.end))
+    ends = "".join(f"<visual>{_at(end)}{sphere}</visual>" for end in (capsule.start, capsule.end))
     return body + ends
 
 
@@ -106,8 +108,8 @@ def _palm(hand: HandModel) -> str:
     return f'<link name="palm"><visual>{_origin(centre)}{geometry}{material}</visual></link>'
 
 
-def _along_x(middle: float) -> str:
-    return f'<origin xyz="{middle:.10g} 0 0" rpy="0 1.5707963267948966 0"/>'
+def _at(along: float) -> str:
+    return f'<origin xyz="0 0 {along:.10g}"/>'
 
 
 def _origin(position: Array, rotation: Array | None = None) -> str:

@@ -106,7 +106,10 @@ class Scene:
             for link, spin in enumerate(spins):
                 ixx, iyy, izz = self.inertias[link]
                 pybullet.changeDynamics(
-                    body, link, localInertiaDiagonal=[ixx, iyy, izz + spin], physicsClientId=self.client
+                    body,
+                    link,
+                    localInertiaDiagonal=[ixx, iyy + spin, izz] if link else [ixx, iyy, izz + spin],
+                    physicsClientId=self.client,
                 )
 
     def contacts(self) -> list[Contact]:
