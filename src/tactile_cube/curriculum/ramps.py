@@ -23,6 +23,7 @@ class Ramps:
     penalty_scale: float = 1.0
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         if self.filter_time is not None and not self.filter_time > 0.0:
             raise InputError(f"curriculum filter_time is {self.filter_time} s; give a time constant above 0")
         for key in ("gravity_scale", "penalty_scale"):
@@ -65,6 +66,7 @@ class LinearCurriculum(Ramps):
     length: float = 4e6
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         super().__post_init__()
         if not (self.begin >= 0.0 and self.length > 0.0):
             raise InputError(f"curriculum begin {self.begin}, length {self.length}; give begin >= 0 and length > 0")
@@ -94,6 +96,7 @@ class PerformanceCurriculum(Ramps):
     high: float = 4.0
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         super().__post_init__()
         if not self.low < self.high:
             raise InputError(f"curriculum low {self.low} is not below high {self.high}; give angles low < high [rad]")

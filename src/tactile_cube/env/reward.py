@@ -21,7 +21,7 @@ REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "leaving")
 
 
 def spin(before: CubePose, after: CubePose, direction: int, limit: float) -> float:
-    """Rotation in the rewarded direction, at most `limit` a step [rad]. Source: paper, section II, and website (clip)."""
+    """Rotation in the rewarded direction, at most `limit` a step [rad]. Source: paper, section II; website (clip)."""
     return min(direction * (after.theta - before.theta), limit)
 
 
@@ -41,7 +41,7 @@ def tilt(before: CubePose, after: CubePose) -> float:
 
 
 def proximal(joint_angles: Sequence[float]) -> float:
-    """Sum over the fingers of q1^4 [rad^4] for joint angles (12,), finger by finger: keeps the fingers from twisting."""
+    """Sum over the fingers of q1^4 [rad^4] for joint angles (12,): keeps the fingers from twisting."""
     return sum(q**4 for q in joint_angles[::3])
 
 
@@ -73,6 +73,7 @@ class Reward:
     fastest: float = 1.0
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         for key in (*REWARD_TERMS, "fastest"):
             if not (math.isfinite(getattr(self, key)) and getattr(self, key) >= 0.0):
                 raise InputError(

@@ -48,6 +48,7 @@ class Task:
     tilt_limit: float = 0.8
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         for key in ("filter_time", "plane_range", "height_range", "tilt_limit", "episode_steps"):
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0):

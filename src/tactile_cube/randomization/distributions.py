@@ -50,6 +50,7 @@ class Uniform:
     high: float
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         if not self.low <= self.high:
             raise InputError(f"Uniform: low {self.low} is above high {self.high}; give low <= high")
 
@@ -66,6 +67,7 @@ class LogUniform:
     high: float
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         if not 0.0 < self.low <= self.high:
             raise InputError(f"LogUniform: needs 0 < low <= high, got low {self.low}, high {self.high}")
 
@@ -82,6 +84,7 @@ class Normal:
     std: float
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         if not self.std >= 0.0:
             raise InputError(f"Normal: std {self.std} is negative; give a standard deviation >= 0")
 

@@ -51,6 +51,7 @@ class Randomization:
     sticky_probability: float = 0.0
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         for group in ("values", "factors", "shifts"):
             for key in getattr(self, group):
                 if key not in FIELDS:

@@ -32,6 +32,7 @@ class StartStates:
     clearance: float = 0.001
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         if self.poses < 1:
             raise InputError(f"start.poses is {self.poses}; give at least 1")
         if not 0.0 <= self.yaw_range < 0.25 * np.pi:

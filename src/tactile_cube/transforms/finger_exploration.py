@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import torch
 from tensordict import TensorDictBase
-from torch import Tensor
 from torchrl.data import Categorical, Composite, Unbounded
 from torchrl.envs.transforms import Transform
 
@@ -41,6 +40,7 @@ class Exploration:
     longest: int = 7
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         for key in ("episodes", "probability"):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise InputError(f"exploration.{key} is {getattr(self, key)}; give a number in [0, 1]")

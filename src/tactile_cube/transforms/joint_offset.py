@@ -28,7 +28,7 @@ class JointOffset(Transform):  # type: ignore[misc]
     offset: Tensor
 
     def __init__(self, distribution: Distribution, half_range: Tensor) -> None:
-        """Draws each joint's offset from `distribution` [rad]; `half_range` (12,) [rad] is what an action of 1 means."""
+        """Draws each joint's offset from `distribution` [rad]; an action of 1 means `half_range` (12,) [rad]."""
         super().__init__()
         self.distribution = distribution
         self.half_range = half_range

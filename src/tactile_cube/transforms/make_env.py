@@ -53,6 +53,7 @@ class EnvConfig:
     stack: int = 5
 
     def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
         if self.stack < 1:
             raise InputError(f"env.stack is {self.stack}; give at least 1 reading")
 

@@ -14,7 +14,7 @@ def reset_mask(tensordict: TensorDictBase, fresh: TensorDictBase) -> Tensor:
         tensordict: what reset was called with.
         fresh: what the environment gave back.
     """
-    mask = tensordict.get("_reset", None)
+    mask: Tensor | None = tensordict.get("_reset", None)
     if mask is None:
         return torch.ones((*fresh.batch_size, 1), dtype=torch.bool)
     return mask.reshape(*fresh.batch_size, 1)

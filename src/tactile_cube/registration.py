@@ -1,0 +1,49 @@
+"""The environment's name in Gymnasium's registry: "tactile_cube/Rotation-v0"."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import gymnasium
+
+if TYPE_CHECKING:
+    from tactile_cube.transforms.gymnasium_env import GymnasiumRotation
+
+NAME = "tactile_cube/Rotation-v0"
+
+
+def register() -> None:
+    """Makes `gymnasium.make(NAME)` work."""
+    if NAME not in gymnasium.registry:
+        gymnasium.register(id=NAME, entry_point="tactile_cube.registration:make_rotation")
+
+
+def make_rotation(
+    task: str = "table",
+    reward: str = "early",
+    randomization: str = "paper",
+    start: str = "wide_yaw",
+    overrides: tuple[str, ...] = (),
+    render_mode: str | None = None,
+) -> GymnasiumRotation:
+    """The environment of the named options of `conf/`.
+
+    Args:
+        task: option of the group of that name.
+        reward: option of the group of that name.
+        randomization: option of the group of that name.
+        start: option of the group of that name.
+        overrides: further settings as on the command line, e.g. "task.filter_time=0.25".
+        render_mode: None; pictures come from `evaluate`.
+    """
+    from hydra import compose, initialize_config_dir
+    from hydra.utils import instantiate
+
+    from tactile_cube.cli import CONFIG
+    from tactile_cube.transforms.gymnasium_env import GymnasiumRotation
+
+    groups = {"task": task, "reward": reward, "randomization": randomization, "start": start}
+    groups |= {"exploration": "none", "curriculum": "none", "env": "rotation"}
+    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+        config = compose(overrides=[*(f"+{group}={option}" for group, option in groups.items()), *overrides])
+    return GymnasiumRotation(instantiate(config.env), render_mode)

@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from tactile_cube.env import REWARD_TERMS, CubePose, Reward
+from tactile_cube.env import reward as terms
+from tactile_cube.errors import InputError
+
+STILL = CubePose(0, 0, 0, 0, 0, 0, 0)
+
+
+def test_spin_counts_in_the_rewarded_direction_and_is_clipped_there_only() -> None:
+    turned = STILL._replace(theta=0.05)
+    assert terms.spin(STILL, turned, 1, 0.1) == pytest.approx(0.05)
+    assert terms.spin(STILL, turned, -1, 0.1) == pytest.approx(-0.05)
+    assert terms.spin(STILL, STILL._replace(theta=0.3), 1, 0.1) == pytest.approx(0.1)
+    assert terms.spin(STILL, STILL._replace(theta=0.3), -1, 0.1) == pytest.approx(-0.3)
+
+
+def test_motion_terms_measure_the_change_of_a_step() -> None:
+    before = CubePose(0.1, 0.1, 0.1, 0, 0.1, 0.1, 0)
+    after = CubePose(0.103, 0.096, 0.098, 0, 0.15, 0.08, 0)
+    assert terms.plane(before, after) == pytest.approx(0.005)
+    assert terms.height(before, after) == pytest.approx(0.002)
+    assert terms.tilt(before, after) == pytest.approx(0.07)
+    assert terms.plane(after, after) == terms.height(after, after) == terms.tilt(after, after) == 0.0
+
+
+def test_proximal_term_sums_the_fourth_power_of_each_fingers_first_joint() -> None:
+    angles = np.full(12, 9.0)
+    angles[::3] = (0.1, -0.2, 0.3, 0.0)
+    assert terms.proximal(angles.tolist()) == pytest.approx(0.1**4 + 0.2**4 + 0.3**4)
+
+
+def test_published_weights_and_their_signs() -> None:
+    assert Reward().weights().tolist() == [16, -100, -300, -50, -25, -10]
+
+
+def test_penalty_scale_changes_the_motion_weights_only() -> None:
+    ratio = Reward().weights(0.2) / Reward().weights(1.0)
+    scaled = {name for name, r in zip(REWARD_TERMS, ratio, strict=True) if r != 1.0}
+    assert scaled == {"height", "plane", "tilt"}
+    assert ratio[1:4] == pytest.approx([0.2] * 3)
+
+
+def test_negative_weight_is_refused_because_signs_are_built_in() -> None:
+    with pytest.raises(InputError, match=r"reward\.plane is -300"):
+        Reward(plane=-300)

@@ -1,0 +1,50 @@
+import dataclasses
+
+import pytest
+
+from tactile_cube.env import OUTCOMES, CubePose, Task
+from tactile_cube.env.conditions import Conditions
+from tactile_cube.errors import InputError
+from tactile_cube.simulation import EpisodeConstants
+
+START = CubePose(0, 0, 0.002, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("pose", "step", "expected"),
+    [
+        (START, 5, "running"),
+        (START, 100, "time_limit"),
+        (START._replace(z=-0.05), 5, "dropped"),
+        (START._replace(z=0.05), 5, "lifted"),
+        (START._replace(x=-0.04), 5, "left_range"),
+        (START._replace(y=0.04), 5, "left_range"),
+        (START._replace(tilt=0.9), 5, "tilted"),
+        (START._replace(z=-0.05), 100, "dropped"),
+        (START._replace(theta=20.0), 5, "running"),
+    ],
+)
+def test_outcome_names_why_an_episode_ends(pose: CubePose, step: int, expected: str) -> None:
+    assert OUTCOMES[Task("full").outcome(START, pose, step)] == expected
+
+
+def test_table_stands_under_the_cube_of_this_episode() -> None:
+    constants = EpisodeConstants(cube_size=0.09)
+    task = Task("table", table=True)
+    assert task.apply(constants, task.conditions()).table_height == pytest.approx(-0.045)
+    floating = dataclasses.replace(task, table=False)
+    assert floating.apply(constants, floating.conditions()).table_height is None
+
+
+def test_conditions_reach_the_constants() -> None:
+    constants = Task("full").apply(EpisodeConstants(), Conditions(filter_time=0.2, gravity_scale=0.3))
+    assert (constants.filter_time, constants.gravity_scale, constants.gravity_onset) == (0.2, 0.3, 4)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"filter_time": -0.1}, {"episode_steps": 0}, {"direction": 2}, {"gravity_scale": -1}]
+)
+def test_impossible_values_are_refused_with_key_and_value(wrong: dict[str, float]) -> None:
+    ((key, value),) = wrong.items()
+    with pytest.raises(InputError, match=rf"task\.{key} is {value}"):
+        Task("full", **wrong)

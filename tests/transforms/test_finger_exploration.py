@@ -1,0 +1,71 @@
+from collections.abc import Callable
+
+import pytest
+import torch
+from torchrl.envs import TransformedEnv
+from torchrl.envs.utils import check_env_specs, step_mdp
+
+from tactile_cube.errors import InputError
+from tactile_cube.transforms import Exploration, FingerExploration
+
+MakeEnv = Callable[..., TransformedEnv]
+
+
+def run(env: TransformedEnv, worlds: int, steps: int) -> torch.Tensor:
+    """Actions taken while the policy says 0, shape (steps, worlds, fingers, joints)."""
+    data, taken = env.reset(), []
+    for _ in range(steps):
+        data = step_mdp(env.step(data.set("action", torch.zeros(worlds, 12))))
+        taken.append(data["action_taken"].clone())
+    return torch.stack(taken).unflatten(-1, (4, 3))
+
+
+def test_only_the_given_part_of_the_episodes_explores(transformed: MakeEnv) -> None:
+    env = transformed(FingerExploration(Exploration(episodes=0.3)), worlds=400)
+    taken = run(env, 400, 30)
+    exploring = env.transform._exploring.flatten()
+    assert float(exploring.float().mean()) == pytest.approx(0.3, abs=0.06)
+    assert (taken[:, ~exploring] == 0.0).all()
+    assert (taken[:, exploring] != 0.0).any()
+
+
+def test_whole_fingers_hold_a_target_for_two_to_seven_steps(transformed: MakeEnv) -> None:
+    env = transformed(FingerExploration(Exploration(episodes=1.0, probability=0.06)), worlds=100)
+    taken = run(env, 100, 60)
+    moved = (taken != 0.0).all(-1)
+    assert torch.equal(moved, (taken != 0.0).any(-1))
+    assert set(moved.sum(-1).unique().tolist()) == {0, 1, 2, 4}
+    lengths = []
+    for world in range(100):
+        runs, count = torch.unique_consecutive(taken[:, world].flatten(1), dim=0, return_counts=True)
+        lengths += count[(runs != 0.0).any(-1)][:-1].tolist()
+    assert set(lengths) == {2, 3, 4, 5, 6, 7}
+
+
+def test_what_was_taken_reaches_the_world(transformed: MakeEnv) -> None:
+    env = transformed(FingerExploration(Exploration(episodes=1.0, probability=1.0)), worlds=1)
+    taken = run(env, 1, 3)[-1].flatten()
+    task = env.base_env.tasks[0]
+    wanted = task._middle + task._half_range * taken.double().numpy()
+    assert task.world.commands[-1] == pytest.approx(wanted)
+
+
+def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> None:
+    env = transformed(FingerExploration(Exploration(episodes=1.0, probability=1.0, shortest=7)), worlds=2)
+    data = step_mdp(env.step(env.reset().set("action", torch.zeros(2, 12))))
+    before = data["action_taken"].clone()
+    data = env.reset(data.set("_reset", torch.tensor([[True], [False]])))
+    after = env.step(data.set("action", torch.zeros(2, 12)))["next", "action_taken"]
+    assert torch.equal(after[1], before[1])
+    assert not torch.equal(after[0], before[0])
+
+
+def test_impossible_settings_are_refused() -> None:
+    with pytest.raises(InputError, match=r"exploration\.episodes is 1\.5"):
+        Exploration(episodes=1.5)
+    with pytest.raises(InputError, match="shortest"):
+        Exploration(shortest=8)
+
+
+def test_specs_hold(transformed: MakeEnv) -> None:
+    check_env_specs(transformed(FingerExploration(Exploration())))
