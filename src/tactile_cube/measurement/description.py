@@ -48,8 +48,14 @@ class ControllerChange(_Strict):
 
 
 class Sensors(_Strict):
-    """What is known of the sensors: resolution and standard deviation of the position [rad], of the torque [N m]."""
+    """What is known of the sensors: resolution and standard deviation of the position [rad], of the torque [N m].
 
+    Attributes:
+        read: a row shows position and torque at the end of the control period in which its command acted (`after`), or at
+            its beginning (`before`).
+    """
+
+    read: Literal["after", "before"] = "after"
     position_resolution: NotNegative = 0.0
     position_noise: NotNegative = 0.0
     torque_resolution: NotNegative = 0.0

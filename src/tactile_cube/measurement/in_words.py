@@ -31,8 +31,10 @@ def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor) -
         return f"{joint} {_verb(rows, error)} everywhere, {1e3 * error:.2g} mrad ({ratio:.2g} times the noise floor)"
     first, second = ((places + kinds) + [None])[:2] if places else (kinds[0], None)
     where = _place(first)
-    also = f", most in {_place(second)}" if second is not None and second.dimension == "kind" else (
-        f", {_place(second)}" if second is not None else ""
+    also = (
+        f", most in {_place(second)}"
+        if second is not None and second.dimension == "kind"
+        else (f", {_place(second)}" if second is not None else "")
     )
     return f"{joint} {_verb([first], error)} {where}, {1e3 * first.error:.2g} mrad{also} ({ratio:.2g} times the noise floor)"
 

@@ -40,7 +40,7 @@ def noise_floor(recording: Recording, step_size: ErrorSummary | None = None) -> 
     if groups:
         variance, source = _scatter(groups), "repeats"
     else:
-        variance, source = _guess(recording), "guess"
+        variance, source = sensor_noise(recording) ** 2, "guess"
     measured = NoiseFloor(
         float(np.sqrt(variance.mean())),
         dict(zip(recording.joints, map(float, np.sqrt(variance)), strict=True)),
@@ -60,24 +60,24 @@ def with_step_size(floor: NoiseFloor, step_size: ErrorSummary) -> NoiseFloor:
 
 def _scatter(groups: list[list[Array]]) -> Array:
     """Variance (joints,) of a repeat about the mean of its group, each repeat's own constant removed."""
-    total, freedom = np.zeros(groups[0][0].shape[1]), 0.0
+    joints = groups[0][0].shape[1]
+    total, freedom = np.zeros(joints), np.zeros(joints)
     for group in groups:
         stack = np.stack(group)
-        with np.errstate(invalid="ignore"):
-            stack = stack - np.nanmean(stack, axis=1, keepdims=True)
-            deviation = stack - stack.mean(axis=0)
-        usable = np.isfinite(deviation).all(axis=(0, 2))
-        total += np.sum(deviation[:, usable] ** 2, axis=(0, 1))
-        freedom += float(usable.sum()) * (len(group) - 1)
+        stack = np.where(np.isfinite(stack).all(axis=0), stack, np.nan)
+        stack = stack - np.nanmean(stack, axis=1, keepdims=True)
+        deviation = stack - stack.mean(axis=0)
+        total += np.nansum(deviation**2, axis=(0, 1))
+        freedom += np.isfinite(deviation[0]).sum(axis=0) * (len(group) - 1)
     return total / freedom
 
 
-def _guess(recording: Recording) -> Array:
-    """Variance (joints,) of what is too fast to be motion, at least that of the sensor's steps."""
+def sensor_noise(recording: Recording) -> Array:
+    """Noise (joints,) [rad] of the position: what is too fast to be motion, at least the sensor's own steps."""
     fast = np.concatenate([_fast_part(trial)[trial.valid] for trial in recording.trials])
     sensors = recording.description.sensors
     least = sensors.position_resolution**2 / 12 + sensors.position_noise**2
-    return np.maximum(np.median(np.abs(fast), axis=0) ** 2 / 0.6745**2, least)
+    return np.sqrt(np.maximum(np.median(np.abs(fast), axis=0) ** 2 / 0.6745**2, least))
 
 
 def _fast_part(trial: Trial) -> Array:

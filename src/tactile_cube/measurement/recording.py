@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +77,11 @@ class Recording:
     def step(self) -> float:
         """Time between samples [s]."""
         return 1.0 / self.rate
+
+    @property
+    def read(self) -> Literal["after", "before"]:
+        """Whether a row shows the state at the end of the period in which its command acted, or at its beginning."""
+        return self.description.sensors.read
 
     @property
     def torque_controlled(self) -> bool:

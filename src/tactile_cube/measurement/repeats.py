@@ -10,13 +10,15 @@ from tactile_cube.measurement.trial import Trial
 Array = NDArray[np.float64]
 LONGEST_LAG = 0.3  # [s] two starts of one command are not further apart
 SAME = 0.02  # share of a command's spread by which a repeat may differ
+LEFT_START = 0.1  # [rad] of motion after which a joint no longer knows where friction held it at the start
 SHORTEST = 0.8  # share of the shorter trial that must overlap
 
 
 def aligned_repeats(trials: Sequence[Trial]) -> list[list[Array]]:
-    """Groups of two or more repeats; each is (n, joints) positions [rad], nan where a sample was bridged.
+    """Groups of two or more repeats; each is (n, joints) positions [rad], nan where it says nothing about noise.
 
-    Trials repeat each other if they are of one kind and their commands agree after a shift in time.
+    Trials repeat each other if they are of one kind and their commands agree after a shift in time. Left out are bridged
+    samples and a joint's wait at its start, which differs from repeat to repeat and which a simulation starts from.
     """
     groups: list[list[Array]] = []
     waiting = list(trials)
@@ -62,6 +64,13 @@ def _differs(first: Array, other: Array) -> float:
 
 def _cut(members: list[tuple[Trial, int]]) -> list[Array]:
     start = max(0, *(lag for _, lag in members))
-    measured = [np.where(trial.valid[:, None], trial.position, np.nan)[start - lag :] for trial, lag in members]
+    measured = [np.where(_telling(trial), trial.position, np.nan)[start - lag :] for trial, lag in members]
     length = min(map(len, measured))
     return [positions[:length] for positions in measured]
+
+
+def _telling(trial: Trial) -> NDArray[np.bool_]:
+    """(n, joints): measured, and the joint has left its start (if it ever does)."""
+    left = np.abs(trial.position - trial.position[0]) > LEFT_START
+    gone = np.maximum.accumulate(left, axis=0) | ~left.any(axis=0)
+    return np.asarray(gone & trial.valid[:, None])

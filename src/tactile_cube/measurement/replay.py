@@ -2,19 +2,24 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, resolve
+from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN, Parameters
+from tactile_cube.measurement.read_out import read_out
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.trial import Trial
 
 Array = NDArray[np.float64]
+SIGNALS = np.array([MOTOR_POSITION, TORQUE, COMMAND])
+Engine = Literal["fast", "pybullet"]
 HISTORY = 0.15  # [s] of the first command played before the trial, for effects with a memory
 START_WINDOW = 0.02  # [s] over which the state at the start is read
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
@@ -26,6 +31,17 @@ class Simulated:
 
     position: Array
     torque: Array
+
+
+def replay(recording: Recording, parameters: Parameters, engine: Engine, step: float) -> list[Simulated]:
+    """Every trial of a recording simulated freely from its start."""
+    simulator = Replay(recording, [name for name, _ in parameters.effects], step)
+    return simulator.simulate(recording.trials, parameters)
+
+
+def effect_names(model: ModelFile | None) -> list[str]:
+    """`NAME@JOINT` of every effect of a model."""
+    return [one.effect for one in model.effects] if model is not None else []
 
 
 class Replay:
@@ -56,18 +72,26 @@ class Replay:
         """Each trial simulated from its measured start."""
         memory = np.stack([self._memory(trial, parameters) for trial in trials])
         history = round(HISTORY / self.recording.step)
-        rows = np.array([len(trial.time) for trial in trials], dtype=np.int64)
-        commands = np.zeros((len(trials), history + rows.max(), len(self.recording.joints)))
-        for block, trial in enumerate(trials):
-            command = self._positions(trial, parameters)
-            commands[block, :history] = command[0]
-            commands[block, history : history + len(command)] = command
-        position = np.zeros((len(trials), rows.max(), commands.shape[2]))
-        torque = np.zeros_like(position)
-        self.plant.kernel.rollout_batch(
-            commands, np.arange(len(trials)), rows, history, self.substeps, memory, position, torque
-        )
-        return [Simulated(position[b, : rows[b]], torque[b, : rows[b]]) for b in range(len(trials))]
+        rows = np.array([len(trial.time) + 1 for trial in trials], dtype=np.int64)
+        commands = np.stack([self._commands(trial, history, rows.max()) for trial in trials])
+        out = np.zeros((len(trials), rows.max(), len(SIGNALS), commands.shape[2]))
+        blocks = np.arange(len(trials))
+        self.plant.kernel.rollout_batch(commands, blocks, rows, history, self.substeps, memory, SIGNALS, out)
+        return [self._read(trial, out[b, : rows[b]], parameters) for b, trial in enumerate(trials)]
+
+    def _commands(self, trial: Trial, history: int, rows: int) -> Array:
+        """Commands as positions [rad], the first one held before the trial and the last one after it."""
+        scale = TORQUE_MODE_GAIN if self.recording.torque_controlled else 1.0
+        return np.pad(trial.command / scale, ((history, rows - len(trial.command)), (0, 0)), mode="edge")
+
+    def _read(self, trial: Trial, signals: Array, parameters: Parameters) -> Simulated:
+        """What the log would show of the signals (n + 1, signals, joints)."""
+        position, torque, command = np.moveaxis(signals, 1, 0)
+        if self.recording.read == "before":
+            return Simulated(position[:-1], torque[:-1])
+        constants = self._constants(trial, parameters)
+        limits = (constants["kp"], constants["stiffness"], constants["torque_limit"])
+        return Simulated(*read_out(position, torque, command, *limits))
 
     def _memory(self, trial: Trial, parameters: Parameters) -> Array:
         constants = DrivetrainConstants(**self._constants(trial, parameters))
@@ -78,6 +102,7 @@ class Replay:
         self.plant.view(memory, "offset")[0] += self.tree.ratio * parameters.posture[self.tree.follow]
         position, velocity, torque = self.start(trial)
         self.plant.reset(memory, position - torque / parameters.constants["stiffness"], velocity)
+        self.plant.view(memory, "reading")[:] = 0  # at the beginning of each period; read_out looks at its end
         if trial.clamped:
             self.plant.view(memory, "brake")[:] = CLAMPED
         if trial.force is not None:
@@ -94,14 +119,12 @@ class Replay:
                     constants[key] = np.where(common > 0, constants[key] * own / np.where(common > 0, common, 1), own)
         return constants
 
-    def _positions(self, trial: Trial, parameters: Parameters) -> Array:
-        """Commands as positions [rad]; a commanded torque becomes the position that asks for it."""
-        return trial.command / TORQUE_MODE_GAIN if self.recording.torque_controlled else trial.command
-
     def start(self, trial: Trial) -> tuple[Array, Array, Array]:
         """Position [rad], velocity [rad/s] and torque [N m] at the trial's first sample, each (joints,)."""
         n = max(3, round(START_WINDOW / trial.step))
         slope, level = np.polyfit(trial.time[:n], trial.position[:n], 1)
+        if self.recording.read == "after":
+            level = level - slope * trial.step
         if trial.torque is not None:
             return level, slope, trial.torque[: max(1, n // 3)].mean(axis=0)
         if self.recording.torque_controlled:

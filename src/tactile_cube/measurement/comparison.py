@@ -1,0 +1,149 @@
+"""How well a model follows a recording, and where it fails."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.measurement.band import Band, simulate_band
+from tactile_cube.measurement.error import ErrorSummary, residuals, summarise
+from tactile_cube.measurement.in_words import where_it_fails
+from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.parameters import nominal_parameters, require_same_joints
+from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.regimes import Regime, regimes
+from tactile_cube.measurement.replay import Engine, Simulated, replay
+from tactile_cube.measurement.stretches import Stretch, failing_stretches
+from tactile_cube.measurement.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
+
+Array = NDArray[np.float64]
+FINER = 8  # times smaller than the simulation's step, to see the error of the step itself
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model beside a recording; every error in rad, residual = measured - simulated, joint offsets removed.
+
+    Attributes:
+        recording: what was measured.
+        model: what was simulated; None for what the rig's owner believes.
+        simulated: one entry a trial.
+        residuals: (n, joints) of each trial, nan where a dropped sample was bridged.
+        errors: overall and by joint.
+        trials: the same for each trial.
+        floor: what a perfect model would leave.
+        regimes: the error by joint and regime.
+        sentences: the same in words.
+        whiteness: does the residual remember itself?
+        cross_correlations: what it goes with, strongest first.
+        stretches: where it is far above the floor.
+        band: randomised simulations, or None.
+    """
+
+    recording: Recording
+    model: ModelFile | None
+    simulated: list[Simulated]
+    residuals: list[Array]
+    errors: ErrorSummary
+    trials: list[ErrorSummary]
+    floor: NoiseFloor
+    regimes: list[Regime]
+    sentences: list[str]
+    whiteness: list[Whiteness]
+    cross_correlations: list[CrossCorrelation]
+    stretches: list[Stretch]
+    band: Band | None
+
+    @property
+    def ratio(self) -> float:
+        """Error over noise floor."""
+        return self.errors.overall / self.floor.overall
+
+
+def compare(
+    recording: Recording,
+    model: ModelFile | None = None,
+    engine: Engine = "fast",
+    step: float = 0.002,
+    simulations: int = 0,
+    spread: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> Comparison:
+    """Simulate every trial freely from its start and describe what is left.
+
+    Args:
+        recording: what was measured.
+        model: the model file; None for the values in recording.yaml.
+        engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
+        step: simulation step [s].
+        simulations: how many randomised simulations make the band; 0 for none.
+        spread: relative half widths of constants without an interval, `offset` in rad.
+        seed: of the randomised simulations.
+    """
+    if model is not None:
+        require_same_joints(recording, model)
+    parameters = nominal_parameters(recording, model)
+    simulated = replay(recording, parameters, engine, step)
+    fine = replay(recording, parameters, "fast", step / FINER)
+    trials, joints = recording.trials, recording.joints
+    step_size = summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], joints)
+    errors = residuals(trials, [one.position for one in simulated])
+    summary, floor = summarise(errors, joints), noise_floor(recording, step_size)
+    table = regimes(trials, errors, joints)
+    return Comparison(
+        recording=recording,
+        model=model,
+        simulated=simulated,
+        residuals=errors,
+        errors=summary,
+        trials=[summarise([error], joints) for error in errors],
+        floor=floor,
+        regimes=table,
+        sentences=where_it_fails(table, summary.joints, floor),
+        whiteness=whiteness(trials, errors, joints),
+        cross_correlations=cross_correlations(trials, errors, joints),
+        stretches=_stretches(recording, errors, floor),
+        band=simulate_band(recording, model, simulations, spread or {}, step, seed) if simulations else None,
+    )
+
+
+def _stretches(recording: Recording, errors: list[Array], floor: NoiseFloor) -> list[Stretch]:
+    return [
+        stretch
+        for trial, error in zip(recording.trials, errors, strict=True)
+        for index, joint in enumerate(recording.joints)
+        for stretch in failing_stretches(trial.name, joint, trial.time, error[:, index], floor.joints[joint])
+    ]
+
+
+def as_json(comparison: Comparison) -> dict[str, Any]:
+    """The content of comparison.json: plain numbers, errors in rad, times in s."""
+    recording, floor, band = comparison.recording, comparison.floor, comparison.band
+    return {
+        "recording": str(recording.folder),
+        "error": asdict(comparison.errors),
+        "noise_floor": {
+            "overall": floor.overall,
+            "joints": floor.joints,
+            "source": floor.source,
+            "repeats": floor.repeats,
+            "step_size": floor.step_size,
+        },
+        "regimes": [asdict(one) for one in comparison.regimes],
+        "trials": [
+            {"name": trial.name, "file": trial.file, "kind": trial.kind, "initialisation": trial.initialisation}
+            | {"error": asdict(errors)}
+            for trial, errors in zip(recording.trials, comparison.trials, strict=True)
+        ],
+        "where": comparison.sentences,
+        "stretches": [asdict(one) for one in comparison.stretches],
+        "whiteness": [asdict(one) for one in comparison.whiteness],
+        "cross_correlations": [asdict(one) for one in comparison.cross_correlations],
+        "band": None
+        if band is None
+        else {"simulations": band.simulations, "inside": band.inside, "joints": band.joints},
+        "warnings": list(recording.warnings),
+    }

@@ -1,0 +1,143 @@
+"""A comparison as a Rerun recording: the robot in motion, measured and simulated signals, failing stretches marked."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+from rerun.urdf import UrdfTree
+
+from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.visualization.comparison_figures import marked
+
+Array = NDArray[np.float64]
+TIMELINE = "time"
+POSE_RATE = 50.0  # [Hz] of the robot's poses; the signals keep their own rate
+PAUSE = 1.0  # [s] between two trials on the time line
+COLORS = {"command": (140, 140, 140), "measured": (240, 240, 240), "simulated": (80, 150, 255), "failing": (230, 60, 60)}
+
+
+def write_comparison(comparison: Comparison, path: Path, summary: str) -> None:
+    """Write the recording with its blueprint; open it with `rerun FILE.rrd`.
+
+    The trials follow one another on the time line. The robot moves as measured; a joint that fails is plotted in red.
+
+    Args:
+        comparison: what was compared.
+        path: file to write, `.rrd`.
+        summary: Markdown shown beside the robot.
+    """
+    stream = rr.RecordingStream("tactile_cube_compare", recording_id=path.stem)
+    stream.save(path, default_blueprint=blueprint(comparison))
+    starts = trial_starts(comparison)
+    _log_robot(stream, comparison, starts)
+    for index, joint in enumerate(comparison.recording.joints):
+        _log_joint(stream, comparison, index, joint, starts)
+    _log_events(stream, comparison, starts)
+    stream.log("summary", rr.TextDocument(summary, media_type="text/markdown"), static=True)
+    stream.flush()
+    stream.disconnect()
+
+
+def trial_starts(comparison: Comparison) -> list[float]:
+    """When each trial begins on the common time line [s]."""
+    lengths = [trial.duration + PAUSE for trial in comparison.recording.trials]
+    return [float(start) for start in np.concatenate([[0.0], np.cumsum(lengths)[:-1]])]
+
+
+def blueprint(comparison: Comparison) -> rrb.Blueprint:
+    """The robot and a summary on the left, one tab a joint on the right."""
+    tabs = [
+        rrb.Vertical(
+            rrb.TimeSeriesView(name=f"{joint}: command, measured, simulated [rad]", origin=f"/joints/{joint}/angle"),
+            rrb.TimeSeriesView(name=f"{joint}: measured - simulated [mrad]", origin=f"/joints/{joint}/error"),
+            name=joint,
+        )
+        for joint in comparison.recording.joints
+    ]
+    worst = max(comparison.errors.joints, key=lambda j: comparison.errors.joints[j] / comparison.floor.joints[j])
+    left = rrb.Vertical(
+        rrb.Spatial3DView(name="The rig, as measured", origin="/", contents=["/robot/**"], line_grid=False),
+        rrb.Tabs(
+            rrb.TextDocumentView(name="Where it fails", origin="/summary"),
+            rrb.TextLogView(name="Failing stretches", origin="/failing"),
+        ),
+        row_shares=[3, 2],
+    )
+    active = list(comparison.recording.joints).index(worst)
+    return rrb.Blueprint(
+        rrb.Horizontal(left, rrb.Tabs(*tabs, active_tab=active), column_shares=[2, 3]),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+    )
+
+
+def _log_robot(stream: rr.RecordingStream, comparison: Comparison, starts: list[float]) -> None:
+    recording = comparison.recording
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "rig.urdf"
+        file.write_text(recording.urdf, encoding="utf-8")
+        tree = UrdfTree.from_file_path(file, entity_path_prefix="robot", static_transform_entity_path="robot/static")
+        tree.log_urdf_to_recording(stream)
+    stride = max(1, round(recording.rate / POSE_RATE))
+    time = np.concatenate([start + t.time[::stride] for start, t in zip(starts, recording.trials, strict=True)])
+    angles = np.concatenate([trial.position[::stride] for trial in recording.trials])
+    for joint in tree.joints():
+        values = _joint_angle(comparison, joint.name, angles)
+        if values is not None:
+            transform = joint.compute_transform_columns(values.tolist(), clamp=False)
+            stream.send_columns(f"robot/joint_transforms/{joint.name}", _at(time), transform)
+
+
+def _joint_angle(comparison: Comparison, name: str, angles: Array) -> Array | None:
+    recording = comparison.recording
+    if name in recording.joints:
+        return angles[:, recording.joints.index(name)]
+    if name in recording.coupled:
+        coupling = recording.coupled[name]
+        return coupling.ratio * angles[:, recording.joints.index(coupling.joint)] + coupling.offset
+    return None
+
+
+def _log_joint(stream: rr.RecordingStream, comparison: Comparison, index: int, joint: str, starts: list[float]) -> None:
+    trials = comparison.recording.trials
+    time = np.concatenate([start + trial.time for start, trial in zip(starts, trials, strict=True)])
+    measured = np.concatenate([trial.position[:, index] for trial in trials])
+    residual = np.concatenate([error[:, index] for error in comparison.residuals])
+    simulated = np.concatenate([one.position[:, index] for one in comparison.simulated])
+    signals = {"measured": measured, "simulated": simulated}
+    if not comparison.recording.torque_controlled:
+        signals = {"command": np.concatenate([trial.command[:, index] for trial in trials])} | signals
+    failing = np.zeros(len(time), dtype=bool)
+    for number, start in enumerate(starts):
+        for begin, end in marked(comparison, number, index):
+            failing |= (time >= start + begin) & (time <= start + end)
+    for name, values in signals.items():
+        _send(stream, f"joints/{joint}/angle/{name}", time, values, name, COLORS[name])
+    _send(stream, f"joints/{joint}/angle/failing", time, np.where(failing, measured, np.nan), "failing", COLORS["failing"])
+    _send(stream, f"joints/{joint}/error/residual", time, 1e3 * residual, "measured - simulated", COLORS["simulated"])
+    _send(stream, f"joints/{joint}/error/failing", time, np.where(failing, 1e3 * residual, np.nan), "failing", COLORS["failing"])
+
+
+def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list[float]) -> None:
+    begin = dict(zip((trial.name for trial in comparison.recording.trials), starts, strict=True))
+    for trial, start in begin.items():
+        stream.set_time(TIMELINE, duration=start)
+        stream.log("failing", rr.TextLog(f"trial {trial}", level=rr.TextLogLevel.INFO))
+    for one in comparison.stretches:
+        stream.set_time(TIMELINE, duration=begin[one.trial] + one.start)
+        line = f"{one.joint} in {one.trial}: {one.start:.2f} .. {one.end:.2f} s, {1e3 * one.error:.3g} mrad"
+        stream.log("failing", rr.TextLog(line, level=rr.TextLogLevel.WARN))
+    stream.reset_time()
+
+
+def _send(stream: rr.RecordingStream, entity: str, time: Array, values: Array, name: str, color: tuple[int, ...]) -> None:
+    stream.log(entity, rr.SeriesLines(names=[name], colors=[color], widths=[2.5 if name == "failing" else 1.2]), static=True)
+    stream.send_columns(entity, _at(time), rr.Scalars.columns(scalars=values))
+
+
+def _at(time: Array) -> list[rr.TimeColumn]:
+    return [rr.TimeColumn(TIMELINE, duration=time)]

@@ -1,0 +1,74 @@
+"""Pictures of a comparison: measured over simulated, the band, the error by joint and regime."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.visualization.svg import ERROR, FLOOR, MEASURED, SIMULATED, Axes, Band, Line, line_chart
+from tactile_cube.visualization.svg_tables import heat_map
+
+Array = NDArray[np.float64]
+
+
+def overlay(comparison: Comparison, trial: int, joint: int) -> str:
+    """Command, measured and simulated angle of one joint in one trial; failing stretches are marked."""
+    one = comparison.recording.trials[trial]
+    offset = _offset(comparison, trial, joint)
+    lines = [Line("measured", one.time, one.position[:, joint], MEASURED, 1.8)]
+    lines.append(Line("simulated", one.time, comparison.simulated[trial].position[:, joint] + offset, SIMULATED, 1.4))
+    if not comparison.recording.torque_controlled:
+        lines.insert(0, Line("command", one.time, one.command[:, joint], FLOOR, 1.0, "4 3"))
+    name = comparison.recording.joints[joint]
+    return line_chart(Axes("time [s]", f"{name} [rad]", marked=marked(comparison, trial, joint)), lines)
+
+
+def residual(comparison: Comparison, trial: int, joint: int) -> str:
+    """Measured minus simulated of one joint in one trial, beside the noise floor."""
+    time = comparison.recording.trials[trial].time
+    name = comparison.recording.joints[joint]
+    floor = 1e3 * 1.96 * comparison.floor.joints[name] * np.ones_like(time)
+    line = Line("measured - simulated", time, 1e3 * comparison.residuals[trial][:, joint], ERROR, 1.2)
+    band = [Band("noise floor (95 %)", time, -floor, floor, FLOOR)]
+    axes = Axes("time [s]", f"{name} [mrad]", height=170, marked=marked(comparison, trial, joint))
+    return line_chart(axes, [line], band)
+
+
+def band(comparison: Comparison, trial: int, joint: int) -> str:
+    """The measured angle of one joint among the randomised simulations."""
+    one, randomised = comparison.recording.trials[trial], comparison.band
+    if randomised is None:
+        return ""
+    area = Band("95 % of the simulations", one.time, randomised.low[trial][:, joint], randomised.high[trial][:, joint])
+    line = Line("measured", one.time, one.position[:, joint], MEASURED, 1.2)
+    return line_chart(Axes("time [s]", f"{comparison.recording.joints[joint]} [rad]"), [line], [area])
+
+
+def regime_map(comparison: Comparison) -> str:
+    """Error / noise floor of every joint in every regime."""
+    names = list(dict.fromkeys((one.dimension, one.regime) for one in comparison.regimes))
+    cells = {(one.joint, one.dimension, one.regime): one.error for one in comparison.regimes}
+    values: list[list[float | None]] = []
+    for joint in comparison.recording.joints:
+        floor = comparison.floor.joints[joint]
+        errors = [cells.get((joint, *name)) for name in names]
+        values.append([None if error is None else error / floor for error in errors])
+    return heat_map(list(comparison.recording.joints), [regime for _, regime in names], values)
+
+
+def marked(comparison: Comparison, trial: int, joint: int) -> tuple[tuple[float, float], ...]:
+    """Start and end [s] of the failing stretches of one joint in one trial."""
+    name, of = comparison.recording.joints[joint], comparison.recording.trials[trial].name
+    return tuple((one.start, one.end) for one in comparison.stretches if one.joint == name and one.trial == of)
+
+
+def worst_trial(comparison: Comparison, joint: int) -> int:
+    """The trial in which a joint's error is largest."""
+    name = comparison.recording.joints[joint]
+    return int(np.argmax([errors.joints[name] for errors in comparison.trials]))
+
+
+def _offset(comparison: Comparison, trial: int, joint: int) -> float:
+    """The constant that was removed from the residual [rad]."""
+    one = comparison.recording.trials[trial]
+    difference = one.position - comparison.simulated[trial].position - comparison.residuals[trial]
+    return float(np.nanmean(difference[:, joint]))
