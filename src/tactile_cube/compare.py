@@ -1,0 +1,53 @@
+"""Verb: simulate a recording's commands, show how far model and measurement are apart, and where."""
+
+from __future__ import annotations
+
+from omegaconf import DictConfig
+
+from tactile_cube.cli import verb
+
+
+@verb("compare")
+def main(config: DictConfig) -> None:
+    """Write comparison.json, report.html and comparison.rrd; print the errors and where the model fails."""
+    import json
+    import shlex
+    import sys
+    import time
+    from pathlib import Path
+
+    from hydra.core.hydra_config import HydraConfig
+    from omegaconf import OmegaConf
+
+    from tactile_cube.drivetrain.model_file import read_model
+    from tactile_cube.measurement.comparison import as_json, compare
+    from tactile_cube.measurement.recording import read_recording
+    from tactile_cube.visualization.comparison_report import comparison_report
+    from tactile_cube.visualization.comparison_summary import markdown, summary
+    from tactile_cube.visualization.report import write_report
+
+    begin = time.perf_counter()
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    model = read_model(config.model) if config.model is not None else None
+    recording = read_recording(config.recording)
+    for line in recording.warnings:
+        print(f"warning: {line}", file=sys.stderr)
+    spread = OmegaConf.to_container(config.band.spread)
+    comparison = compare(
+        recording, model, config.engine, config.step, config.band.simulations, dict(spread), config.seed
+    )
+    command = shlex.join(["python", "-m", "tactile_cube.compare", *sys.argv[1:]])
+    result = as_json(comparison) | {"model": config.model, "engine": config.engine, "command": command}
+    result["seconds"] = round(time.perf_counter() - begin, 2)
+    (folder / "comparison.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
+    write_report(comparison_report(comparison, command, config.model), folder / "report.html")
+    if config.rerun:
+        from tactile_cube.visualization.comparison_episode import write_comparison
+
+        write_comparison(comparison, folder / "comparison.rrd", markdown(comparison))
+    print(summary(comparison))
+    print(f"report: {folder / 'report.html'}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,30 @@
+"""A comparison in the terminal, and as Markdown beside the robot."""
+
+from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.visualization.comparison_report import answer, floor_source
+
+
+def summary(comparison: Comparison) -> str:
+    """What the command line prints: the answer, one line a joint, where it fails."""
+    lines = [answer(comparison), "", f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor   (RMS, mrad)"]
+    for joint, error in comparison.errors.joints.items():
+        floor = comparison.floor.joints[joint]
+        lines.append(f"{joint:<16}{1e3 * error:>9.3f}{1e3 * floor:>9.3f}{error / floor:>11.2f}")
+    overall, floor = comparison.errors.overall, comparison.floor.overall
+    lines.append(f"{'all':<16}{1e3 * overall:>9.3f}{1e3 * floor:>9.3f}{comparison.ratio:>11.2f}")
+    lines += ["", f"noise floor: {floor_source(comparison.floor)}, with the simulator's own time step"]
+    if comparison.band is not None:
+        inside = 100 * comparison.band.inside
+        lines.append(f"measured inside the band of {comparison.band.simulations} simulations: {inside:.0f} % of the samples")
+    return "\n".join([*lines, "", *(f"- {sentence}" for sentence in comparison.sentences)])
+
+
+def markdown(comparison: Comparison) -> str:
+    """The same for a reader of the Rerun recording."""
+    rows = [
+        f"| {joint} | {1e3 * error:.3g} | {1e3 * comparison.floor.joints[joint]:.3g} |"
+        for joint, error in comparison.errors.joints.items()
+    ]
+    table = ["| joint | error [mrad] | noise floor [mrad] |", "|---|---|---|", *rows]
+    where = [f"- {sentence}" for sentence in comparison.sentences]
+    return "\n".join([f"# {comparison.recording.name}", "", answer(comparison), "", *table, "", *where])
