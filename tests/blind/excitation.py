@@ -27,7 +27,9 @@ def ramps(rng: np.random.Generator, low: Array, high: Array, samples: int, rate:
     """Triangles, each joint at a speed and phase of its own, two speeds in one trial."""
     time = np.arange(samples) / rate
     speed = np.where(time < 0.6 * time[-1], 1.0, rng.uniform(0.25, 0.6))
-    phase = np.cumsum(speed)[:, None] / rate * rng.uniform(0.2, 0.5, len(low)) / (high - low) + rng.uniform(0, 2, len(low))
+    phase = np.cumsum(speed)[:, None] / rate * rng.uniform(0.2, 0.5, len(low)) / (high - low) + rng.uniform(
+        0, 2, len(low)
+    )
     return low + (high - low) * (1.0 - np.abs(np.mod(phase, 2.0) - 1.0))
 
 
@@ -36,7 +38,9 @@ def multisine(rng: np.random.Generator, low: Array, high: Array, samples: int, r
     time = np.arange(samples)[:, None] / rate
     out = np.zeros((samples, len(low)))
     for frequency in np.geomspace(0.1, rng.uniform(2.5, 4.0), 8):
-        out += frequency**-0.6 * np.sin(2 * np.pi * (frequency * rng.uniform(0.9, 1.1, len(low)) * time + rng.uniform(size=len(low))))
+        out += frequency**-0.6 * np.sin(
+            2 * np.pi * (frequency * rng.uniform(0.9, 1.1, len(low)) * time + rng.uniform(size=len(low)))
+        )
     out /= np.abs(out).max(axis=0)
     return low + (high - low) * (0.5 + 0.45 * out)
 
@@ -50,7 +54,9 @@ def policy(rng: np.random.Generator, low: Array, high: Array, samples: int, rate
 
 def holds(rng: np.random.Generator, low: Array, high: Array, samples: int, rate: float) -> Array:
     """Postures, each approached fast and held."""
-    return _filtered(_stepped(rng, low, high, samples, float(rng.choice([1.5, 2.0])), rate), rng.uniform(0.06, 0.15), rate)
+    return _filtered(
+        _stepped(rng, low, high, samples, float(rng.choice([1.5, 2.0])), rate), rng.uniform(0.06, 0.15), rate
+    )
 
 
 KINDS = {"ramps": ramps, "multisine": multisine, "policy": policy, "holds": holds}

@@ -2,8 +2,8 @@
 
     python tests/blind/generator.py --seed 7 --out FOLDER
 
-writes FOLDER/recording (the documented recording format, with fresh commands in recording/validation) and, beside it and never
-inside it, FOLDER/truth.json. Nothing here comes from the package under test.
+writes FOLDER/recording (the documented recording format, with fresh commands in recording/validation) and, beside it
+and never inside it, FOLDER/truth.json. Nothing here comes from the package under test.
 """
 
 import argparse
@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import hidden
 import numpy as np
 import polars as pl
 import yaml
-from numpy.typing import NDArray
-
-import hidden
 from excitation import KINDS
+from numpy.typing import NDArray
 from physics import Plant, neutral, simulate
 from rig import RIGS, Rig
 
@@ -27,13 +26,35 @@ Array = NDArray[np.float64]
 CYCLE = ("none", "named", "named", "unnamed", "named", "named", "two", "named")
 """Which kind of truth each seed hides, in turn."""
 VISIBLE = 1.5
-"""An effect counts as visible when it moves its joint by this multiple of the sensor noise, refitted constants removed."""
+"""A visible effect moves its joint by at least this multiple of the sensor noise, refitted constants removed."""
 CONSTANTS = {
-    "finger": {"kp": (3.2, 4.5), "kd": (0.2, 0.3), "stiffness": (20, 32), "friction": (0.015, 0.03), "inertia": (0.0022, 0.004)},
-    "pendulum": {"kp": (5, 8), "kd": (0.25, 0.4), "stiffness": (40, 80), "friction": (0.02, 0.04), "inertia": (0.003, 0.006)},
-    "two_link": {"kp": (4, 7), "kd": (0.25, 0.35), "stiffness": (30, 60), "friction": (0.02, 0.035), "inertia": (0.003, 0.006)},
+    "finger": {
+        "kp": (3.2, 4.5),
+        "kd": (0.2, 0.3),
+        "stiffness": (20, 32),
+        "friction": (0.015, 0.03),
+        "inertia": (0.0022, 0.004),
+    },
+    "pendulum": {
+        "kp": (5, 8),
+        "kd": (0.25, 0.4),
+        "stiffness": (40, 80),
+        "friction": (0.02, 0.04),
+        "inertia": (0.003, 0.006),
+    },
+    "two_link": {
+        "kp": (4, 7),
+        "kd": (0.25, 0.35),
+        "stiffness": (30, 60),
+        "friction": (0.02, 0.035),
+        "inertia": (0.003, 0.006),
+    },
 }
-MOTION = {"finger": [(-0.35, 0.35), (-0.1, 1.1), (-0.05, 1.2)], "pendulum": [(-1.5, 1.5)], "two_link": [(-1.2, 1.2)] * 2}
+MOTION = {
+    "finger": [(-0.35, 0.35), (-0.1, 1.1), (-0.05, 1.2)],
+    "pendulum": [(-1.5, 1.5)],
+    "two_link": [(-1.2, 1.2)] * 2,
+}
 
 
 @dataclass
@@ -132,7 +153,7 @@ def probe(world: World, seed: int, step: float = 5e-4) -> tuple[Array, Array, Ar
 
 
 def visibility(plain: World, changed: World, joint: int, noise: float, seed: int) -> dict[str, float]:
-    """RMS that the change moves its joint by, in units of the noise: all of it, and what refitted constants cannot imitate."""
+    """RMS that the change moves its joint by [noise]: all of it, and what refitted constants cannot imitate."""
     reference = probe(plain, seed)[0]
     columns = [np.zeros(reference.shape) for _ in reference.T]
     for i, column in enumerate(columns):
@@ -152,7 +173,9 @@ def visibility(plain: World, changed: World, joint: int, noise: float, seed: int
     return {"signal": rms(moved.ravel()), "distinct": rms(left)}
 
 
-def hide(world: World, name: str, rng: np.random.Generator, strength: float, seed: int, noise: float) -> tuple[World, dict[str, Any]]:
+def hide(
+    world: World, name: str, rng: np.random.Generator, strength: float, seed: int, noise: float
+) -> tuple[World, dict[str, Any]]:
     """The world with one effect more, and the truth about it."""
     changed = copy(world)
     n = len(world.rig.actuated)
@@ -161,7 +184,9 @@ def hide(world: World, name: str, rng: np.random.Generator, strength: float, see
         joint = n - 1
     _, torque, command = probe(world, seed)
     speed = np.abs(np.diff(command, axis=0)).max(axis=0) * 400.0
-    scene = hidden.Scene(changed.rig, changed.plant, world.low, world.high, np.abs(torque).max(axis=0), speed, rng, strength)
+    scene = hidden.Scene(
+        changed.rig, changed.plant, world.low, world.high, np.abs(torque).max(axis=0), speed, rng, strength
+    )
     make = hidden.NAMED.get(name) or hidden.UNNAMED[name]
     joints = [joint]
     if name == "command_delay" and n > 1 and rng.uniform() < 0.4:
@@ -195,7 +220,9 @@ def names_for(seed: int, rng: np.random.Generator) -> tuple[str, list[str]]:
     return kind, rng.choice(apart, 2, replace=False).tolist()
 
 
-def draw(seed: int, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None) -> tuple[World, Bench, dict[str, Any]]:
+def draw(
+    seed: int, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None
+) -> tuple[World, Bench, dict[str, Any]]:
     """The world, the bench and the truth of one seed; `names` and `kind` force what is hidden and where."""
     rng = np.random.default_rng([seed, 20231212])
     label, chosen = names_for(seed, rng)
@@ -206,9 +233,13 @@ def draw(seed: int, seconds: float | None = None, names: list[str] | None = None
     for attempt in range(4):
         bench, poor = draw_bench(rng, seconds)
         many = any(n in hidden.NEEDS_NEIGHBOUR for n in chosen)
-        rigs = ["finger"] if "coupling_error" in chosen else ["finger", "finger", "two_link"] + ["pendulum"] * (not many)
+        rigs = (
+            ["finger"] if "coupling_error" in chosen else ["finger", "finger", "two_link"] + ["pendulum"] * (not many)
+        )
         rig = kind or str(rng.choice(rigs))
-        world = draw_world(rng, rig, float(rng.uniform(0.25, 0.4) if poor and rng.uniform() < 0.5 else rng.uniform(0.7, 1.0)))
+        world = draw_world(
+            rng, rig, float(rng.uniform(0.25, 0.4) if poor and rng.uniform() < 0.5 else rng.uniform(0.7, 1.0))
+        )
         floor = float(np.hypot(bench.noise, bench.resolution / np.sqrt(12)))
         effects = []
         for name in chosen:
@@ -285,7 +316,10 @@ def repeat_scatter(tables: dict[str, tuple[int, str, pl.DataFrame]], joints: lis
         repeats = [t for _, kind, t in tables.values() if kind == wanted]
         common = set.intersection(*(set(t["time"].to_list()) for t in repeats))
         aligned = np.stack(
-            [t.filter(pl.col("time").is_in(sorted(common))).select([f"{j}.position" for j in joints]).to_numpy() for t in repeats]
+            [
+                t.filter(pl.col("time").is_in(sorted(common))).select([f"{j}.position" for j in joints]).to_numpy()
+                for t in repeats
+            ]
         ).astype(float)
         aligned -= aligned.mean(axis=1, keepdims=True)
         left = aligned - aligned.mean(axis=0)
@@ -294,7 +328,9 @@ def repeat_scatter(tables: dict[str, tuple[int, str, pl.DataFrame]], joints: lis
     return float(np.sqrt(squares / count))
 
 
-def write(seed: int, out: Path, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None) -> dict[str, Any]:
+def write(
+    seed: int, out: Path, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None
+) -> dict[str, Any]:
     """Draw the seed and write `out`/recording and `out`/truth.json; returns the truth."""
     world, bench, truth = draw(seed, seconds, names, kind)
     rng = np.random.default_rng([seed, 7])

@@ -1,8 +1,8 @@
 """What can be hidden in a recording: every named effect, some outside any catalogue, each at its usual size.
 
-A maker receives the scene (rig, plant, ranges of the motion), a joint and a random generator, changes plant or rig in
-place and returns the true parameters. Sizes follow the table of typical sizes of geared and tendon-driven finger joints;
-torques scale with the rig's controller stiffness.
+A maker receives the scene (rig, plant, ranges of the motion) and a joint, changes plant or rig in place and returns
+the true parameters. Sizes follow what is typical of geared and tendon-driven finger joints; torques scale with the
+rig's controller stiffness.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
 from physics import Plant
 from rig import Rig
 
@@ -169,12 +168,20 @@ def coupling_error(s: Scene, i: int) -> Truth:
 def joint_coupling(s: Scene, i: int) -> Truth:
     j = s.other(i)
     if s.rng.uniform() < 0.5:
-        return {"from": s.rig.actuated[j], "viscous": _put(s.plant.viscous_coupling, (i, j), s.sign() * s.size(0.01, 0.08))}
-    return {"from": s.rig.actuated[j], "dry": _put(s.plant.dry_coupling, (i, j), s.sign() * s.size(0.01, 0.04) * s.scale(i))}
+        return {
+            "from": s.rig.actuated[j],
+            "viscous": _put(s.plant.viscous_coupling, (i, j), s.sign() * s.size(0.01, 0.08)),
+        }
+    return {
+        "from": s.rig.actuated[j],
+        "dry": _put(s.plant.dry_coupling, (i, j), s.sign() * s.size(0.01, 0.04) * s.scale(i)),
+    }
 
 
 def torque_saturation(s: Scene, i: int) -> Truth:
-    return {"limit": _put(s.plant.saturation, i, float(s.peak_torque[i] * s.rng.uniform(0.7, 0.8) * (1 - 0.5 * s.strength)))}
+    return {
+        "limit": _put(s.plant.saturation, i, float(s.peak_torque[i] * s.rng.uniform(0.7, 0.8) * (1 - 0.5 * s.strength)))
+    }
 
 
 def command_dead_zone(s: Scene, i: int) -> Truth:
@@ -184,7 +191,11 @@ def command_dead_zone(s: Scene, i: int) -> Truth:
 
 
 def rate_limit(s: Scene, i: int) -> Truth:
-    return {"rate": _put(s.plant.rate_limit, i, float(s.peak_command_speed[i] * s.rng.uniform(0.6, 0.7) * (1 - 0.5 * s.strength)))}
+    return {
+        "rate": _put(
+            s.plant.rate_limit, i, float(s.peak_command_speed[i] * s.rng.uniform(0.6, 0.7) * (1 - 0.5 * s.strength))
+        )
+    }
 
 
 def position_torque(s: Scene, i: int) -> Truth:
@@ -233,7 +244,10 @@ def position_relay(s: Scene, i: int) -> Truth:
 
 def neighbour_friction(s: Scene, i: int) -> Truth:
     j = s.other(i)
-    return {"from": s.rig.actuated[j], "friction": _put(s.plant.neighbour_friction, (i, j), s.size(0.02, 0.06) * s.scale(i))}
+    return {
+        "from": s.rig.actuated[j],
+        "friction": _put(s.plant.neighbour_friction, (i, j), s.size(0.02, 0.06) * s.scale(i)),
+    }
 
 
 def even_drag(s: Scene, i: int) -> Truth:
@@ -254,7 +268,8 @@ NAMED: dict[str, Maker] = {
 UNNAMED: dict[str, Maker] = {
     f.__name__: f
     for f in (
-        position_velocity_product, periodic_disturbance, acceleration_friction, position_relay, neighbour_friction, even_drag,
+        position_velocity_product, periodic_disturbance, acceleration_friction, position_relay, neighbour_friction,
+        even_drag,
     )
 }  # fmt: skip
 ABSORBED = ("coulomb_friction", "viscous_friction", "elasticity", "reflected_inertia", "position_offset")

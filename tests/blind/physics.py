@@ -1,8 +1,8 @@
 """The blind world: exact rigid-body dynamics and every hidden effect, integrated at 5 kHz, on its own code alone.
 
-The measured loop is tau = kp (q_d - q_m) - kd dq with q_m = q + deflection(tau) + offset; the rotor's reflected inertia is
-added to the joint-space mass matrix; dry friction is solved exactly (a joint sticks without creeping). A step evaluates
-all forces at the middle of the interval, which makes it second order where nothing switches.
+The measured loop is tau = kp (q_d - q_m) - kd dq with q_m = q + deflection(tau) + offset; the rotor's reflected inertia
+is added to the joint-space mass matrix; dry friction is solved exactly (a joint sticks without creeping). All
+forces are taken at the middle of a step, which makes it second order where nothing switches.
 """
 
 from typing import NamedTuple
@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-
 from rig import Rig
 
 Array = NDArray[np.float64]
@@ -129,7 +128,9 @@ def _times(m, a, out):
 
 
 @njit(cache=True)
-def mass_and_bias(axes, origins, coms, masses, inertias, gravity, q, v):
+def mass_and_bias(  # noqa: C901 - one page of Newton-Euler reads better than its pieces
+    axes, origins, coms, masses, inertias, gravity, q, v
+):
     """Joint-space mass matrix (n, n) and bias torque (n) of the open chain (Newton-Euler in the world frame)."""
     n = q.shape[0]
     z, c, o = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
@@ -225,7 +226,7 @@ def _dead_zone(x, width):
 
 @njit(cache=True)
 def _closed_loop(p, i, error, speed, gap):
-    """Controller torque with the drive's stretch in the loop; `error` is q_d minus the joint's own reading, `gap` the play."""
+    """Controller torque, the drive's stretch in the loop; `error` is q_d minus the joint's reading, `gap` the play."""
     torque = 0.0
     for _ in range(40):
         stretch = _deflection(torque, p.stiffness[i], p.cubic_stiffness[i])
@@ -242,7 +243,7 @@ def _closed_loop(p, i, error, speed, gap):
 
 @njit(cache=True)
 def _drive(p, i, error, speed):
-    """Controller torque and the position of the play: pressed to the side that transmits torque, floating in between."""
+    """Controller torque and position of the play: pressed to the side that transmits torque, floating in between."""
     half = 0.5 * p.backlash[i]
     torque = _closed_loop(p, i, error, speed, half)
     if half == 0.0 or torque > 0.0:
@@ -320,13 +321,13 @@ def _log(p, q, held, filtered, state, position, torque, joint):
 def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, command, start, rate, settle, step):
     """Sampled motor positions and torques (samples, joints) under a command held between its samples."""
     samples, n = command.shape
-    per = int(round(1.0 / (rate * step)))
+    per = round(1.0 / (rate * step))
     position, torque_out, joint_out = np.empty((samples, n)), np.empty((samples, n)), np.empty((samples, n))
     q = start.copy()
     v, acceleration, impulse = np.zeros(n), np.zeros(n), np.zeros(n)
     held, state, filtered, bristle, relay = command[0].copy(), np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n)
     torque, load, low, high = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    lead = int(round(settle / step))
+    lead = round(settle / step)
     for k in range(-lead, samples * per):
         t = k * step
         qm, vm = q + 0.5 * step * v, v + 0.5 * step * acceleration
@@ -335,7 +336,9 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, comma
             target = command[min(max(late, 0), samples - 1), i]
             most = p.rate_limit[i] * step
             held[i] += min(max(target - held[i], -most), most)
-            filtered[i] = vm[i] if p.velocity_lag[i] <= 0 else filtered[i] + (vm[i] - filtered[i]) * step / p.velocity_lag[i]
+            filtered[i] = (
+                vm[i] if p.velocity_lag[i] <= 0 else filtered[i] + (vm[i] - filtered[i]) * step / p.velocity_lag[i]
+            )
             error = held[i] - qm[i] - p.offset[i]
             error -= p.transmission[i] * np.sin(p.transmission_order[i] * qm[i] + p.transmission_phase[i])
             if p.lag[i] > 0.0:
@@ -344,7 +347,7 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, comma
                 wanted = min(max(wanted, -p.torque_limit[i]), p.torque_limit[i])
                 state[i] += (wanted - state[i]) * step / p.lag[i]
             else:
-                state[i], gap = _drive(p, i, error, filtered[i])
+                state[i] = _drive(p, i, error, filtered[i])[0]
             edge = p.relay_centre[i] + (-0.5 if relay[i] > 0 else 0.5) * p.relay_width[i]
             relay[i] = 1.0 if qm[i] > edge else -1.0
         for i in range(n):
@@ -376,8 +379,8 @@ def simulate(
 ) -> tuple[Array, Array, Array]:
     """Noise-free motor positions [rad], controller torques [N m] and joint positions [rad], each (samples, joints).
 
-    The joints rest at `start` (joints) [rad] while the first command is applied for `settle` seconds before the first sample.
-    Row k is what the sensors say at the end of the interval in which command k was in force, as in the shared recordings.
+    The joints start at rest at `start` (joints) [rad], `settle` seconds before the first sample. Row k is what the
+    sensors say at the end of the interval in which command k was in force.
     """
     select, shift = rig.selection()
     return _run(*rig.arrays(), np.array(rig.gravity), select, shift, plant, command, start, rate, settle, step)

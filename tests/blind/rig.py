@@ -1,4 +1,4 @@
-"""Serial mechanisms of the blind world: the numbers that its physics needs and the URDF text that its owner would write."""
+"""Serial mechanisms of the blind world: the numbers that its physics needs and the URDF that its owner would write."""
 
 from dataclasses import dataclass, field
 
@@ -52,7 +52,7 @@ class Rig:
         return s, c
 
     def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
-        """Axes, origins, centres of mass, masses and diagonal inertias, with the hidden tip mass put on the last link."""
+        """Axes, origins, centres of mass, masses and diagonal inertias; the hidden tip mass is on the last link."""
         axes, origins, coms = (np.array([getattr(x, n) for x in self.links], float) for n in ("axis", "origin", "com"))
         masses = np.array([x.mass for x in self.links])
         inertias = np.array([x.inertia for x in self.links], float)
@@ -71,7 +71,8 @@ class Rig:
         for link in self.links:
             x, y, z = link.inertia
             lines += [
-                f'<link name="{link.joint}_link"><inertial><origin xyz="{_xyz(link.com)}"/><mass value="{link.mass:.9g}"/>',
+                f'<link name="{link.joint}_link"><inertial>',
+                f'<origin xyz="{_xyz(link.com)}"/><mass value="{link.mass:.9g}"/>',
                 f'<inertia ixx="{x:.9g}" iyy="{y:.9g}" izz="{z:.9g}" ixy="0" ixz="0" iyz="0"/></inertial></link>',
             ]
         parent = "base"

@@ -1,0 +1,42 @@
+# `make` prints what there is to make. PYTHON names the interpreter that the environment is created with.
+PYTHON ?= python3
+BIN := .venv/bin
+ARGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help train test check show example benchmark clean
+
+help: ## print these targets
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 20
+	@echo "  ARGS=... adds words to the command, as in: make train ARGS='+experiment=table seed=1'"
+
+# The environment, made again only when what it holds has changed.
+.venv/installed: pyproject.toml requirements.txt
+	@echo "installing into .venv (a few minutes the first time)"
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements.txt --editable '.[dev,ros,onnx]'
+	@touch $@
+
+train: .venv/installed ## teach the hand; Ctrl-C saves, the same command goes on
+	$(BIN)/python -m tactile_cube.train $(or $(ARGS),+experiment=curriculum)
+
+test: .venv/installed ## run the tests
+	$(BIN)/python -m pytest $(ARGS)
+
+check: .venv/installed ## lint, format, types, tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest $(ARGS)
+
+show: .venv/installed ## watch the shipped policy turn the cube
+	$(BIN)/python -m tactile_cube.evaluate $(ARGS)
+
+example: .venv/installed ## find a hidden effect in a hand and win the lost success back
+	$(BIN)/python examples/circle.py $(ARGS)
+
+benchmark: .venv/installed ## measure the speed of everything on this machine
+	$(BIN)/python -m tactile_cube.benchmark $(ARGS)
+
+clean: ## remove the environment and the caches, keep outputs/
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache build src/*.egg-info

@@ -1,0 +1,217 @@
+"""Run the public verbs on blind recordings and judge what they answer.
+
+    python tests/blind/judge.py --draws 60 --out outputs/blind --jobs 1
+
+Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped.
+identification.md and identification.json beside it sum the lines up. What counts as right stands in scoring.py.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from generator import write
+from scoring import GOAL, score
+
+FIRST_SEED = 10_000
+
+
+def run_verb(verb: str, out: Path, *words: str) -> dict[str, Any] | None:
+    """One public verb as a user types it; its JSON answer, or None when it failed (its words stay in `out`)."""
+    answer = {"diagnose": "diagnosis.json", "compare": "comparison.json"}[verb]
+    out.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-m", f"tactile_cube.{verb}", *words, f"hydra.run.dir={out}"]
+    with (out / "words.txt").open("w") as words_of_verb:
+        subprocess.run(command, stdout=words_of_verb, stderr=subprocess.STDOUT, check=False)
+    path = out / answer
+    return json.loads(path.read_text()) if path.is_file() else None
+
+
+def validation_error(recording: Path, model: Path, out: Path) -> float | None:
+    """Overall RMS of the recommended model on trials that the diagnosis never saw [rad]."""
+    if not model.is_file():
+        return None
+    answer = run_verb("compare", out, f"recording={recording / 'validation'}", f"model={model}")
+    return None if answer is None else float(answer["error"]["overall"])
+
+
+def judge(seed: int, folder: Path, seconds: float | None, keep: bool) -> dict[str, Any]:
+    """Generate, diagnose, compare and judge one seed."""
+    place = folder / f"draw_{seed}"
+    truth = write(seed, place, seconds)
+    started = time.perf_counter()
+    diagnosis = run_verb("diagnose", place / "diagnose", f"recording={place / 'recording'}")
+    wall = time.perf_counter() - started
+    line: dict[str, Any] = {"seed": seed, "truth": truth, "diagnosis": diagnosis, "wall_seconds": round(wall, 1)}
+    if diagnosis is None:
+        line["score"] = {"outcome": "wrong", "why": "no answer", "truth": "", "answer": "no answer", "confident": False}
+        return line
+    error = validation_error(place / "recording", place / "diagnose" / "model.yaml", place / "validation")
+    ratio = None if error is None else error / truth["repeat_scatter"]
+    line |= {"validation_error": error, "validation_ratio": ratio, "score": asdict(score(truth, diagnosis, ratio))}
+    if not keep:
+        shutil.rmtree(place / "recording")
+        shutil.rmtree(place / "diagnose")
+    return line
+
+
+def _answer_class(line: dict[str, Any]) -> str:
+    verdict = line["diagnosis"]["verdict"] if line["diagnosis"] else "no answer"
+    if verdict != "missing_effect":
+        return str(verdict)
+    return "missing_effect, the truth" if line["score"]["outcome"] != "wrong" else "missing_effect, another"
+
+
+def _truth_class(line: dict[str, Any]) -> str:
+    effects = line["truth"]["effects"]
+    if not effects:
+        return "nothing"
+    if len(effects) == 2:
+        return "two effects"
+    return "one effect" if effects[0]["in_catalogue"] else "outside the catalogue"
+
+
+def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
+    """Counts, shares, the confusion matrix and how near the validation error came to the floor."""
+    outcomes = Counter(x["score"]["outcome"] for x in lines)
+    none = [x for x in lines if not x["truth"]["effects"]]
+    known = [x for x in lines if x["truth"]["effects"] and all(e["in_catalogue"] for e in x["truth"]["effects"])]
+    ratios = sorted(x["validation_ratio"] for x in known if x.get("validation_ratio") is not None)
+    matrix: dict[str, Counter[str]] = {}
+    for line in lines:
+        matrix.setdefault(_truth_class(line), Counter())[_answer_class(line)] += 1
+    return {
+        "draws": len(lines),
+        "right": outcomes["right"],
+        "acceptable": outcomes["acceptable"],
+        "wrong": outcomes["wrong"],
+        "confidently_wrong": sum(x["score"]["confident"] for x in lines),
+        "false_alarms": [sum(x["score"]["outcome"] == "wrong" for x in none), len(none)],
+        "reasons": dict(Counter(f"{x['score']['outcome']}: {x['score']['why']}" for x in lines)),
+        "confusion": {k: dict(v) for k, v in matrix.items()},
+        "validation_ratio": {
+            "draws": len(ratios),
+            "median": ratios[len(ratios) // 2] if ratios else None,
+            f"share_below_{GOAL}": sum(r <= GOAL for r in ratios) / len(ratios) if ratios else None,
+            "worst": ratios[-1] if ratios else None,
+        },
+        "median_seconds": sorted(x["wall_seconds"] for x in lines)[len(lines) // 2] if lines else None,
+    }
+
+
+def _cell(line: dict[str, Any]) -> str:
+    ratio = line.get("validation_ratio")
+    size = "/".join(f"{e['distinct']:.1f}" for e in line["truth"]["effects"]) or "-"
+    words = [line["seed"], line["truth"]["rig"], line["score"]["truth"], size, line["score"]["answer"]]
+    words += [
+        f"{line['score']['outcome']} ({line['score']['why']})",
+        "-" if ratio is None else f"{ratio:.2f}",
+        line["wall_seconds"],
+    ]
+    return "| " + " | ".join(str(w) for w in words) + " |"
+
+
+def markdown(lines: list[dict[str, Any]], command: str) -> str:
+    """The summary as a page."""
+    s = summarise(lines)
+    columns = [
+        "adequate",
+        "missing_effect, the truth",
+        "missing_effect, another",
+        "ambiguous",
+        "unknown_effect",
+        "no answer",
+    ]
+    share = (s["right"] + s["acceptable"]) / max(s["draws"], 1)
+    v = s["validation_ratio"]
+    page = [
+        "# Blind diagnosis of hidden effects",
+        "",
+        f"Command: `{command}`. Definitions of right, acceptable and wrong: tests/blind/scoring.py.",
+        "",
+        f"- {s['draws']} draws: {s['right']} right, {s['acceptable']} acceptable, {s['wrong']} wrong "
+        f"({s['confidently_wrong']} of them confidently); right or acceptable {100 * share:.0f} %",
+        f"- false alarms where nothing is hidden: {s['false_alarms'][0]} of {s['false_alarms'][1]}",
+        f"- error on unseen trials over the scatter of repeats, catalogue effects ({v['draws']} draws): median "
+        f"{v['median'] or float('nan'):.2f}, within {GOAL}: {100 * (v[f'share_below_{GOAL}'] or 0):.0f} %, "
+        f"worst {v['worst'] or float('nan'):.2f}",
+        f"- median time of a diagnosis: {s['median_seconds']} s",
+        "",
+        "| hidden | " + " | ".join(columns) + " |",
+        "|---" * (len(columns) + 1) + "|",
+    ]
+    page += [f"| {k} | " + " | ".join(str(row.get(c, 0)) for c in columns) + " |" for k, row in s["confusion"].items()]
+    page += ["", "| reason | draws |", "|---|---|"]
+    page += [f"| {k} | {n} |" for k, n in sorted(s["reasons"].items())]
+    page += [
+        "",
+        "Size: how far the effect moves its joint [sensor noise], after refitting the plain model's constants.",
+        "",
+        "| seed | rig | hidden | size | answer | judged | unseen error / floor | s |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    return "\n".join([*page, *(_cell(x) for x in sorted(lines, key=lambda x: x["seed"])), ""])
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """The draws judged so far."""
+    return [json.loads(x) for x in path.read_text().splitlines()] if path.is_file() else []
+
+
+def report(folder: Path, command: str) -> dict[str, Any]:
+    """Write identification.md and identification.json from the lines so far; returns the summary."""
+    lines = read_lines(folder / "verdicts.jsonl")
+    summary = summarise(lines)
+    (folder / "identification.md").write_text(markdown(lines, command))
+    (folder / "identification.json").write_text(
+        json.dumps({"command": command, **summary, "draws_judged": lines}, indent=1)
+    )
+    return summary
+
+
+def main() -> None:
+    """Judge the draws that are not judged yet."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draws", type=int, default=60)
+    parser.add_argument("--out", type=Path, default=Path("outputs/blind"))
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--seconds", type=float, help="length of every trial (default: drawn)")
+    parser.add_argument("--keep", action="store_true", help="keep recordings and answers")
+    args = parser.parse_args()
+    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    args.out.mkdir(parents=True, exist_ok=True)
+    done = {x["seed"] for x in read_lines(args.out / "verdicts.jsonl")}
+    wanted = [s for s in range(args.first_seed, args.first_seed + args.draws) if s not in done]
+    command = f"python tests/blind/judge.py --draws {args.draws}"
+    command += f" --first-seed {args.first_seed}" * (args.first_seed != FIRST_SEED) + (
+        f" --seconds {args.seconds:g}" if args.seconds else ""
+    )
+    with ThreadPoolExecutor(args.jobs) as pool:
+        for future in as_completed([pool.submit(judge, s, args.out, args.seconds, args.keep) for s in wanted]):
+            line = future.result()
+            with (args.out / "verdicts.jsonl").open("a") as lines:
+                lines.write(json.dumps(line) + "\n")
+            found = line["score"]
+            print(
+                f"{line['seed']}  {found['truth']}  ->  {found['answer']}  {found['outcome']} ({found['why']})",
+                flush=True,
+            )
+            report(args.out, command)
+    print(json.dumps({k: v for k, v in report(args.out, command).items() if k != "draws_judged"}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

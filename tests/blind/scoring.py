@@ -1,0 +1,111 @@
+"""Right, acceptable or wrong: what counts as a good answer to a blind recording.
+
+| hidden | right | acceptable | wrong |
+|---|---|---|---|
+| nothing | `adequate` | | everything else (a false alarm) |
+| one named effect | `missing_effect`, exactly that name and joint | `ambiguous` with the truth in the set | the rest |
+| two named effects | `missing_effect` with exactly both | `ambiguous`, both in the sets | the rest |
+| outside the catalogue | `unknown_effect` | `ambiguous` | the rest |
+
+Exceptions, each counted apart and never as right by name:
+- `absorbed`: the plain model has a constant for it (Coulomb and viscous friction, stiffness, reflected inertia, joint
+  offset), so `adequate` after refitting it is acceptable when the refitted model is at the floor on unseen trials.
+- `invisible`: `adequate` for any other effect is acceptable when the recommended model is at the floor on unseen
+  trials: the effect then changes nothing that this bench can measure.
+- Effects of the whole mechanism (payload, coupling) may be named at any joint.
+- A confidently wrong answer (`missing_effect` with other effects than the truth) is wrong however small its error is.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+AT_FLOOR = 1.1
+"""Validation error in units of the repeats' scatter below which nothing measurable is missing."""
+GOAL = 1.3
+
+
+@dataclass
+class Score:
+    """The judgement of one draw."""
+
+    outcome: str
+    """right, acceptable or wrong."""
+    why: str
+    truth: str
+    answer: str
+    confident: bool
+
+
+def _label(names: list[tuple[str, list[str]]]) -> str:
+    return " + ".join(f"{name}@{','.join(joints)}" for name, joints in sorted(names)) or "nothing"
+
+
+def _matches(truth: dict[str, Any], name: str, joints: list[str]) -> bool:
+    return name == truth["name"] and (truth["any_joint"] or set(joints) == set(truth["joints"]))
+
+
+def _merged(diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
+    """The answer's effects, one entry a name: the same effect at two joints is one effect at both."""
+    merged: dict[str, dict[str, Any]] = {}
+    for effect in diagnosis["effects"]:
+        if effect["name"] in merged:
+            merged[effect["name"]]["joints"] = merged[effect["name"]]["joints"] + list(effect["joints"])
+        else:
+            merged[effect["name"]] = {**effect, "joints": list(effect["joints"])}
+    return list(merged.values())
+
+
+def _in_set(truth: dict[str, Any], diagnosis: dict[str, Any]) -> bool:
+    """Whether an ambiguous answer's set holds the truth; a rival is `name` (same joints) or `name@joint`."""
+    for effect in diagnosis["effects"]:
+        for candidate in [effect["name"], *effect.get("rivals", [])]:
+            name, _, joints = str(candidate).partition("@")
+            if _matches(truth, name, joints.split(",") if joints else list(effect["joints"])):
+                return True
+    merged = _merged(diagnosis)
+    return any(_matches(truth, e["name"], e["joints"]) for e in merged)
+
+
+def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bool) -> tuple[str, str]:
+    """Judge an answer where one or two catalogue effects are hidden."""
+    verdict, answer = diagnosis["verdict"], _merged(diagnosis)
+    found = [t for t in truths if any(_matches(t, e["name"], e["joints"]) for e in answer)]
+    if verdict == "missing_effect":
+        if len(found) == len(truths) == len(answer):
+            return "right", "named"
+        missed = [t for t in truths if t not in found]
+        if len(found) == len(answer) and at_floor:
+            return "acceptable", "absorbed" if all(t["absorbed"] for t in missed) else "invisible"
+        if not found:
+            return "wrong", "another effect"
+        return "wrong", "only one of two" if len(found) < len(truths) else "an effect too many"
+    if verdict == "ambiguous":
+        held = [t for t in truths if _in_set(t, diagnosis)]
+        return ("acceptable", "in the set") if len(held) == len(truths) else ("wrong", "not in the set")
+    if verdict == "adequate":
+        if not at_floor:
+            return "wrong", "missed"
+        return "acceptable", "absorbed" if all(t["absorbed"] for t in truths) else "invisible"
+    return "wrong", "called unknown"
+
+
+def score(truth: dict[str, Any], diagnosis: dict[str, Any], ratio: float | None) -> Score:
+    """Judge a diagnosis; `ratio` is the recommended model's error on unseen trials over the scatter of repeats."""
+    verdict, effects = diagnosis["verdict"], truth["effects"]
+    at_floor = ratio is not None and ratio <= AT_FLOOR
+    if not effects:
+        outcome, why = ("right", "nothing hidden") if verdict == "adequate" else ("wrong", "false alarm")
+    elif all(e["in_catalogue"] for e in effects):
+        outcome, why = _named(effects, diagnosis, at_floor)
+    elif verdict == "unknown_effect":
+        outcome, why = "right", "unknown"
+    elif verdict == "ambiguous":
+        outcome, why = "acceptable", "not sure"
+    elif verdict == "adequate" and at_floor:
+        outcome, why = "acceptable", "invisible"
+    else:
+        outcome, why = "wrong", "missed" if verdict == "adequate" else "explained by another effect"
+    told = _label([(e["name"], e["joints"]) for e in _merged(diagnosis)])
+    answer = verdict if verdict in ("adequate", "unknown_effect") else f"{verdict}: {told}"
+    hidden = _label([(e["name"], e["joints"]) for e in effects])
+    return Score(outcome, why, hidden, answer, outcome == "wrong" and verdict == "missing_effect")
