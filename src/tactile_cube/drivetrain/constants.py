@@ -42,6 +42,7 @@ class DrivetrainConstants:
     sign: Literal["physical", "printed"] = "physical"
 
     def __post_init__(self) -> None:
+        """Refuses values that no drive has."""
         for entry in fields(self):
             if entry.name != "sign":
                 _check(entry.name, getattr(self, entry.name), positive=entry.name in _POSITIVE)

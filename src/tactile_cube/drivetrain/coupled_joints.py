@@ -26,8 +26,8 @@ def reduce_equations(
     h_joint[:] = 0.0
     for k in range(len(follow)):
         h_joint[follow[k]] += ratio[k] * h[k]
-        for l in range(len(follow)):
-            M_joint[follow[k], follow[l]] += ratio[k] * ratio[l] * M[k, l]
+        for i in range(len(follow)):
+            M_joint[follow[k], follow[i]] += ratio[k] * ratio[i] * M[k, i]
     for j in range(len(rotor)):
         M_joint[j, j] += rotor[j]
 
@@ -43,8 +43,8 @@ def estimate_contact(
     contact[:] = 0.0
     for k in range(len(follow)):
         other = h[k] - torque[k]
-        for l in range(len(follow)):
-            other += M[k, l] * acceleration[l]
+        for i in range(len(follow)):
+            other += M[k, i] * acceleration[i]
         contact[follow[k]] += ratio[k] * other
     for j in range(len(contact)):
         contact[j] = min(max(contact[j], -limit), limit)
@@ -67,8 +67,8 @@ def bullet_torques(
     """
     for k in range(len(follow)):
         torque[k] = h[k]
-        for l in range(len(follow)):
-            torque[k] += M[k, l] * ratio[l] * acceleration[follow[l]]
+        for i in range(len(follow)):
+            torque[k] += M[k, i] * ratio[i] * acceleration[follow[i]]
     for j in range(len(leader)):
         torque[leader[j]] -= contact[j]
 

@@ -63,32 +63,28 @@ def _stands(limit: float, grip: float, side: float) -> bool:
 
 @compiled
 def _solve_moving(M: Array, b: Array, limit: Array, grip: Array, side: Array, factor: Array, v: Array) -> None:
-    """Speeds of the joints that move, under full friction against `side`; the others stand (L D L^T)."""
+    """Speeds of the joints that move, under full friction against `side`; the others stand (L D L^T).
+
+    A standing joint's row and column are those of the identity, its right side zero.
+    """
     n = len(v)
     for i in range(n):
-        v[i] = 0.0
-        if _stands(limit[i], grip[i], side[i]):
-            continue
-        v[i] = b[i] - limit[i] * side[i]
-        pivot = M[i, i] + (grip[i] if side[i] == 0.0 and limit[i] > 0.0 else 0.0)
+        stands = _stands(limit[i], grip[i], side[i])
+        sticks = limit[i] > 0.0 and side[i] == 0.0
+        v[i] = 0.0 if stands else b[i] - limit[i] * side[i]
+        pivot = 1.0 if stands else M[i, i] + (grip[i] if sticks else 0.0)
         for j in range(i):
-            if _stands(limit[j], grip[j], side[j]):
-                continue
-            entry = M[i, j]
+            entry = 0.0 if stands or _stands(limit[j], grip[j], side[j]) else M[i, j]
             for k in range(j):
-                if not _stands(limit[k], grip[k], side[k]):
-                    entry -= factor[i, k] * factor[j, k] * factor[k, k]
+                entry -= factor[i, k] * factor[j, k] * factor[k, k]
             factor[i, j] = entry / factor[j, j]
             pivot -= factor[i, j] * entry
             v[i] -= factor[i, j] * v[j]
         factor[i, i] = max(pivot, SMALLEST_PIVOT)
     for i in range(n - 1, -1, -1):
-        if _stands(limit[i], grip[i], side[i]):
-            continue
         v[i] /= factor[i, i]
         for j in range(i + 1, n):
-            if not _stands(limit[j], grip[j], side[j]):
-                v[i] -= factor[j, i] * v[j]
+            v[i] -= factor[j, i] * v[j]
 
 
 @compiled

@@ -7,7 +7,7 @@ from tactile_cube.compiled import compiled
 def impedance_torque(
     command: float, q: float, v: float, kp: float, kd: float, compliance: float, extra: float, limit: float
 ) -> float:
-    """tau = K_P (q_d - q_m) - K_D dq with q_m = q + compliance * tau + extra, solved for tau and limited.
+    """Torque tau = K_P (q_d - q_m) - K_D dq with q_m = q + compliance * tau + extra, solved for tau and limited.
 
     The loop is algebraic: iterating it would add a delay of one step, the closed form does not.
     Source: Sievers, Pitz, Bauml (ICRA 2022), eq. (1) and (2).

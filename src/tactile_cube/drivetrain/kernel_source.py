@@ -18,6 +18,7 @@ from importlib import import_module
 import numpy as np
 from numba import carray, cfunc, njit, types
 
+from tactile_cube.compiled import borrowed
 from tactile_cube.drivetrain.coupled_joints import (
     add_tendons, bullet_torques, estimate_contact, expand, reduce_equations,
 )
@@ -113,7 +114,7 @@ def next_speeds(x, c, dt, memory):
         x[DIRECTION, j] = np.sign(x[VELOCITY, j]) if x[VELOCITY, j] != 0.0 else np.sign(net)
         x[FRICTION, j] = memory[STATIC_FRICTION + a]
         memory[SPEED + j] = x[VELOCITY, j]
-    effects_friction(x, c, dt, memory)  # such a law may also add to JOINT_TORQUE: bristles take the place of dry friction
+    effects_friction(x, c, dt, memory)  # may also add to JOINT_TORQUE: bristles in place of dry friction
     add_midpoint_damping(x, c, dt, memory)
     for j in range(n):
         memory[MOMENTUM + j] = dt * (x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j])
@@ -312,23 +313,23 @@ def roll_segments(commands, length, history, substeps, segment, position, speed,
 
 @outer
 def control_step(i, q, v, torque, memory):
-    control(i, q, v, torque, memory)
+    control(i, borrowed(q), borrowed(v), borrowed(torque), borrowed(memory))
 
 
 @outer
 def step(command, memory):
-    free_step(command, memory)
+    free_step(command, borrowed(memory))
 
 
 @outer
 def rollout(commands, history, substeps, memory, rows, out):
-    roll(commands, len(out), history, substeps, memory, rows, out)
+    roll(commands, len(out), history, substeps, borrowed(memory), rows, out)
 
 
 @outer
 def rollout_batch(commands, which, lengths, history, substeps, memory, rows, out):
     for b in range(len(memory)):
-        roll(commands[which[b]], lengths[which[b]], history, substeps, memory[b], rows, out[b])
+        roll(commands[which[b]], lengths[which[b]], history, substeps, borrowed(memory[b]), rows, out[b])
 
 
 @outer
@@ -339,8 +340,8 @@ def segments_batch(
     for b in range(first, last):
         s = which[b]
         roll_segments(
-            commands[s], lengths[s], history, substeps, segment, position[s], speed[s], nudge[b], memory[b], rows,
-            out[b],
+            commands[s], lengths[s], history, substeps, segment, position[s], speed[s], nudge[b],
+            borrowed(memory[b]), rows, out[b],
         )
 
 

@@ -104,7 +104,7 @@ def _joint_constants(joints: int) -> dict[str, Shape]:
         "goal",
     )
     single = ("time_constant", "tendon_stiffness", "tendon_damping", "contact_torque_limit")
-    return {key: (joints,) for key in per_joint} | {key: (1,) for key in single}
+    return {**dict.fromkeys(per_joint, (joints,)), **dict.fromkeys(single, (1,))}
 
 
 def _mechanism(chains: int, dofs: int) -> dict[str, Shape]:

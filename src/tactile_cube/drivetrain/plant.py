@@ -134,9 +134,7 @@ class Plant:
             value = np.asarray(getattr(constants, key), dtype=float)
             self.view(memory, key)[...] = self._per_joint(value, key)
 
-    def set_effect(
-        self, memory: Array, effect: EffectClass, joint: str, values: Mapping[str, float | Array]
-    ) -> None:
+    def set_effect(self, memory: Array, effect: EffectClass, joint: str, values: Mapping[str, float | Array]) -> None:
         """Switch an effect on at a joint of memory (..., size); values may be (batch,) arrays.
 
         An effect on the MECHANISM changes the constants in place, so apply it once to a fresh memory.
@@ -228,8 +226,8 @@ def _common_topology(trees: Sequence[RigidBodyTree]) -> Topology:
 
 def _topology(tree: RigidBodyTree, chains: int) -> Topology:
     leader = tuple(tree.dof_names.index(name) for name in tree.joint_names)
-    parts = (tuple(int(k) for k in part) for part in (tree.parent, tree.prismatic, tree.follow))
-    return Topology(chains, *parts, leader)
+    parent, prismatic, follow = (tuple(map(int, part)) for part in (tree.parent, tree.prismatic, tree.follow))
+    return Topology(chains, parent, prismatic, follow, leader)
 
 
 def _joint_names(trees: Sequence[RigidBodyTree], names: Sequence[str] | None) -> tuple[str, ...]:

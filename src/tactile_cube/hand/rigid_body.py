@@ -86,7 +86,8 @@ class RigidBodyTree:
 
     def expand(self, q: Array) -> Array:
         """Positions of all dofs (N,) from those of the actuated joints (n,)."""
-        return self.ratio * np.asarray(q, dtype=float)[self.follow] + self.offset
+        positions = np.asarray(q, dtype=float)[self.follow]
+        return np.asarray(self.ratio * positions + self.offset)
 
     def equations(self, q: Array, v: Array, gravity: Array) -> tuple[Array, Array]:
         """M (N, N) [kg m^2] and h (N,) [N m] at positions q (N,) and velocities v (N,); gravity (3,) in the base."""

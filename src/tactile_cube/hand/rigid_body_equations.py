@@ -230,7 +230,7 @@ def add_spin_inertia(parent: Integers, prismatic: Integers, spin: Array, work: A
 def add_weight(
     parent: Integers, prismatic: Integers, mass: Array, gravity: Array, other: Array, work: Array, h: Array
 ) -> None:
-    """Turns the bias h under `gravity` (3,) into that under `other` (3,), after `mass_matrix_and_bias` filled `work`."""
+    """Turns the bias h under `gravity` (3,) into that under `other` (3,); `work` is of `mass_matrix_and_bias`."""
     change = gravity[0] - other[0], gravity[1] - other[1], gravity[2] - other[2]
     if change[0] == 0.0 and change[1] == 0.0 and change[2] == 0.0:
         return

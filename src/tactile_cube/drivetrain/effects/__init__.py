@@ -1,4 +1,4 @@
-"""The catalogue of physical effects: one class each, used in training, in fitting and in the search for what is missing."""
+"""The catalogue of physical effects: one class each, used in training, in fitting and in the search."""
 
 from tactile_cube.drivetrain.effects.catalogue import catalogue, find_effect, matching_joints, resolve
 from tactile_cube.drivetrain.effects.effect import Effect, Parameter, Place, Stage

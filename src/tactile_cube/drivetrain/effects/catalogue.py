@@ -1,4 +1,4 @@
-"""Which effects exist, and how a user names them: `stribeck_friction@q3`, `my_rig.CableDrag@q2`, `cogging` (all joints)."""
+"""Which effects exist, and how a user names them: `stribeck_friction@q3`, `my_rig.CableDrag@q2`, `cogging`."""
 
 from __future__ import annotations
 

@@ -145,6 +145,6 @@ class Effect:
         """
         raise NotImplementedError
 
-    def __repr__(self) -> str:
+    def __repr__(self) -> str:  # noqa: D105
         values = ", ".join(f"{key}={value:g}" for key, value in self.values.items())
         return f"{type(self).__name__}('{self.joint}', {values})"
