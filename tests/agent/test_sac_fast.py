@@ -1,0 +1,148 @@
+"""The fast composition against TorchRL's SACLoss."""
+
+from typing import Any
+
+import pytest
+import torch
+
+from tactile_cube.agent.batch import Batch, Sizes
+from tactile_cube.agent.flat_perceptron import FlatPerceptron
+from tactile_cube.agent.sac import Sac
+from tactile_cube.agent.sac_fast import FastSac
+
+SIZES = Sizes(observation=30, privileged=7, action=4)
+SETTINGS: dict[str, Any] = {"hidden": (64, 48), "batch_size": 32, "learning_rate": 1e-3}
+
+
+def random_batch(rows: int = 32, seed: int = 1) -> Batch:
+    generator = torch.Generator().manual_seed(seed)
+
+    def normal(width: int) -> torch.Tensor:
+        return torch.randn(rows, width, generator=generator)
+
+    return Batch(
+        observation=normal(SIZES.observation),
+        privileged=normal(SIZES.privileged),
+        action=torch.tanh(normal(SIZES.action)),
+        reward=normal(1),
+        next_observation=normal(SIZES.observation),
+        next_privileged=normal(SIZES.privileged),
+        terminated=(normal(1) > 1.0).float(),
+        steps=torch.randint(1, 4, (rows, 1), generator=generator).float(),
+    )
+
+
+def pair(**settings: Any) -> tuple[Sac, FastSac]:
+    torch.manual_seed(3)
+    plain = Sac(SIZES, **(SETTINGS | settings))
+    torch.manual_seed(3)
+    return plain, FastSac(SIZES, **(SETTINGS | settings))
+
+
+def gradients_of_fast(fast: FastSac) -> list[torch.Tensor]:
+    """In the order and orientation of the torch modules: actor, critic 1, critic 2."""
+    networks = fast.networks
+    views = [networks.actor, *networks.critics]
+    return [tensor for view in views for weight, bias in view.gradients for tensor in (weight.t(), bias)]
+
+
+def gradients_of_sac(plain: Sac, batch: Batch) -> list[torch.Tensor]:
+    losses = plain.losses(batch)
+    (losses["loss_qvalue"] + losses["loss_actor"] + losses["loss_alpha"]).backward()
+    by_name = {name: p.grad for name, p in plain.loss.named_parameters()}
+    actor = [grad for name, grad in by_name.items() if name.startswith("actor")]
+    critics = [grad for name, grad in by_name.items() if name.startswith("qvalue")]
+    return [*actor, *(grad[0] for grad in critics), *(grad[1] for grad in critics)]
+
+
+@pytest.mark.parametrize("layer_norm", [False, True])
+def test_losses_and_gradients_equal_those_of_sacloss(layer_norm: bool) -> None:
+    plain, fast = pair(layer_norm=layer_norm)
+    batch = random_batch()
+    torch.manual_seed(7)
+    expected = gradients_of_sac(plain, batch)
+    torch.manual_seed(7)
+    losses = plain.losses(batch)
+    torch.manual_seed(7)
+    metrics = fast.compute_gradients(batch)
+    torch.testing.assert_close(metrics["critic_loss"], losses["loss_qvalue"], rtol=1e-5, atol=1e-6)
+    torch.testing.assert_close(metrics["actor_loss"], losses["loss_actor"], rtol=1e-5, atol=1e-6)
+    torch.testing.assert_close(fast.log_alpha.grad, plain.loss.log_alpha.grad, rtol=1e-5, atol=1e-6)
+    for mine, theirs in zip(gradients_of_fast(fast), expected, strict=True):
+        torch.testing.assert_close(mine, theirs, rtol=1e-4, atol=1e-6)
+
+
+def test_both_compositions_stay_together_over_updates() -> None:
+    plain, fast = pair()
+    for index in range(20):
+        batch = random_batch(seed=index)
+        torch.manual_seed(index)
+        plain.update(batch)
+        torch.manual_seed(index)
+        fast.update(batch)
+    for mine, theirs in zip(fast.policy().parameters(), plain.policy().parameters(), strict=True):
+        torch.testing.assert_close(mine, theirs, rtol=1e-3, atol=2e-5)
+    targets = torch.cat([p.reshape(2, -1) for n, p in plain.loss.state_dict().items() if n.startswith("target")], 1)
+    assert fast.networks.target_master.double().norm().item() == pytest.approx(targets.double().norm().item(), rel=1e-4)
+
+
+def test_bfloat16_follows_float32_roughly() -> None:
+    torch.manual_seed(3)
+    exact = FastSac(SIZES, **SETTINGS)
+    torch.manual_seed(3)
+    rough = FastSac(SIZES, **(SETTINGS | {"precision": "bf16"}))
+    batch = random_batch()
+    for agent in (exact, rough):
+        torch.manual_seed(7)
+        agent.compute_gradients(batch)
+    a, b = exact.networks.gradient, rough.networks.gradient.float()
+    assert torch.nn.functional.cosine_similarity(a, b, dim=0) > 0.995
+    assert not torch.equal(a, b)
+    assert rough.approximations()
+    assert not exact.approximations()
+
+
+def test_flat_perceptron_equals_torch_perceptron() -> None:
+    from tactile_cube.agent.flat_perceptron import parameter_count
+    from tactile_cube.agent.networks import perceptron
+
+    sizes = (5, 8, 6, 3)
+    module = perceptron(sizes, layer_norm=True)
+    flat = torch.zeros(parameter_count(sizes))
+    network = FlatPerceptron(sizes, flat, None, layer_norm=True)
+    network.copy_from(module)
+    x = torch.randn(9, 5)
+    torch.testing.assert_close(network.forward(x)[0], module(x))
+
+
+def test_state_dict_restores_the_agent_bit_for_bit() -> None:
+    for kind in (Sac, FastSac):
+        torch.manual_seed(0)
+        first = kind(SIZES, **SETTINGS)
+        first.update(random_batch())
+        state = {key: value for key, value in first.state_dict().items()}
+        import io
+
+        stream = io.BytesIO()
+        torch.save(state, stream)
+        stream.seek(0)
+        second = kind(SIZES, **SETTINGS)
+        second.load_state_dict(torch.load(stream, weights_only=True))
+        for agent in (first, second):
+            torch.manual_seed(5)
+            agent.update(random_batch(seed=2))
+        for a, b in zip(first.policy().parameters(), second.policy().parameters(), strict=True):
+            assert torch.equal(a, b)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_cuda_gives_the_gradients_of_the_cpu() -> None:
+    torch.manual_seed(3)
+    cpu = FastSac(SIZES, **SETTINGS)
+    gpu = FastSac(SIZES, **(SETTINGS | {"device": "cuda"}))
+    gpu.load_networks(cpu.state_dict())
+    target = cpu._target(random_batch(), random_batch().action, torch.zeros(32, 1))
+    batch = random_batch().to(torch.device("cuda"))
+    on_gpu = gpu._target(batch, batch.action, torch.zeros(32, 1, device="cuda"))
+    torch.testing.assert_close(on_gpu.cpu(), target, rtol=1e-3, atol=1e-4)
+    assert torch.isfinite(gpu.update(random_batch())["critic_loss"])

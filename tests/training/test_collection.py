@@ -1,0 +1,95 @@
+"""Workers that die, fail or get stuck must never hang the run."""
+
+import os
+import signal
+import time
+
+import pytest
+import torch
+
+from tactile_cube.agent.networks import Actor
+from tactile_cube.training.collection import CollectionError, MultiSyncCollection, SingleCollection
+from tests.training.tiny_env import SIZES, LENGTH, TinyEnv, tiny_environment
+
+
+class StuckEnv(TinyEnv):
+    """Stops answering after the first steps."""
+
+    def _step(self, tensordict):  # type: ignore[no-untyped-def]
+        if int(self._count.max()) >= 2:
+            time.sleep(60)
+        return super()._step(tensordict)
+
+
+def start(make=None, timeout: float = 30.0, processes: int = 1) -> MultiSyncCollection:  # type: ignore[no-untyped-def]
+    actor = Actor(SIZES, (8,))
+    return MultiSyncCollection(make or tiny_environment().make, actor, 4, 5, processes, timeout, "fork")
+
+
+def collect(collection: MultiSyncCollection) -> None:
+    collection.launch(Actor(SIZES, (8,)), False, (0, 0.0))
+    collection.take()
+
+
+def test_killed_worker_is_reported_within_seconds() -> None:
+    collection = start(processes=2)
+    collection.restart(0, (0, 0.0))
+    collect(collection)
+    began = time.perf_counter()
+    os.kill(collection._processes[0].pid, signal.SIGKILL)
+    with pytest.raises(CollectionError, match="worker"):
+        for _ in range(3):
+            collect(collection)
+    collection.close()
+    assert time.perf_counter() - began < 20.0
+
+
+def test_stuck_worker_is_reported_after_the_timeout() -> None:
+    collection = start(make=StuckEnv, timeout=2.0)
+    began = time.perf_counter()
+    with pytest.raises(CollectionError, match="collector.timeout=2 s"):
+        collect(collection)
+    collection.close()
+    assert time.perf_counter() - began < 20.0
+
+
+def test_failing_world_is_reported() -> None:
+    collection = start(make=tiny_environment(fail_at=3).make, timeout=20.0)
+    with pytest.raises(CollectionError, match="worker"):
+        for _ in range(3):
+            collect(collection)
+    collection.close()
+
+
+def test_world_that_cannot_be_made_is_reported() -> None:
+    def broken(worlds: int, seed: int) -> TinyEnv:
+        raise RuntimeError("no such hand")
+
+    with pytest.raises(CollectionError, match="no such hand"):
+        start(make=broken)
+
+
+def test_restart_makes_blocks_repeat_and_tells_the_curriculum() -> None:
+    collection = SingleCollection(tiny_environment().make, Actor(SIZES, (8,)), 4, LENGTH)
+    actor = Actor(SIZES, (8,))
+    blocks = []
+    for _ in range(2):
+        collection.restart(11, (500, 0.0))
+        assert collection.launch(actor, False, (500, 0.0)) == {"scale": 1.5}
+        blocks.append(collection.take())
+    assert torch.equal(blocks[0]["next", "theta"], blocks[1]["next", "theta"])
+    assert blocks[0].batch_size == (4, LENGTH)
+    assert collection.cpu_seconds() > 0.0
+
+
+def test_single_collection_leaves_the_learners_random_numbers_alone() -> None:
+    torch.manual_seed(5)
+    expected = torch.rand(3)
+    torch.manual_seed(5)
+    actor_state = torch.get_rng_state()
+    actor = Actor(SIZES, (8,))
+    torch.set_rng_state(actor_state)
+    collection = SingleCollection(tiny_environment().make, actor, 4, 5)
+    collection.restart(1, (0, 0.0))
+    collection.launch(actor, False, (0, 0.0))
+    assert torch.equal(torch.rand(3), expected)

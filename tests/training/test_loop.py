@@ -1,0 +1,187 @@
+"""Same seed, same weights: for two runs, for other ways of collecting, and for a run that was interrupted."""
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from tactile_cube.agent.sac_fast import FastSac
+from tactile_cube.errors import InputError
+from tactile_cube.training.loop import barrier_seed
+from tactile_cube.training.run import Run
+from tests.training.tiny_env import tiny_environment
+from tests.training.tiny_run import tiny_run
+
+
+def finish(run: Run) -> torch.Tensor:
+    """Train to the end; all weights of the agent in one vector."""
+    run.train()
+    run.close()
+    return weights(run)
+
+
+def weights(run: Run) -> torch.Tensor:
+    return torch.cat([v.flatten().double() for v in run.learner.agent.state_dict()["loss"].values() if v.dtype.is_floating_point])
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> torch.Tensor:
+    return finish(tiny_run(tmp_path_factory.mktemp("reference")))
+
+
+def test_same_seed_gives_the_same_weights_bit_for_bit(tmp_path: Path, reference: torch.Tensor) -> None:
+    assert torch.equal(finish(tiny_run(tmp_path)), reference)
+
+
+def test_other_seed_gives_other_weights(tmp_path: Path, reference: torch.Tensor) -> None:
+    assert not torch.equal(finish(tiny_run(tmp_path, seed=1)), reference)
+
+
+def test_worker_process_gives_the_weights_of_this_process(tmp_path: Path, reference: torch.Tensor) -> None:
+    assert torch.equal(finish(tiny_run(tmp_path, collector={"kind": "multi_sync"})), reference)
+
+
+def test_two_runs_with_two_worker_processes_are_equal(tmp_path: Path) -> None:
+    collector = {"kind": "multi_sync", "processes": 2}
+    first, second = (finish(tiny_run(tmp_path / name, collector=collector)) for name in ("a", "b"))
+    assert torch.equal(first, second)
+
+
+@pytest.mark.parametrize("agent_settings", [{"n_step": 1}, {"n_step": 3}])
+def test_resumed_run_equals_an_uninterrupted_one(tmp_path: Path, agent_settings: dict[str, Any]) -> None:
+    whole = tiny_run(tmp_path / "whole", agent_settings=agent_settings)
+    expected = finish(whole)
+    finish(tiny_run(tmp_path / "parts", agent_settings=agent_settings, steps=80))
+    resumed = tiny_run(tmp_path / "parts", agent_settings=agent_settings)
+    assert resumed.learner.steps == 80
+    assert torch.equal(finish(resumed), expected)
+    assert (tmp_path / "whole/metrics.csv").read_text().count("\n") == (tmp_path / "parts/metrics.csv").read_text().count("\n")
+    assert whole.learner.episodes.summary() == resumed.learner.episodes.summary()
+
+
+def test_resumed_worker_processes_equal_an_uninterrupted_run(tmp_path: Path) -> None:
+    collector = {"kind": "multi_sync", "processes": 2}
+    expected = finish(tiny_run(tmp_path / "whole", collector=collector))
+    finish(tiny_run(tmp_path / "parts", collector=collector, steps=80))
+    assert torch.equal(finish(tiny_run(tmp_path / "parts", collector=collector)), expected)
+
+
+def test_fast_agent_resumes_bit_for_bit_too(tmp_path: Path) -> None:
+    def flat(folder: str, **training: Any) -> torch.Tensor:
+        run = tiny_run(tmp_path / folder, agent=FastSac, agent_settings={"precision": "bf16"}, **training)
+        run.train()
+        run.close()
+        return run.learner.agent.state_dict()["parameters"]
+
+    expected = flat("whole")
+    flat("parts", steps=80)
+    assert torch.equal(flat("parts"), expected)
+
+
+def test_ctrl_c_stops_at_the_next_barrier_and_the_run_goes_on_as_if_nothing_happened(
+    tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tiny_run(tmp_path)
+    iterate = run.learner.iterate
+
+    def interrupted_iterate() -> None:
+        if run.learner.iteration == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+        iterate()
+
+    monkeypatch.setattr(run.learner, "iterate", interrupted_iterate)
+    assert run.train() == "interrupted"
+    run.close()
+    assert run.learner.iteration == 4
+    assert torch.equal(finish(tiny_run(tmp_path)), reference)
+
+
+def test_second_ctrl_c_stops_at_once_and_keeps_the_last_checkpoint(
+    tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tiny_run(tmp_path)
+    iterate = run.learner.iterate
+
+    def interrupted_iterate() -> None:
+        if run.learner.iteration == 6:
+            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)
+        iterate()
+
+    monkeypatch.setattr(run.learner, "iterate", interrupted_iterate)
+    with pytest.raises(KeyboardInterrupt):
+        run.train()
+    run.close()
+    resumed = tiny_run(tmp_path)
+    assert resumed.learner.iteration == 4
+    assert torch.equal(finish(resumed), reference)
+
+
+def test_changed_settings_are_not_mixed_into_a_run(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path, steps=80))
+    with pytest.raises(InputError, match="agent.learning_rate was 0.01, is 0.5"):
+        tiny_run(tmp_path, agent_settings={"learning_rate": 0.5})
+    fresh = tiny_run(tmp_path, agent_settings={"learning_rate": 0.5}, resume="never")
+    assert fresh.learner.steps == 0
+
+
+def test_damaged_checkpoint_is_named(tmp_path: Path) -> None:
+    (tmp_path / "checkpoint.pt").write_bytes(b"not a checkpoint")
+    with pytest.raises(InputError, match="checkpoint.pt: damaged checkpoint"):
+        tiny_run(tmp_path)
+
+
+def test_learner_uses_the_replay_of_the_iteration_before(tmp_path: Path) -> None:
+    run = tiny_run(tmp_path, learning_starts=0, random_steps=0)
+    run.learner.replay.extend({k: torch.zeros(1, w) for k, w in run.learner.replay.widths.items()})
+    seen = []
+    sample = run.learner.replay.sample
+
+    def watched(*args: Any) -> Any:
+        seen.append(run.learner.replay.written)
+        return sample(*args)
+
+    run.learner.replay.sample = watched  # type: ignore[method-assign]
+    run.train()
+    assert seen[:6] == [1, 1, 1, 21, 21, 21]
+
+
+def test_run_gives_up_without_regrasping_and_finishes_early_when_good(tmp_path: Path) -> None:
+    assert "no regrasping" in tiny_run(tmp_path / "a", stop_if_no_regrasp_by=80).train()
+    good = tiny_run(tmp_path / "b", stop_when_angle_above=0.0001, random_steps=0)
+    good.learner.episodes.angles.append(1.0)
+    assert "stop_when_angle_above" in good.train()
+
+
+def test_warm_start_takes_networks_from_checkpoint_and_policy(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path / "first", steps=80))
+    first = tiny_run(tmp_path / "first", steps=80).learner.agent.policy()
+    for file in ("checkpoint.pt", "policy.safetensors"):
+        run = tiny_run(tmp_path / f"next-{file}", init_from=str(tmp_path / "first" / file))
+        assert run.learner.steps == 0
+        for mine, theirs in zip(run.learner.agent.policy().parameters(), first.parameters(), strict=True):
+            assert torch.equal(mine, theirs)
+
+
+def test_warm_start_from_other_shape_is_refused(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path / "first", steps=80))
+    for file in ("checkpoint.pt", "policy.safetensors"):
+        with pytest.raises(InputError, match=r"networks of other shape"):
+            tiny_run(tmp_path / "next", agent_settings={"hidden": (8,)}, init_from=str(tmp_path / "first" / file))
+
+
+def test_faulty_transitions_never_reach_the_replay(tmp_path: Path) -> None:
+    run = tiny_run(tmp_path, environment=tiny_environment(fault=0.2), agent_settings={"n_step": 3})
+    finish(run)
+    assert run.learner.episodes.faulty > 0
+    assert torch.isfinite(run.learner.replay.rows).all()
+    assert run.learner.replay.written + run.learner.episodes.faulty == run.learner.steps
+
+
+def test_barriers_have_seeds_of_their_own() -> None:
+    seeds = {barrier_seed(seed, k) for seed in range(20) for k in range(0, 500, 25)}
+    assert len(seeds) == 400
+    assert max(seeds) < 2**31
