@@ -7,13 +7,13 @@ and its joint turns about y.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand.model import Array, Capsule, HandModel, Link
 
 _AXIS_Y, _AXIS_Z = '<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>'
 _ACROSS = f'<origin xyz="0 0 0" rpy="{np.pi} {-np.pi / 2.0} 0"/>'
 """From q1's frame to q2's: z along the finger, which is x of the base, y against y of the base."""
+_UPRIGHT = 1e-9
 _COLOURS = {"palm": "0.35 0.37 0.40 1", "link": "0.72 0.74 0.78 1", "tip": "0.13 0.15 0.18 1"}
 
 
@@ -113,8 +113,18 @@ def _at(along: float) -> str:
 
 
 def _origin(position: Array, rotation: Array | None = None) -> str:
-    rpy = np.zeros(3) if rotation is None else Rotation.from_matrix(rotation).as_euler("xyz")
+    rpy = np.zeros(3) if rotation is None else roll_pitch_yaw(rotation)
     return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(rpy)}"/>'
+
+
+def roll_pitch_yaw(rotation: Array) -> Array:
+    """URDF's angles (3,) [rad] of a rotation matrix (3, 3): about fixed x, then y, then z."""
+    level = np.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = np.arctan2(-rotation[2, 0], level)
+    if level < _UPRIGHT:  # roll and yaw turn about the same axis: leave it all to roll
+        return np.array([np.arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
+    roll = np.arctan2(rotation[2, 1], rotation[2, 2])
+    return np.array([roll, pitch, np.arctan2(rotation[1, 0], rotation[0, 0])])
 
 
 def _numbers(values: Array) -> str:

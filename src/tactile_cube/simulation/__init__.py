@@ -3,6 +3,7 @@
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.rig import RigWorld
 from tactile_cube.simulation.world import World
 
-__all__ = ["Contact", "EpisodeConstants", "SimulationOptions", "Start", "World"]
+__all__ = ["Contact", "EpisodeConstants", "RigWorld", "SimulationOptions", "Start", "World"]

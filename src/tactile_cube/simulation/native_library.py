@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pybullet
 
+from tactile_cube.drivetrain.kernel import cache_directory
 from tactile_cube.errors import InputError
 
 _SOURCE = Path(__file__).parent / "native" / "physics_steps.c"
@@ -27,13 +28,6 @@ def find_compiler() -> str | None:
     return None
 
 
-def cache_folder() -> Path:
-    """Where compiled code is kept: $TACTILE_CUBE_CACHE, else the user's cache folder."""
-    if folder := os.environ.get("TACTILE_CUBE_CACHE"):
-        return Path(folder)
-    return Path(os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))) / "tactile_cube"
-
-
 @functools.cache
 def native_library() -> Path:
     """The shared library, compiled now if this source never was; several processes may ask at once.
@@ -43,7 +37,7 @@ def native_library() -> Path:
     """
     source = _SOURCE.read_bytes()
     digest = hashlib.sha256(source + " ".join(_FLAGS).encode()).hexdigest()[:16]
-    library = cache_folder() / f"physics_steps-{digest}.so"
+    library = cache_directory() / f"physics_steps-{digest}.so"
     if not library.exists():
         _compile(library)
     return library
@@ -54,7 +48,6 @@ def _compile(library: Path) -> None:
     compiler = find_compiler()
     if compiler is None:
         raise InputError("simulation.loop=c needs a C compiler (cc); install one or choose simulation.loop=python")
-    library.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         fresh = Path(folder) / library.name
         command = [compiler, *_FLAGS, "-o", str(fresh), str(_SOURCE)]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain import DrivetrainConstants, Plant, check_damping_stability
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, TORQUE
 from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
@@ -64,9 +65,9 @@ class World:
         self.trace: dict[str, Array] = {}
         self._effects = list(effects)
         self._scene = Scene(hand, self.options)
-        tree = RigidBodyTree.from_urdf(finger_urdf(hand))
+        self._tree = RigidBodyTree.from_urdf(finger_urdf(hand))
         self._plant = Plant(
-            trees=[tree] * len(hand.fingers),
+            trees=[self._tree] * len(hand.fingers),
             dt=self.options.dt,
             effects=tuple(dict.fromkeys(type(effect) for effect in effects)),
             joint_names=hand.joint_names,
@@ -222,6 +223,7 @@ class World:
             rate_limit=c.rate_limit,
             sign="physical" if c.elasticity_sign > 0 else "printed",
         )
+        self._refuse_unstable(drivetrain)
         self._down = np.asarray(c.gravity_direction) / np.linalg.norm(c.gravity_direction)
         gravity = np.stack([self._in_base(k, c.gravity * self._down) for k in range(len(self.hand.fingers))])
         self._memory[:] = self._plant.memory(drivetrain, gravity=gravity, effects=self._effects)
@@ -232,6 +234,20 @@ class World:
         self._plant.reset(self._memory, start.angles, v=start.velocities)
         for key in ("filtered", "limited", "goal"):
             self._set(key, start.angles if start.target is None else start.target - c.joint_offset)
+
+    def _refuse_unstable(self, c: DrivetrainConstants) -> None:
+        """Raises InputError if a finger with the largest damping and smallest inertia of each joint would diverge."""
+        shape = (-1, JOINTS_PER_FINGER)
+        kd, inertia = np.reshape(c.kd, shape).max(axis=0), np.reshape(c.reflected_inertia, shape).min(axis=0)
+        weakest = replace(
+            c,
+            kp=np.reshape(c.kp, shape).max(axis=0),
+            kd=kd,
+            stiffness=np.reshape(c.stiffness, shape).min(axis=0),
+            static_friction=0.0,
+            reflected_inertia=inertia,
+        )
+        check_damping_stability(self._tree, weakest, self.options.dt)
 
     def _set(self, key: str, value: Array | float) -> None:
         self._plant.view(self._memory, key)[:] = value
@@ -245,7 +261,7 @@ class World:
         """Gives the cube a share of its weight through Bullet's gravity; the control step keeps the fingers' whole."""
         acceleration = scale * self.constants.gravity * self._down
         self._scene.set_gravity(acceleration)
-        self._set("gravity", np.stack([self._in_base(k, acceleration) for k in range(len(self.hand.fingers))]))
+        self._set("engine_gravity", np.stack([self._in_base(k, acceleration) for k in range(len(self.hand.fingers))]))
 
     def _sense_once(self) -> None:
         """Computes what the sensors read at the start, without moving anything or changing any state."""

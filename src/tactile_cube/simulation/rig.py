@@ -1,0 +1,198 @@
+"""Any single mechanism in PyBullet, without contacts: replays what a recorded rig was commanded.
+
+The world that training uses and this one share engine, control step and loop; so errors stated from here are errors of
+the simulation that a policy learns in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects import MOTOR_POSITION, TORQUE, Effect
+from tactile_cube.errors import InputError
+from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.simulation.loop import make_loop
+from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.rig_urdf import tree_urdf
+from tactile_cube.simulation.scene import connect, load_chain
+from tactile_cube.simulation.spin_inertia import LEAST_INERTIA, TENDON_DAMPING, TENDON_STIFFNESS
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_NUMBERS = ("placement_rotation", "placement_translation", "axis", "mass", "com", "inertia")
+_OFF = np.inf
+
+
+class RigWorld:
+    """A plant of one chain, moved by PyBullet; its rollouts take and give what those of `plant.kernel` do."""
+
+    def __init__(self, plant: Plant, options: SimulationOptions | None = None) -> None:
+        """Prepares an empty world.
+
+        Args:
+            plant: One chain; its step is the physics step.
+            options: Loop to use; the rest is the plant's.
+
+        Raises:
+            InputError: The plant has several chains.
+        """
+        if plant.topology.chains != 1:
+            raise InputError(f"a rig world moves one chain, this plant has {plant.topology.chains}; give each its own")
+        self.plant = plant
+        self._kind = (options or SimulationOptions()).loop
+        self._client = connect(SimulationOptions(dt=plant.dt))
+        self._body = -1
+        self._loaded = b""
+
+    @classmethod
+    def from_urdf(
+        cls,
+        urdf: str,
+        dt: float,
+        effects: tuple[type[Effect], ...] = (),
+        joints: tuple[str, ...] | None = None,
+    ) -> RigWorld:
+        """A world for a URDF's text; `joints` names the actuated ones, by default all that mimic no other."""
+        return cls(Plant([RigidBodyTree.from_urdf(urdf, joints)], dt, effects))
+
+    def replay(
+        self,
+        commands: Array,
+        angles: Array,
+        constants: DrivetrainConstants,
+        gravity: Array,
+        effects: tuple[Effect, ...] = (),
+        substeps: int = 1,
+    ) -> tuple[Array, Array]:
+        """Plays commands from rest.
+
+        Args:
+            commands: Desired positions (n, joints) [rad].
+            angles: Joint angles at the start (joints,) [rad].
+            constants: Of the drivetrain.
+            gravity: In the base frame (3,) [m/s^2].
+            effects: Effects that act; their classes must be the plant's.
+            substeps: Physics steps per row of commands.
+
+        Returns:
+            Positions q_m [rad] and torques [N m], (n, joints) each, at the end of each row.
+        """
+        memory = self.plant.memory(constants, gravity=gravity, effects=effects)
+        self.plant.reset(memory, angles)
+        out = np.empty((len(commands), 2, self.plant.topology.joints))
+        self.rollout(commands, 0, substeps, memory, np.array([MOTOR_POSITION, TORQUE]), out)
+        return out[:, 0], out[:, 1]
+
+    def rollout(self, commands: Array, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
+        """As `plant.kernel.rollout`, from the state in memory, which stays as it is.
+
+        Args:
+            commands: Desired positions (history + T, joints) [rad].
+            history: Rows that only effects on the command remember.
+            substeps: Physics steps per row.
+            memory: Constants, effects and state (size,).
+            rows: Signals to keep (R,).
+            out: Filled with them (T, R, joints).
+        """
+        memory = self._prepared(memory)
+        if history:
+            self.plant.kernel.rollout(commands[:history], history, substeps, memory, rows, out[:0])
+        q, v = self._place(memory)
+        loop = make_loop(self._kind, self._client, [self._body], self.plant)
+        reading = min(int(self.plant.view(memory, "reading")[0]), substeps - 1) + 1
+        goal = self.plant.view(memory, "goal")
+        for k, command in enumerate(commands[history : history + len(out)]):
+            goal[:] = command
+            loop.run(reading, q, v, memory, -1, None, None)
+            for r, row in enumerate(rows):
+                out[k, r] = self.plant.signal(memory, int(row))
+            loop.run(substeps - reading, q, v, memory, -1, None, None)
+
+    def rollout_batch(
+        self,
+        commands: Array,
+        which: Integers,
+        lengths: Integers,
+        history: int,
+        substeps: int,
+        memory: Array,
+        rows: Integers,
+        out: Array,
+    ) -> None:
+        """As `plant.kernel.rollout_batch`: block b plays segment `which[b]` with memory[b] into out[b]."""
+        for b, segment in enumerate(which):
+            length = int(lengths[segment])
+            self.rollout(commands[segment], history, substeps, memory[b], rows, out[b, :length])
+
+    def close(self) -> None:
+        """Ends the physics server."""
+        if pybullet.isConnected(self._client):
+            pybullet.disconnect(self._client)
+
+    def _prepared(self, memory: Array) -> Array:
+        """A copy that drives Bullet: targets reach the controller unfiltered, offsets sit in the joints' frames."""
+        plant, memory = self.plant, memory.copy()
+        for key, value in (("time_constant", 0.0), ("rate_limit", _OFF), ("command_torque_limit", _OFF)):
+            plant.view(memory, key)[:] = value
+        _fold_offsets(plant, memory)
+        inertia = np.maximum(plant.view(memory, "reflected_inertia")[list(plant.topology.follow)], LEAST_INERTIA)
+        plant.view(memory, "spin_inertia")[0] = np.where(plant.topology.prismatic, 0.0, 0.5 * inertia)
+        plant.view(memory, "tendon_stiffness")[:] = TENDON_STIFFNESS
+        plant.view(memory, "tendon_damping")[:] = TENDON_DAMPING
+        return memory
+
+    def _place(self, memory: Array) -> tuple[Array, Array]:
+        """Puts Bullet's joints where the memory says; gives positions and speeds of all dofs (N,)."""
+        self._load(memory)
+        view, topology = self.plant.view, self.plant.topology
+        follow = list(topology.follow)
+        q = view(memory, "ratio")[0] * view(memory, "q")[follow] + view(memory, "offset")[0]
+        v = view(memory, "ratio")[0] * view(memory, "v")[follow]
+        for k in range(len(follow)):
+            pybullet.resetJointState(self._body, k, q[k], v[k], physicsClientId=self._client)
+        pybullet.setGravity(*view(memory, "engine_gravity")[0], physicsClientId=self._client)
+        return q, v
+
+    def _load(self, memory: Array) -> None:
+        """Loads the mechanism into Bullet if its numbers have changed."""
+        numbers = {key: self.plant.view(memory, key)[0].copy() for key in _NUMBERS}
+        spin = self.plant.view(memory, "spin_inertia")[0]
+        fingerprint = b"".join(value.tobytes() for value in (*numbers.values(), spin))
+        if fingerprint == self._loaded:
+            return
+        if self._body >= 0:
+            pybullet.removeBody(self._body, physicsClientId=self._client)
+        outer = numbers["axis"][:, :, None] * numbers["axis"][:, None, :]
+        moments, axes = np.linalg.eigh(numbers["inertia"] + spin[:, None, None] * outer)
+        axes *= np.linalg.det(axes)[:, None, None]
+        topology = self.plant.topology
+        urdf = tree_urdf(numbers, topology.parent, topology.prismatic, axes)
+        self._body = load_chain(self._client, urdf, np.zeros(3), np.eye(3))
+        self._check_order()
+        for k, diagonal in enumerate(moments):
+            pybullet.changeDynamics(self._body, k, localInertiaDiagonal=diagonal.tolist(), physicsClientId=self._client)
+        self._loaded = fingerprint
+
+    def _check_order(self) -> None:
+        count = pybullet.getNumJoints(self._body, physicsClientId=self._client)
+        names = [pybullet.getJointInfo(self._body, k, physicsClientId=self._client)[1].decode() for k in range(count)]
+        if names != [f"joint{k}" for k in range(count)]:
+            raise InputError("this rig's joints branch in an order that PyBullet changes; list them branch by branch")
+
+
+def _fold_offsets(plant: Plant, memory: Array) -> None:
+    """Moves the offsets of actuated joints into their frames: Bullet counts joint positions as the drivetrain does."""
+    offset = plant.view(memory, "offset")[0]
+    rotation, translation = plant.view(memory, "placement_rotation")[0], plant.view(memory, "placement_translation")[0]
+    axis = plant.view(memory, "axis")[0]
+    for k in plant.topology.leader:
+        if plant.topology.prismatic[k]:
+            translation[k] += rotation[k] @ axis[k] * offset[k]
+        else:
+            rotation[k] = rotation[k] @ Rotation.from_rotvec(axis[k] * offset[k]).as_matrix()
+        offset[k] = 0.0
