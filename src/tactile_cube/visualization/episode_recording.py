@@ -18,7 +18,7 @@ from tactile_cube.hand import DLR_HAND2, HandModel, hand_urdf
 from tactile_cube.visualization.blueprint import TIMELINE, episode_blueprint
 from tactile_cube.visualization.scene import FACE_COLOURS, FACE_NORMALS, STICKER, STICKER_HEIGHT
 
-ARROW_LENGTH = 0.02
+ARROW_LENGTH = 0.03
 """Length of a contact arrow [m/N]."""
 POSE_RATE = 50.0
 """Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""

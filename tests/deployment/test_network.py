@@ -1,0 +1,45 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.policy_file import PolicyInfo, save_policy
+from tactile_cube.deployment.network import read_network
+from tactile_cube.errors import InputError
+
+
+@pytest.fixture
+def policy(tmp_path: Path) -> tuple[Path, Actor]:
+    torch.manual_seed(0)
+    actor = Actor(Sizes(120, 0, 12), (512, 512))
+    save_policy(tmp_path / "policy.safetensors", actor, PolicyInfo.describe(actor, time_constant=0.5))
+    return tmp_path / "policy.safetensors", actor
+
+
+def test_numpy_and_torch_give_the_same_action(policy: tuple[Path, Actor]) -> None:
+    path, actor = policy
+    observation = np.random.default_rng(1).normal(0.0, 0.5, (50, 120)).astype(np.float32)
+    with torch.no_grad():
+        expected = actor.deterministic(torch.from_numpy(observation)).numpy()
+    np.testing.assert_allclose(read_network(path)(observation), expected, atol=2e-6)
+
+
+def test_metadata_comes_along(policy: tuple[Path, Actor]) -> None:
+    network = read_network(policy[0])
+    assert (network.observation_size, network.action_size) == (120, 12)
+    assert network.info["time_constant"] == 0.5
+
+
+@pytest.mark.parametrize("keep", [0, 10, 1000])
+def test_damaged_files_are_refused_by_name(policy: tuple[Path, Actor], keep: int) -> None:
+    policy[0].write_bytes(policy[0].read_bytes()[:keep])
+    with pytest.raises(InputError, match=r"policy\.safetensors"):
+        read_network(policy[0])
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such policy file"):
+        read_network(tmp_path / "policy.safetensors")

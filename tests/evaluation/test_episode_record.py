@@ -1,0 +1,34 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.episode_record import ARRAY_FIELDS, CONTACT_FIELDS, EpisodeRecord
+from tests.evaluation.synthetic import episode
+
+
+def test_a_saved_record_comes_back_unchanged(tmp_path: Path) -> None:
+    record = episode(steps=5)
+    record.save(tmp_path / "episode.npz")
+    loaded = EpisodeRecord.load(tmp_path / "episode.npz")
+    for name in ARRAY_FIELDS:
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(record, name))
+    for name in CONTACT_FIELDS:
+        np.testing.assert_array_equal(getattr(loaded.contacts, name), getattr(record.contacts, name))
+    assert (loaded.ending, loaded.direction, loaded.constants) == (record.ending, record.direction, record.constants)
+    assert loaded.reward_terms.keys() == record.reward_terms.keys()
+    assert loaded.trace.keys() == record.trace.keys()
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip file", b"PK\x03\x04 cut off"])
+def test_a_damaged_record_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "episode.npz"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"episode\.npz"):
+        EpisodeRecord.load(path)
+
+
+def test_a_missing_record_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere\.npz"):
+        EpisodeRecord.load(tmp_path / "nowhere.npz")

@@ -1,0 +1,21 @@
+from pathlib import Path
+
+import pytest
+
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.policy_path import policy_path
+
+
+def test_a_run_folder_means_its_latest_policy(tmp_path: Path) -> None:
+    (tmp_path / "policy.safetensors").touch()
+    assert policy_path(str(tmp_path)) == tmp_path / "policy.safetensors"
+
+
+def test_an_empty_run_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="first checkpoint"):
+        policy_path(str(tmp_path))
+
+
+def test_an_unknown_policy_is_refused_with_the_choices() -> None:
+    with pytest.raises(InputError, match=r"policy=nobody.*hold, random, scripted"):
+        policy_path("nobody")

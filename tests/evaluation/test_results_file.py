@@ -1,0 +1,33 @@
+from pathlib import Path
+
+import pytest
+
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.evaluation import VariantResult
+from tactile_cube.evaluation.policies import HoldPolicy
+from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.protocol import Protocol
+from tactile_cube.evaluation.results_file import Run, read_results, write_results
+from tactile_cube.evaluation.summary import summarise
+from tactile_cube.evaluation.variant import Variant
+from tactile_cube.evaluation.verdict import judge
+from tests.evaluation.synthetic import episode
+
+
+def test_results_come_back_with_every_episode(tmp_path: Path) -> None:
+    results = [judge(episode(angle=angle), number) for number, angle in enumerate((5.0, 2.0))]
+    variant = VariantResult(Variant(), results, summarise(results, 0.8), 0.8)
+    run = Run(Protocol("paper", success_share=0.8), PolicySource(HoldPolicy(), "hold"), 4, "python -m x", 0.1)
+    write_results(tmp_path / "results.json", run, [variant])
+    data = read_results(tmp_path / "results.json")
+    assert (data["protocol"], data["policy"]["label"], data["seed"]) == ("paper", "hold", 4)
+    assert [row["success"] for row in data["variants"][0]["episodes"]] == [True, False]
+    assert data["variants"][0]["summary"]["best_angle"] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"format": "something else"}', "{"])
+def test_other_files_are_refused_by_name(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "results.json"
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"results\.json"):
+        read_results(path)

@@ -1,0 +1,112 @@
+"""Whole episodes in the real world, short ones."""
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from torchrl.envs import TransformedEnv
+
+from tactile_cube.env import Task
+from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.evaluation import Evaluation
+from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy, action_of
+from tactile_cube.evaluation.protocol import Protocol
+from tactile_cube.evaluation.replay import NearlyEqualStart
+from tactile_cube.evaluation.rollout import run_episode
+from tactile_cube.evaluation.scripted import ScriptedPolicy
+from tactile_cube.evaluation.variant import Pull
+from tactile_cube.evaluation.verdict import Verdict
+from tactile_cube.hand import DLR_HAND2
+from tactile_cube.randomization import Randomization, Uniform
+from tactile_cube.simulation import SimulationOptions
+from tactile_cube.transforms import EnvConfig, make_env
+
+CONFIG = EnvConfig(
+    Task("full", episode_steps=15),
+    randomization=Randomization(joint_offset=Uniform(-0.01, 0.01), sensor_noise=0.002, sticky_probability=0.1),
+    simulation=SimulationOptions(trace=True),
+)
+
+
+@pytest.fixture(scope="module")
+def env() -> Iterator[TransformedEnv]:
+    made = make_env(CONFIG, 1, 0, evaluation=True)
+    yield made
+    made.close()
+
+
+def test_equal_seeds_give_equal_episodes_and_others_do_not(env: TransformedEnv) -> None:
+    first, other, again = (run_episode(env, RandomPolicy(), seed) for seed in (3, 4, 3))
+    np.testing.assert_array_equal(first.joint_position, again.joint_position)
+    np.testing.assert_array_equal(first.cube_quaternion, again.cube_quaternion)
+    np.testing.assert_array_equal(first.target, again.target)
+    assert not np.array_equal(first.target, other.target)
+
+
+def test_the_record_is_complete(env: TransformedEnv) -> None:
+    record = run_episode(env, HoldPolicy(), 0)
+    assert record.steps == 15
+    assert record.ending == "time_limit"
+    assert len(record.trace["q"]) == 15 * 50
+    np.testing.assert_allclose(np.diff(record.trace["time"]), 0.002, atol=1e-9)
+    np.testing.assert_allclose(record.trace["q"][-1], record.joint_position[-1], atol=2e-3)
+    np.testing.assert_allclose(sum(record.reward_terms.values()), record.reward, rtol=1e-4, atol=1e-4)
+    assert set(record.contacts.finger.tolist()) == {0, 1, 2, 3}
+
+
+def test_contact_forces_of_a_held_cube_carry_its_weight(env: TransformedEnv) -> None:
+    held = make_env(dataclasses.replace(CONFIG, randomization=Randomization()), 1, 0, evaluation=True)
+    record = run_episode(held, HoldPolicy(), 0)
+    held.close()
+    last = record.contacts.step == record.steps
+    total = record.contacts.force[last].sum(axis=0)
+    np.testing.assert_allclose(total[2], 0.05 * 9.81, atol=0.1)
+    np.testing.assert_allclose(total[:2], 0.0, atol=0.15)
+
+
+def test_replaying_an_undisturbed_episode_repeats_it() -> None:
+    undisturbed = dataclasses.replace(CONFIG.randomization, sticky_probability=0.0)
+    quiet = make_env(dataclasses.replace(CONFIG, randomization=undisturbed), 1, 0, evaluation=True)
+    original = run_episode(quiet, RandomPolicy(), 5)
+    replayed = run_episode(quiet, ReplayPolicy(original.target), 5)
+    displaced = run_episode(quiet, ReplayPolicy(original.target), 5, NearlyEqualStart(1))
+    quiet.close()
+    np.testing.assert_allclose(replayed.cube_position, original.cube_position, atol=1e-4)
+    assert 1e-5 < np.abs(displaced.cube_position - original.cube_position).max() < 0.02
+
+
+def test_a_pulled_finger_gives_way_and_is_let_go(env: TransformedEnv) -> None:
+    pulled = run_episode(env, HoldPolicy(), 0, Pull("thumb", 2.0, start=0.5, duration=0.5))
+    still = run_episode(env, HoldPolicy(), 0)
+    moved = np.abs(pulled.joint_position - still.joint_position)
+    assert moved[:6].max() == 0.0
+    assert moved[8:11, 9:].max() > 0.05
+    assert moved[8:11, :9].max() < moved[8:11, 9:].max()
+
+
+def test_scripted_gait_is_deterministic_and_bounded(env: TransformedEnv) -> None:
+    record = run_episode(env, ScriptedPolicy(), 0)
+    assert isinstance(record, EpisodeRecord)
+    slack = 0.011  # the joint offset
+    assert np.all(record.target >= DLR_HAND2.action_lower - slack)
+    assert np.all(record.target <= DLR_HAND2.action_upper + slack)
+
+
+def test_actions_and_angles_are_inverse() -> None:
+    angles = np.random.default_rng(0).uniform(DLR_HAND2.action_lower, DLR_HAND2.action_upper)
+    action = action_of(DLR_HAND2, angles)
+    half_range = 0.5 * (DLR_HAND2.action_upper - DLR_HAND2.action_lower)
+    np.testing.assert_allclose(DLR_HAND2.action_lower + half_range * (action + 1.0), angles)
+
+
+def test_an_evaluation_judges_and_repeats_its_episodes() -> None:
+    evaluation = Evaluation(CONFIG, HoldPolicy(), Protocol("x", episodes=2, seconds=1.0, replay=True), seed=1)
+    seen: list[str] = []
+    nominal, replay = evaluation.run(lambda name, result: seen.append(name))
+    assert [result.verdict for result in nominal.results] == [Verdict.HOLDING] * 2
+    assert [result.seed for result in nominal.results] == [10_000, 10_001]
+    assert len(seen) == len(nominal.results) + len(replay.results) == 4
+    record = evaluation.record(nominal.variant, nominal.results[1])
+    assert record.theta[-1] == nominal.results[1].final_angle
+    assert record.steps == 10

@@ -1,0 +1,60 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.env import Task
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.variant import Pull, Variant, typical_effects
+from tactile_cube.randomization import Randomization, Uniform
+from tactile_cube.transforms import EnvConfig
+
+
+def config() -> EnvConfig:
+    randomization = Randomization(
+        values={"tip_friction": Uniform(0.8, 1.0)}, shifts={"cube_mass": Uniform(-0.005, 0.005)}
+    )
+    return EnvConfig(Task("full"), randomization=randomization)
+
+
+def test_the_nominal_variant_changes_nothing() -> None:
+    before, after = config(), Variant().apply(config())
+    assert after.randomization == before.randomization
+    assert after.simulation == before.simulation
+    assert list(after.effects) == []
+
+
+def test_a_varied_constant_is_no_longer_replaced_by_the_randomisation() -> None:
+    changed = Variant(constants={"tip_friction": 0.4, "cube_mass": 0.2}).apply(config())
+    drawn = changed.randomization.constants(changed.constants, np.random.default_rng(0))
+    assert drawn.tip_friction == 0.4
+    assert 0.195 <= drawn.cube_mass <= 0.205
+
+
+def test_a_cuboid_keeps_its_shape() -> None:
+    changed = Variant(constants={"cube_size": [0.09, 0.08, 0.08]}).apply(config())
+    np.testing.assert_allclose(changed.constants.cube_size, [0.09, 0.08, 0.08])
+
+
+def test_solver_settings_are_replaced() -> None:
+    changed = Variant(simulation={"dt": 0.001, "substeps": 100}).apply(config())
+    assert changed.simulation == dataclasses.replace(config().simulation, dt=0.001, substeps=100)
+
+
+@pytest.mark.parametrize("group", ["constants", "simulation"])
+def test_unknown_keys_are_refused(group: str) -> None:
+    with pytest.raises(InputError, match=f"{group}.weight is unknown"):
+        Variant(**{group: {"weight": 1.0}})
+
+
+def test_a_pull_at_an_unknown_finger_is_refused() -> None:
+    with pytest.raises(InputError, match="little"):
+        Pull("little", 1.0)
+
+
+@pytest.mark.parametrize("name", sorted(catalogue()))
+def test_every_effect_of_the_catalogue_has_a_typical_size(name: str) -> None:
+    effects = typical_effects(name)
+    assert effects
+    assert all(type(effect).name == name for effect in effects)

@@ -1,0 +1,50 @@
+import json
+
+import numpy as np
+import pytest
+
+from tactile_cube.evaluation.verdict import Verdict, judge, verdict
+from tests.evaluation.synthetic import episode
+
+
+@pytest.mark.parametrize(
+    ("angle", "changes", "lost", "expected"),
+    [
+        (5.0, 8, False, Verdict.REGRASPING),
+        (2.5, 1, False, Verdict.STUCK_TWISTED),
+        (1.5, 4, False, Verdict.STUCK_TWISTED),
+        (0.3, 4, False, Verdict.HOLDING),
+        (-2.0, 0, False, Verdict.HOLDING),
+        (1.8, 0, True, Verdict.SPUN_AND_DROPPED),
+        (6.0, 9, True, Verdict.DROPPED),
+        (0.1, 0, True, Verdict.DROPPED),
+    ],
+)
+def test_verdicts_follow_their_definitions(angle: float, changes: int, lost: bool, expected: Verdict) -> None:
+    assert verdict(angle, changes, lost=lost) == expected
+
+
+def test_judging_a_regrasping_episode() -> None:
+    result = judge(episode(angle=5.0), episode=3, seed=17)
+    assert (result.episode, result.seed, result.verdict) == (3, 17, Verdict.REGRASPING)
+    assert result.final_angle == pytest.approx(5.0)
+    assert result.duration == pytest.approx(10.0)
+    assert result.face_changes == (3, 3, 3, 3)
+    assert result.faces_visited == (4, 4, 4, 4)
+    assert result.kept
+
+
+def test_judging_fingers_that_twist_with_the_cube() -> None:
+    assert judge(episode(angle=1.6, carried=True)).verdict == Verdict.STUCK_TWISTED
+
+
+@pytest.mark.parametrize("ending", ["dropped", "left_range", "tilted", "lifted", "faulty"])
+def test_every_early_ending_loses_the_cube(ending: str) -> None:
+    result = judge(episode(angle=1.6, carried=True, ending=ending))
+    assert result.verdict == Verdict.SPUN_AND_DROPPED
+    assert not result.kept
+
+
+def test_a_result_is_plain_data() -> None:
+    result = judge(episode(steps=10, touch=np.zeros((11, 4), dtype=bool)))
+    assert json.loads(json.dumps(result.as_dict()))["ending"] == "time_limit"

@@ -1,0 +1,43 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tactile_cube.visualization.film import MAX_BYTES, write_film, write_stills
+from tactile_cube.visualization.scene import BELOW, SIDE, Scene
+from tests.evaluation.synthetic import episode
+
+
+def test_a_film_runs_in_real_time_and_stays_small(tmp_path: Path) -> None:
+    path = tmp_path / "film.gif"
+    write_film(episode(steps=40), path, view=96)
+    with Image.open(path) as film:
+        assert film.n_frames == 21
+        assert film.info["duration"] == 200
+    assert path.stat().st_size < MAX_BYTES
+
+
+def test_a_long_episode_is_thinned_out(tmp_path: Path) -> None:
+    write_film(episode(steps=400), tmp_path / "film.gif", view=48)
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames <= 101
+
+
+def test_stills_show_every_kth_step(tmp_path: Path) -> None:
+    write_stills(episode(steps=40), tmp_path / "stills.png", every=10, columns=3, view=64)
+    with Image.open(tmp_path / "stills.png") as sheet:
+        assert sheet.size == (3 * 128, 2 * (64 + 22))
+
+
+@pytest.mark.parametrize("camera", [SIDE, BELOW])
+def test_a_quarter_turn_can_be_seen(camera: object) -> None:
+    """The faces look alike in shape; only their colours tell a quarter turn from none."""
+    record = episode()
+    scene = Scene(record.cube_size)
+    pictures = []
+    for angle in (0.0, np.pi / 2):
+        scene.pose(record.joint_position[0], np.zeros(3), np.array([0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]))
+        pictures.append(np.asarray(scene.picture(camera, 64, 64), dtype=float))  # type: ignore[arg-type]
+    scene.close()
+    assert np.mean(np.abs(pictures[0] - pictures[1]).max(axis=2) > 40) > 0.02
