@@ -67,6 +67,12 @@ class RotationEnv:
     Every episode draws from a generator of its own, made of the seed, the world's index and the episode's number, so
     that what happens in it depends on nothing else.
 
+    Attributes:
+        world: what simulates.
+        constants: constants of the running episode.
+        conditions: conditions of the next episode.
+        target: q_n of the last step `(12,)` [rad].
+
     Example:
         >>> env = RotationEnv(World(), Task("table"), Reward(), Randomization(), StartStates().of(DLR_HAND2))
         >>> moment = env.reset()
@@ -100,6 +106,7 @@ class RotationEnv:
         self.start_poses = start
         self.conditions = task.conditions()
         self.constants = self.nominal
+        self.target = np.zeros(JOINTS)
         self.target = np.asarray(hand.start_angles, dtype=np.float64)
         self._middle = 0.5 * (np.asarray(hand.action_lower) + np.asarray(hand.action_upper))
         self._half_range = 0.5 * (np.asarray(hand.action_upper) - np.asarray(hand.action_lower))

@@ -1,0 +1,85 @@
+"""Every option of the configuration groups that define the environment makes an environment that runs."""
+
+import pickle
+from collections.abc import Iterator
+
+import pytest
+from hydra import compose, initialize_config_dir
+from hydra.errors import InstantiationException
+from hydra.utils import instantiate
+
+from tactile_cube.cli import CONFIG
+from tactile_cube.curriculum import LinearCurriculum
+from tactile_cube.env import Reward
+from tactile_cube.errors import InputError
+from tactile_cube.randomization import LogUniform, StartStates
+from tactile_cube.transforms import EnvConfig, make_env
+
+GROUPS = {
+    "task": "table",
+    "reward": "paper",
+    "randomization": "paper",
+    "start": "paper",
+    "exploration": "none",
+    "curriculum": "none",
+}
+OPTIONS = [(group, file.stem) for group in GROUPS for file in sorted((CONFIG / group).glob("*.yaml"))]
+
+
+@pytest.fixture(autouse=True)
+def _configuration() -> Iterator[None]:
+    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+        yield
+
+
+def configured(*settings: str, **options: str) -> EnvConfig:
+    groups = GROUPS | options
+    config = compose(overrides=["+env=rotation", *(f"+{group}={name}" for group, name in groups.items()), *settings])
+    return instantiate(config.env)
+
+
+@pytest.mark.parametrize(("group", "option"), OPTIONS, ids=lambda name: name)
+def test_option_makes_an_environment_that_runs(group: str, option: str) -> None:
+    config = pickle.loads(pickle.dumps(configured(**{group: option})))
+    env = make_env(config, worlds=1, seed=0)
+    data = env.rollout(2)
+    assert not data["next", "faulty"].any()
+    assert set(env.set_progress(3_000_000, 2.5)) == {"T_s", "gravity", "penalty"}
+    env.close()
+
+
+def test_published_options_equal_the_published_defaults_of_the_code() -> None:
+    config = configured(curriculum="linear")
+    assert config.reward == Reward()
+    assert config.start == StartStates()
+    assert config.curriculum == LinearCurriculum()
+    assert (config.randomization.sensor_noise, config.randomization.sticky_probability) == (0.002, 0.1)
+    assert config.stack == 5
+
+
+def test_early_reward_makes_motion_cheap_and_twisted_fingers_dear() -> None:
+    early, paper = configured(reward="early").reward, Reward()
+    for term in ("height", "plane", "tilt"):
+        assert getattr(early, term) == pytest.approx(0.2 * getattr(paper, term))
+    assert (early.spin, early.proximal, early.leaving) == (16, 40, 10)
+
+
+def test_followup_has_the_published_spinning_friction_and_forces() -> None:
+    values = configured(randomization="followup").randomization.values
+    assert values["tip_spinning_friction"] == LogUniform(2e-4, 2e-2)
+    assert (values["force_mean"].value, values["force_std"].value) == (0.04, 0.008)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("task.filter_time=-0.1", r"task\.filter_time is -0\.1"),
+        ("randomization.sticky_probability=2", r"randomization\.sticky_probability is 2"),
+        ("+randomization.factors.kpp={_target_: tactile_cube.randomization.Constant, value: 1}", "no such constant"),
+        ("env.stack=0", r"env\.stack is 0"),
+    ],
+)
+def test_impossible_setting_is_refused_with_its_name(setting: str, message: str) -> None:
+    with pytest.raises(InstantiationException, match=message) as caught:
+        configured(setting)
+    assert isinstance(caught.value.__cause__, InputError)
