@@ -8,26 +8,30 @@ from tests.evaluation.synthetic import episode
 
 
 @pytest.mark.parametrize(
-    ("angle", "changes", "lost", "expected"),
+    ("angle", "late", "changes", "lost", "expected"),
     [
-        (5.0, 8, False, Verdict.REGRASPING),
-        (2.5, 1, False, Verdict.STUCK_TWISTED),
-        (1.5, 4, False, Verdict.STUCK_TWISTED),
-        (0.3, 4, False, Verdict.HOLDING),
-        (-2.0, 0, False, Verdict.HOLDING),
-        (1.8, 0, True, Verdict.SPUN_AND_DROPPED),
-        (6.0, 9, True, Verdict.DROPPED),
-        (0.1, 0, True, Verdict.DROPPED),
+        (5.0, 2.0, 8, False, Verdict.REGRASPING),
+        (2.5, 1.0, 1, False, Verdict.STUCK_TWISTED),
+        (1.5, 1.0, 4, False, Verdict.STUCK_TWISTED),
+        (2.2, 0.0, 4, False, Verdict.STUCK_TWISTED),
+        (0.3, 0.1, 4, False, Verdict.HOLDING),
+        (-2.0, -1.0, 0, False, Verdict.HOLDING),
+        (1.8, 0.5, 0, True, Verdict.SPUN_AND_DROPPED),
+        (6.0, 2.0, 9, True, Verdict.DROPPED),
+        (0.1, 0.0, 0, True, Verdict.DROPPED),
     ],
 )
-def test_verdicts_follow_their_definitions(angle: float, changes: int, lost: bool, expected: Verdict) -> None:
-    assert verdict(angle, changes, lost=lost) == expected
+def test_verdicts_follow_their_definitions(
+    angle: float, late: float, changes: int, lost: bool, expected: Verdict
+) -> None:
+    assert verdict(angle, late, changes, lost=lost) == expected
 
 
 def test_judging_a_regrasping_episode() -> None:
     result = judge(episode(angle=5.0), episode=3, seed=17)
     assert (result.episode, result.seed, result.verdict) == (3, 17, Verdict.REGRASPING)
     assert result.final_angle == pytest.approx(5.0)
+    assert result.late_angle == pytest.approx(2.0)
     assert result.duration == pytest.approx(10.0)
     assert result.face_changes == (3, 3, 3, 3)
     assert result.faces_visited == (4, 4, 4, 4)

@@ -90,8 +90,8 @@ def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float
 
 
 HEADER = (
-    f"{'run':>4} {'angle':>8} {'time':>7}  {'verdict':<17}{'ending':<12}{'lifts':>6}{'faces':>9}{'tilt':>7}"
-    "  exploits    (angle [rad], time [s], tilt [deg])"
+    f"{'run':>4} {'angle':>8} {'late':>6} {'time':>7}  {'verdict':<17}{'ending':<12}{'lifts':>6}{'faces':>9}{'tilt':>7}"
+    "  exploits   (angle, and late: its part in the last 40 % [rad]; time [s]; tilt [deg])"
 )
 
 
@@ -99,7 +99,7 @@ def row(result: EpisodeResult, name: str = "nominal") -> str:
     """Return an episode as a line of text; the variant's name is added when it is not the nominal one."""
     faces = "/".join(str(count) for count in result.faces_visited)
     return (
-        f"{result.episode:4d} {result.final_angle:8.2f} {result.duration:7.1f}  {result.verdict.value:<17}"
+        f"{result.episode:4d} {result.final_angle:8.2f} {result.late_angle:6.2f} {result.duration:7.1f}  {result.verdict.value:<17}"
         f"{result.ending:<12}{sum(result.finger_lifts):6d}{faces:>9}{math.degrees(result.max_tilt):7.1f}"
         f"  {', '.join(result.exploits) or '-'}{'' if name == 'nominal' else f'   [{name}]'}"
     )

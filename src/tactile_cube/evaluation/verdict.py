@@ -21,14 +21,20 @@ STILL_ANGLE = 0.5
 REGRASP_FACE_CHANGES = 2
 """Moves of a finger to another side face that a regrasping episode shows at least."""
 
+LATE_SHARE = 0.4
+"""The last part of an episode, in which a hand that regrasps still turns the cube."""
+LATE_ANGLE = 0.25
+"""Angle that must be gained in this part [rad]; less means that the hand has come to rest."""
+
 
 class Verdict(StrEnum):
     """What an episode was.
 
-    - `regrasping`: kept the cube, turned it beyond `REGRASP_ANGLE`, and fingers moved to new faces at least
-      `REGRASP_FACE_CHANGES` times.
+    - `regrasping`: kept the cube, turned it beyond `REGRASP_ANGLE` and was still turning it at the end (`LATE_ANGLE`),
+      and fingers moved to new faces at least `REGRASP_FACE_CHANGES` times.
     - `holding`: kept the cube and turned it by less than `STILL_ANGLE`.
-    - `stuck_twisted`: kept the cube and turned it, without regrasping: the paper's failure (a).
+    - `stuck_twisted`: kept the cube, turned it and came to rest, or never regrasped: the paper's failure (a). With a wide
+      range of start yaws a single twist and a half can exceed `REGRASP_ANGLE`; the rest gives it away.
     - `spun_and_dropped`: lost the cube after turning it by more than `STILL_ANGLE` without regrasping: failure (c).
     - `dropped`: lost the cube in any other way, be it before turning it or after regrasps.
     """
@@ -48,6 +54,7 @@ class EpisodeResult:
         episode: its number.
         seed: what its start, noise and randomisation were drawn from.
         final_angle: theta at the end, less theta at the start [rad].
+        late_angle: the part of it gained in the last `LATE_SHARE` of the episode [rad].
         duration: time until the end [s].
         ending: why it ended.
         verdict: what it was.
@@ -62,6 +69,7 @@ class EpisodeResult:
     episode: int
     seed: int
     final_angle: float
+    late_angle: float
     duration: float
     ending: str
     verdict: Verdict
@@ -86,14 +94,16 @@ def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResu
     """Reduce an episode to its row."""
     histories = [finger_history(record, finger) for finger in range(len(FINGERS))]
     angle = float(record.theta[-1] - record.theta[0])
+    late = float(record.theta[-1] - record.theta[round((1.0 - LATE_SHARE) * record.steps)])
     changes = tuple(history.face_changes for history in histories)
     return EpisodeResult(
         episode=episode,
         seed=seed,
         final_angle=angle,
+        late_angle=late,
         duration=float(record.time[-1] - record.time[0]),
         ending=record.ending,
-        verdict=verdict(angle, sum(changes), lost=record.cut_short),
+        verdict=verdict(angle, late, sum(changes), lost=record.cut_short),
         finger_lifts=tuple(history.lifts for history in histories),
         face_changes=changes,
         faces_visited=tuple(len(set(history.faces)) for history in histories),
@@ -103,11 +113,11 @@ def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResu
     )
 
 
-def verdict(final_angle: float, face_changes: int, *, lost: bool) -> Verdict:
+def verdict(final_angle: float, late_angle: float, face_changes: int, *, lost: bool) -> Verdict:
     """Apply the definitions of `Verdict`."""
     regrasped = face_changes >= REGRASP_FACE_CHANGES
     if lost:
         return Verdict.SPUN_AND_DROPPED if final_angle > STILL_ANGLE and not regrasped else Verdict.DROPPED
-    if final_angle > REGRASP_ANGLE and regrasped:
+    if final_angle > REGRASP_ANGLE and late_angle > LATE_ANGLE and regrasped:
         return Verdict.REGRASPING
     return Verdict.HOLDING if final_angle < STILL_ANGLE else Verdict.STUCK_TWISTED
