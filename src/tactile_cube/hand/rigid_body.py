@@ -70,7 +70,7 @@ class RigidBodyTree:
         Raises:
             InputError: no tree, an unknown joint, a coupling to a joint that is not actuated, impossible masses.
         """
-        return _assemble(read_movable_joints(text, joints, coupled), joints)
+        return _assemble(*read_movable_joints(text, joints, coupled))
 
     @property
     def dofs(self) -> int:
@@ -105,8 +105,7 @@ class RigidBodyTree:
         return np.asarray(J.T @ M @ J)
 
 
-def _assemble(dofs: list[Joint], order: Sequence[str] | None) -> RigidBodyTree:
-    actuated = tuple(order) if order is not None else tuple(d.name for d in dofs if d.coupling is None)
+def _assemble(dofs: list[Joint], actuated: tuple[str, ...]) -> RigidBodyTree:
     leaders = [actuated.index(d.coupling.joint if d.coupling else d.name) for d in dofs]
     index = {d.link: k for k, d in enumerate(dofs)}
     _check_masses(dofs)

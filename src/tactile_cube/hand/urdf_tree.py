@@ -85,8 +85,11 @@ class Joint:
 
 def read_movable_joints(
     text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Coupling] | None = None
-) -> list[Joint]:
-    """The joints that move, parents before children; see `RigidBodyTree.from_urdf` for the arguments."""
+) -> tuple[list[Joint], tuple[str, ...]]:
+    """The joints that move, parents before children, and the names of the actuated ones in order.
+
+    See `RigidBodyTree.from_urdf` for the arguments.
+    """
     robot = _robot(text)
     bodies = {_attribute(link, "name", "a link"): _body(link) for link in robot.findall("link")}
     every = [_joint(element, bodies) for element in robot.findall("joint")]
@@ -94,8 +97,9 @@ def read_movable_joints(
         _refuse_unknown(coupled, every)
         every = [replace(j, coupling=coupled[j.name]) if j.name in coupled else j for j in every]
     actuated = _actuated(every, joints)
+    _check_couplings(every)
     every = [j if _moves(j, actuated) else replace(j, kind="fixed") for j in every]
-    return _merge_fixed(_parents_first(every, bodies))
+    return _merge_fixed(_parents_first(every, bodies)), actuated
 
 
 def _robot(text: str) -> ElementTree.Element:
@@ -160,6 +164,16 @@ def _actuated(every: list[Joint], joints: Sequence[str] | None) -> tuple[str, ..
         if joint.name in names and joint.coupling is not None:
             raise InputError(f"joint '{joint.name}' is actuated and follows '{joint.coupling.joint}'; choose one")
     return names
+
+
+def _check_couplings(every: list[Joint]) -> None:
+    leaders = {j.name for j in every if j.kind != "fixed" and j.coupling is None}
+    for joint in every:
+        if joint.coupling is not None and joint.coupling.joint not in leaders:
+            raise InputError(
+                f"joint '{joint.name}' follows '{joint.coupling.joint}', which is no movable joint of its own; name one of "
+                f"{', '.join(sorted(leaders)) or 'none'}"
+            )
 
 
 def _moves(joint: Joint, actuated: tuple[str, ...]) -> bool:
