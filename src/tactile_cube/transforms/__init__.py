@@ -7,7 +7,6 @@ from tactile_cube.transforms.observation_stack import ObservationStack
 from tactile_cube.transforms.privileged_state import PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
-from tactile_cube.transforms.transitions import transitions
 
 __all__ = [
     "EnvConfig",
@@ -20,5 +19,4 @@ __all__ = [
     "StickyAction",
     "make_env",
     "rotation_env",
-    "transitions",
 ]
