@@ -8,7 +8,9 @@ from tactile_cube.measurement.regimes import Regime
 WORTH_SAYING = 1.5  # error / noise floor of a joint below which nothing is said
 STANDS_OUT = 1.25  # error of a regime / error of the joint
 ONE_SIDED = 0.5  # |mean| / RMS above which an error has a direction
-PLACES = ("reversal", "speed", "load", "posture", "time", "neighbours", "direction", "kind")
+RARE = 0.01  # share of the samples below which a regime is no place to point at
+PLACES = ("reversal", "speed", "load", "posture", "time", "direction")
+COMPANY = ("kind", "neighbours")
 
 
 def where_it_fails(table: Sequence[Regime], errors: dict[str, float], floor: NoiseFloor) -> list[str]:
@@ -19,24 +21,26 @@ def where_it_fails(table: Sequence[Regime], errors: dict[str, float], floor: Noi
 
 def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor) -> str:
     ratio = error / floor.joints[joint]
+    size = f"({ratio:.2g} times the noise floor)"
     if ratio < WORTH_SAYING:
-        return f"{joint} follows the model: {1e3 * error:.2g} mrad, {ratio:.2g} times the noise floor"
-    outstanding = sorted((r for r in rows if r.error > STANDS_OUT * error), key=lambda r: -r.error)
-    places: list[Regime] = []
-    for row in outstanding:
-        if row.dimension not in {place.dimension for place in places} and row.dimension != "kind":
-            places.append(row)
-    kinds = [row for row in outstanding if row.dimension == "kind"]
-    if not places and not kinds:
-        return f"{joint} {_verb(rows, error)} everywhere, {1e3 * error:.2g} mrad ({ratio:.2g} times the noise floor)"
-    first, second = ((places + kinds) + [None])[:2] if places else (kinds[0], None)
-    where = _place(first)
-    also = (
-        f", most in {_place(second)}"
-        if second is not None and second.dimension == "kind"
-        else (f", {_place(second)}" if second is not None else "")
-    )
-    return f"{joint} {_verb([first], error)} {where}, {1e3 * first.error:.2g} mrad{also} ({ratio:.2g} times the noise floor)"
+        return f"{joint} follows the model: {1e3 * error:.2g} mrad {size}"
+    standing_out = [row for row in rows if row.error > STANDS_OUT * error and row.share > RARE]
+    places = _worst_of_each(standing_out, PLACES)[:2] or _worst_of_each(standing_out, COMPANY)[:1]
+    if not places:
+        return f"{joint} {_verb(rows, error)} everywhere, {1e3 * error:.2g} mrad {size}"
+    first, more = places[0], "".join(f", {_place(row)}" for row in places[1:])
+    kind = next((row for row in _worst_of_each(standing_out, ("kind",)) if row is not first), None)
+    mostly = f", most of all in {kind.regime}" if kind is not None else ""
+    return f"{joint} {_verb([first], error)} {_place(first)}, {1e3 * first.error:.2g} mrad{more}{mostly} {size}"
+
+
+def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime]:
+    """The worst regime of each dimension, the worst first."""
+    chosen: dict[str, Regime] = {}
+    for row in sorted(rows, key=lambda row: -row.error):
+        if row.dimension in dimensions:
+            chosen.setdefault(row.dimension, row)
+    return list(chosen.values())
 
 
 def _verb(rows: list[Regime], error: float) -> str:
@@ -54,8 +58,10 @@ def _verb(rows: list[Regime], error: float) -> str:
 def _place(row: Regime) -> str:
     if row.dimension in ("speed", "load"):
         return f"at {row.regime}"
-    if row.dimension in ("posture", "time", "kind"):
+    if row.dimension in ("posture", "time"):
         return f"in the {row.regime}"
+    if row.dimension == "kind":
+        return f"in {row.regime}"
     if row.dimension == "neighbours":
         return f"with {row.regime}"
     return row.regime

@@ -26,7 +26,7 @@ class Regime:
         regime: which part of the dimension, in words.
         error: RMS [rad].
         bias: mean of measured - simulated [rad].
-        lag: mean of measured - simulated in the direction of motion [rad]; negative: the rig is behind the model.
+        lag: mean of measured - simulated in the direction of the latest motion [rad]; negative: the rig stays behind.
         share: part of the joint's samples.
         samples: how many.
     """
@@ -48,6 +48,7 @@ class Samples:
     error: Array
     position: Array
     velocity: Array
+    direction: Array
     torque: Array
     neighbours: Array
     reversed: Mask
@@ -63,6 +64,7 @@ def joint_samples(trials: Sequence[Trial], errors: Sequence[Array], joint: int) 
         error=np.concatenate([error[:, joint] for error in errors]),
         position=np.concatenate([trial.position[:, joint] for trial in trials]),
         velocity=np.concatenate([v[:, joint] for v in velocities]),
+        direction=np.concatenate([latest_direction(v[:, joint]) for v in velocities]),
         torque=np.concatenate([_torque(trial)[:, joint] for trial in trials]),
         neighbours=np.concatenate(others),
         reversed=np.concatenate([after_reversal(v[:, joint], t.step) for t, v in zip(trials, velocities, strict=True)]),
@@ -85,11 +87,17 @@ def regimes(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[s
 
 
 def _row(joint: str, dimension: str, name: str, samples: Samples, mask: Mask) -> Regime:
-    error, velocity = samples.error[mask], samples.velocity[mask]
-    moving = np.abs(velocity) > MOVING
-    lag = float(np.mean(error[moving] * np.sign(velocity[moving]))) if moving.any() else 0.0
+    error = samples.error[mask]
+    lag = float(np.mean(error * samples.direction[mask]))
     rms, bias = float(np.sqrt(np.mean(error**2))), float(error.mean())
     return Regime(joint, dimension, name, rms, bias, lag, float(mask.mean()), int(mask.sum()))
+
+
+def latest_direction(velocity: Array) -> Array:
+    """+1 or -1 by the sign of the latest motion, 0 before the first one."""
+    sign = np.where(np.abs(velocity) > MOVING, np.sign(velocity), 0.0)
+    latest = np.maximum.accumulate(np.where(sign != 0, np.arange(len(sign)), 0))
+    return np.asarray(sign[latest])
 
 
 def after_reversal(velocity: Array, step: float) -> Mask:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, resolve
 from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN, Parameters
 from tactile_cube.measurement.read_out import read_out
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.trial import Trial
+from tactile_cube.simulation.rig import RigWorld
 
 Array = NDArray[np.float64]
 SIGNALS = np.array([MOTOR_POSITION, TORQUE, COMMAND])
@@ -34,9 +36,19 @@ class Simulated:
 
 
 def replay(recording: Recording, parameters: Parameters, engine: Engine, step: float) -> list[Simulated]:
-    """Every trial of a recording simulated freely from its start."""
-    simulator = Replay(recording, [name for name, _ in parameters.effects], step)
-    return simulator.simulate(recording.trials, parameters)
+    """Every trial of a recording simulated freely from its start.
+
+    Args:
+        recording: rig and trials.
+        parameters: the numbers of the simulation.
+        engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
+        step: longest integration step [s].
+    """
+    simulator = Replay(recording, [name for name, _ in parameters.effects], step, engine)
+    try:
+        return simulator.simulate(recording.trials, parameters)
+    finally:
+        simulator.close()
 
 
 def effect_names(model: ModelFile | None) -> list[str]:
@@ -47,14 +59,22 @@ def effect_names(model: ModelFile | None) -> list[str]:
 class Replay:
     """Simulates the trials of a recording in the drivetrain that training uses, joint dynamics in closed form."""
 
-    def __init__(self, recording: Recording, effects: Sequence[str] = (), step: float = 0.002) -> None:
+    def __init__(
+        self, recording: Recording, effects: Sequence[str] = (), step: float = 0.002, engine: Engine = "fast"
+    ) -> None:
         """Build the simulation.
 
         Args:
             recording: rig, controller and trials.
             effects: `NAME@JOINT` of every effect that the parameters may name.
             step: longest integration step [s]; a whole number of steps fits between two samples.
+            engine: `fast` or `pybullet`.
+
+        Raises:
+            InputError: an unknown engine or effect.
         """
+        if engine not in get_args(Engine):
+            raise InputError(f"engine={engine}: unknown; choose one of {', '.join(get_args(Engine))}")
         self.recording = recording
         self.substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
         coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
@@ -67,6 +87,12 @@ class Replay:
             effects=tuple(sorted(classes, key=lambda cls: cls.name)),
             joint_names=recording.joints,
         )
+        self._world = RigWorld(self.plant) if engine == "pybullet" else None
+
+    def close(self) -> None:
+        """End the physics server, if there is one."""
+        if self._world is not None:
+            self._world.close()
 
     def simulate(self, trials: Sequence[Trial], parameters: Parameters) -> list[Simulated]:
         """Each trial simulated from its measured start."""
@@ -76,7 +102,8 @@ class Replay:
         commands = np.stack([self._commands(trial, history, rows.max()) for trial in trials])
         out = np.zeros((len(trials), rows.max(), len(SIGNALS), commands.shape[2]))
         blocks = np.arange(len(trials))
-        self.plant.kernel.rollout_batch(commands, blocks, rows, history, self.substeps, memory, SIGNALS, out)
+        rollout_batch = (self._world or self.plant.kernel).rollout_batch
+        rollout_batch(commands, blocks, rows, history, self.substeps, memory, SIGNALS, out)
         return [self._read(trial, out[b, : rows[b]], parameters) for b, trial in enumerate(trials)]
 
     def _commands(self, trial: Trial, history: int, rows: int) -> Array:

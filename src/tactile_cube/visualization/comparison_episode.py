@@ -1,6 +1,7 @@
 """A comparison as a Rerun recording: the robot in motion, measured and simulated signals, failing stretches marked."""
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,15 @@ from tactile_cube.visualization.comparison_figures import marked
 
 Array = NDArray[np.float64]
 TIMELINE = "time"
-POSE_RATE = 50.0  # [Hz] of the robot's poses; the signals keep their own rate
+POSE_RATE = 50.0  # [Hz] of the robot's poses
+SIGNAL_RATE = 250.0  # [Hz] of the signals at most
 PAUSE = 1.0  # [s] between two trials on the time line
-COLORS = {"command": (140, 140, 140), "measured": (240, 240, 240), "simulated": (80, 150, 255), "failing": (230, 60, 60)}
+COLORS = {
+    "command": (140, 140, 140),
+    "measured": (240, 240, 240),
+    "simulated": (80, 150, 255),
+    "failing": (230, 60, 60),
+}
 
 
 def write_comparison(comparison: Comparison, path: Path, summary: str) -> None:
@@ -104,22 +111,40 @@ def _joint_angle(comparison: Comparison, name: str, angles: Array) -> Array | No
 
 def _log_joint(stream: rr.RecordingStream, comparison: Comparison, index: int, joint: str, starts: list[float]) -> None:
     trials = comparison.recording.trials
-    time = np.concatenate([start + trial.time for start, trial in zip(starts, trials, strict=True)])
-    measured = np.concatenate([trial.position[:, index] for trial in trials])
-    residual = np.concatenate([error[:, index] for error in comparison.residuals])
-    simulated = np.concatenate([one.position[:, index] for one in comparison.simulated])
-    signals = {"measured": measured, "simulated": simulated}
+    stride = max(1, round(comparison.recording.rate / SIGNAL_RATE))
+
+    def joined(parts: Sequence[Array]) -> Array:
+        return np.concatenate([part[::stride] for part in parts])
+
+    time = joined([start + trial.time for start, trial in zip(starts, trials, strict=True)])
+    residual = joined([error[:, index] for error in comparison.residuals])
+    signals = {"measured": joined([trial.position[:, index] for trial in trials])}
+    signals["simulated"] = joined([one.position[:, index] for one in comparison.simulated])
     if not comparison.recording.torque_controlled:
-        signals = {"command": np.concatenate([trial.command[:, index] for trial in trials])} | signals
+        signals = {"command": joined([trial.command[:, index] for trial in trials])} | signals
     failing = np.zeros(len(time), dtype=bool)
     for number, start in enumerate(starts):
         for begin, end in marked(comparison, number, index):
             failing |= (time >= start + begin) & (time <= start + end)
     for name, values in signals.items():
         _send(stream, f"joints/{joint}/angle/{name}", time, values, name, COLORS[name])
-    _send(stream, f"joints/{joint}/angle/failing", time, np.where(failing, measured, np.nan), "failing", COLORS["failing"])
+    _send(
+        stream,
+        f"joints/{joint}/angle/failing",
+        time,
+        np.where(failing, signals["measured"], np.nan),
+        "failing",
+        COLORS["failing"],
+    )
     _send(stream, f"joints/{joint}/error/residual", time, 1e3 * residual, "measured - simulated", COLORS["simulated"])
-    _send(stream, f"joints/{joint}/error/failing", time, np.where(failing, 1e3 * residual, np.nan), "failing", COLORS["failing"])
+    _send(
+        stream,
+        f"joints/{joint}/error/failing",
+        time,
+        np.where(failing, 1e3 * residual, np.nan),
+        "failing",
+        COLORS["failing"],
+    )
 
 
 def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list[float]) -> None:
@@ -134,8 +159,12 @@ def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list
     stream.reset_time()
 
 
-def _send(stream: rr.RecordingStream, entity: str, time: Array, values: Array, name: str, color: tuple[int, ...]) -> None:
-    stream.log(entity, rr.SeriesLines(names=[name], colors=[color], widths=[2.5 if name == "failing" else 1.2]), static=True)
+def _send(
+    stream: rr.RecordingStream, entity: str, time: Array, values: Array, name: str, color: tuple[int, ...]
+) -> None:
+    stream.log(
+        entity, rr.SeriesLines(names=[name], colors=[color], widths=[2.5 if name == "failing" else 1.2]), static=True
+    )
     stream.send_columns(entity, _at(time), rr.Scalars.columns(scalars=values))
 
 

@@ -34,13 +34,15 @@ def residual(comparison: Comparison, trial: int, joint: int) -> str:
 
 
 def band(comparison: Comparison, trial: int, joint: int) -> str:
-    """The measured angle of one joint among the randomised simulations."""
+    """The measured angle of one joint among the randomised simulations, all as differences from the nominal one."""
     one, randomised = comparison.recording.trials[trial], comparison.band
     if randomised is None:
         return ""
-    area = Band("95 % of the simulations", one.time, randomised.low[trial][:, joint], randomised.high[trial][:, joint])
-    line = Line("measured", one.time, one.position[:, joint], MEASURED, 1.2)
-    return line_chart(Axes("time [s]", f"{comparison.recording.joints[joint]} [rad]"), [line], [area])
+    nominal = comparison.simulated[trial].position[:, joint]
+    low, high = (1e3 * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
+    line = Line("measured", one.time, 1e3 * (one.position[:, joint] - nominal), MEASURED, 1.2)
+    axes = Axes("time [s]", f"{comparison.recording.joints[joint]} [mrad]", height=200)
+    return line_chart(axes, [line], [Band("95 % of the simulations", one.time, low, high)])
 
 
 def regime_map(comparison: Comparison) -> str:

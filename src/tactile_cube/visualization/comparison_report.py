@@ -43,7 +43,9 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
 def answer(comparison: Comparison) -> str:
     """The result in one or two sentences."""
     error, floor, ratio = comparison.errors.overall, comparison.floor.overall, comparison.ratio
-    head = f"The simulated joints are {mrad(error)} (RMS) away from the measured ones; {mrad(floor)} would be noise alone."
+    head = (
+        f"The simulated joints are {mrad(error)} (RMS) away from the measured ones; {mrad(floor)} would be noise alone."
+    )
     if ratio <= AT_THE_FLOOR:
         return f"{head} The model is as good as this recording can tell."
     return f"{head} That is {ratio:.2g} times the noise: {comparison.sentences[0]}."
@@ -64,7 +66,9 @@ def _tiles(comparison: Comparison) -> list[Tile]:
         Tile(worst, f"worst joint: {mrad(comparison.errors.joints[worst])}"),
     ]
     if comparison.band is not None:
-        tiles.append(Tile(f"{100 * comparison.band.inside:.0f} %", f"measured inside {comparison.band.simulations} simulations"))
+        tiles.append(
+            Tile(f"{100 * comparison.band.inside:.0f} %", f"measured inside {comparison.band.simulations} simulations")
+        )
     return tiles
 
 
@@ -84,14 +88,19 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
         said = f"a model file: values for {', '.join(model.values) or 'no constant'}; {effects}"
     rows = [
         ("recording", str(recording.folder)),
-        ("joints", ", ".join(recording.joints) + (f" (coupled: {', '.join(recording.coupled)})" if recording.coupled else "")),
+        (
+            "joints",
+            ", ".join(recording.joints) + (f" (coupled: {', '.join(recording.coupled)})" if recording.coupled else ""),
+        ),
         ("trials", f"{len(recording.trials)} of {kinds}; {seconds:.0f} s at {recording.rate:g} Hz"),
         ("robot initialisations", f"{starts}, each with joint offsets of its own"),
         ("simulated with", said),
     ]
     warnings = [Callout(line, "warn") for line in recording.warnings]
-    text = ["The same commands that the rig received were given to the simulation. It started where the rig started and then "
-            "ran freely to the end of each trial: nothing pulls it back to the measurement."]
+    text = [
+        "The same commands that the rig received were given to the simulation. It started where the rig started and then "
+        "ran freely to the end of each trial: nothing pulls it back to the measurement."
+    ]
     return Section("What was compared", text, [Table(("", ""), rows), *warnings])
 
 
@@ -108,8 +117,10 @@ def error_section(comparison: Comparison) -> Section:
         if floor.source == "repeats"
         else "Nothing was repeated, so the noise floor is a guess from the fast part of the signals and the sensor's resolution"
     )
-    text = [f"{source}, together with the error of the simulator's own time step. A perfect model would score 1 in the column "
-            "'error / floor'; a model that scores 3 leaves something out that is three times as large as the noise."]
+    text = [
+        f"{source}, together with the error of the simulator's own time step. A perfect model would score 1 in the column "
+        "'error / floor'; a model that scores 3 leaves something out that is three times as large as the noise."
+    ]
     header = ("joint", "error (RMS)", "noise floor", "error / floor", "of it time step")
     guess = [Callout("The noise floor is a guess: repeat each kind of trial to measure it.", "warn")]
     return Section("How well", text, [Table(header, rows), *(guess if floor.source == "guess" else [])])
@@ -117,9 +128,11 @@ def error_section(comparison: Comparison) -> Section:
 
 def where_section(comparison: Comparison) -> Section:
     """In words, and as a map of joints and regimes."""
-    caption = ("Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A bright cell in a "
-               "pale row is a hint at what is missing: friction shows just after reversals and at low speed, delay and inertia "
-               "at high speed, gravity and springs by posture.")
+    caption = (
+        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A bright cell in a "
+        "pale row is a hint at what is missing: friction shows just after reversals and at low speed, delay and inertia "
+        "at high speed, gravity and springs by posture."
+    )
     blocks = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
     return Section("Where it fails", (), blocks)
 
@@ -133,9 +146,18 @@ def overlay_section(comparison: Comparison) -> Section:
         trial = figures.worst_trial(comparison, joint)
         one = comparison.recording.trials[trial]
         error = comparison.trials[trial].joints[name]
-        blocks.append(Figure(figures.overlay(comparison, trial, joint), f"{name}, its worst trial {one.name} ({one.kind}): {mrad(error)}."))
-        blocks.append(Figure(figures.residual(comparison, trial, joint), "What the simulation did not follow. Shaded red: more "
-                             "than three noise floors."))
+        blocks.append(
+            Figure(
+                figures.overlay(comparison, trial, joint),
+                f"{name}, its worst trial {one.name} ({one.kind}): {mrad(error)}.",
+            )
+        )
+        blocks.append(
+            Figure(
+                figures.residual(comparison, trial, joint),
+                "What the simulation did not follow. Shaded red: more than three noise floors.",
+            )
+        )
     return Section("Measured and simulated", (), blocks)
 
 
@@ -143,23 +165,32 @@ def band_section(comparison: Comparison) -> list[Section]:
     """The measurement among randomised simulations."""
     if comparison.band is None:
         return []
-    text = [f"{comparison.band.simulations} simulations with constants drawn from their ranges. A policy that is trained on these "
-            "ranges has met the real rig if the measured line lies in the band: 95 % of the samples should, and "
-            f"{100 * comparison.band.inside:.0f} % do."]
+    text = [
+        f"{comparison.band.simulations} simulations with constants drawn from their ranges. A policy that is trained on these "
+        "ranges has met the real rig if the measured line lies in the band: 95 % of the samples should, and "
+        f"{100 * comparison.band.inside:.0f} % do."
+    ]
     rows = [(joint, f"{100 * share:.0f} %") for joint, share in comparison.band.joints.items()]
     blocks: list[Figure | Table] = [Table(("joint", "measured samples inside"), rows)]
     for name in list(comparison.errors.joints)[:MOST_OVERLAYS]:
         joint = comparison.recording.joints.index(name)
         trial = figures.worst_trial(comparison, joint)
         trial_name = comparison.recording.trials[trial].name
-        blocks.append(Figure(figures.band(comparison, trial, joint), f"{name} in {trial_name}."))
+        blocks.append(
+            Figure(
+                figures.band(comparison, trial, joint),
+                f"{name} in {trial_name}: difference from the simulation with the central values.",
+            )
+        )
     return [Section("Among randomised simulations", text, blocks)]
 
 
 def test_section(comparison: Comparison) -> Section:
     """Whiteness and cross-correlation tests."""
-    text = ["If nothing is missing, what is left is noise: it neither remembers itself (whiteness) nor goes with any other signal "
-            "(cross-correlation). A free-running simulation integrates every small error, so a short memory is normal."]
+    text = [
+        "If nothing is missing, what is left is noise: it neither remembers itself (whiteness) nor goes with any other signal "
+        "(cross-correlation). A free-running simulation integrates every small error, so a short memory is normal."
+    ]
     memory = [(w.joint, f"{1e3 * w.correlation_time:.0f} ms", _p(w.p_value)) for w in comparison.whiteness]
     strongest = [
         (f"{c.joint} residual", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", _p(c.p_value))
@@ -177,7 +208,9 @@ def next_section(comparison: Comparison, model_path: str | None) -> Section:
     folder = comparison.recording.folder
     model = f" model={model_path}" if model_path else ""
     if comparison.ratio <= AT_THE_FLOOR:
-        said = "Nothing is missing at this noise. Check the same model on a recording of other motions, or train with it:"
+        said = (
+            "Nothing is missing at this noise. Check the same model on a recording of other motions, or train with it:"
+        )
         command = f"python -m tactile_cube.train +experiment=finetune{model or ' model=MODEL.yaml'}"
     else:
         said = "Something is missing. Ask which physical effect it is:"

@@ -21,17 +21,23 @@ class Figure:
     @property
     def drawing(self) -> Markup:
         """The SVG, to be put into the page as it is."""
-        return Markup(self.svg)  # noqa: S704 - written by visualization.svg, which escapes its texts
+        return Markup(self.svg)
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table; numbers are right-aligned."""
+    """A table; columns of numbers are right-aligned."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     caption: str = ""
     kind: Literal["table"] = "table"
+
+    @property
+    def classes(self) -> list[str]:
+        """Style of each column: `number` where every cell begins like a number."""
+        columns = list(zip(*self.rows, strict=True)) or [() for _ in self.header]
+        return ["number" if all(cell[:1] in "+-<0123456789" for cell in column) else "text" for column in columns]
 
 
 @dataclass(frozen=True)

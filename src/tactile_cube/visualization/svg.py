@@ -135,7 +135,9 @@ def _frame(axes: Axes, xr: tuple[float, float], yr: tuple[float, float], to_x: _
     for value in ticks(*yr, count=4):
         parts.append(f'<line x1="{left}" x2="{right}" y1="{to_y(value):.1f}" y2="{to_y(value):.1f}" stroke="#eaeef2"/>')
         parts.append(text(left - 6, to_y(value) + 4, f"{value:g}", "end"))
-    parts.append(f'<rect x="{left}" y="{top}" width="{right - left}" height="{bottom - top}" fill="none" stroke="#d0d7de"/>')
+    parts.append(
+        f'<rect x="{left}" y="{top}" width="{right - left}" height="{bottom - top}" fill="none" stroke="#d0d7de"/>'
+    )
     parts.append(text((left + right) / 2, axes.height - 6, axes.x_label, "middle"))
     middle = (top + bottom) / 2
     parts.append(text(14, middle, axes.y_label, "middle", extra=f'transform="rotate(-90 14 {middle:.1f})"'))
@@ -148,7 +150,9 @@ def _marks(axes: Axes, to_x: _scale, x_range: tuple[float, float]) -> str:
     for start, end in axes.marked:
         a, b = to_x(max(start, x_range[0])), to_x(min(end, x_range[1]))
         if b > a:
-            rectangles.append(f'<rect x="{a:.1f}" y="{top}" width="{b - a:.1f}" height="{bottom - top}" fill="{FAILING}"/>')
+            rectangles.append(
+                f'<rect x="{a:.1f}" y="{top}" width="{b - a:.1f}" height="{bottom - top}" fill="{FAILING}"/>'
+            )
     return "\n".join(rectangles)
 
 

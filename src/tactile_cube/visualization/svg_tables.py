@@ -1,5 +1,6 @@
 """Drawings of tables: bars with a floor, a heat map, values with their intervals."""
 
+import math
 from dataclasses import dataclass
 
 from tactile_cube.visualization.svg import FLOOR, PALETTE, document, text, ticks
@@ -19,7 +20,9 @@ class Interval:
     neutral: float | None = None
 
 
-def bar_chart(bars: list[tuple[str, float]], unit: str, floor: float | None = None, floor_name: str = "noise floor") -> str:
+def bar_chart(
+    bars: list[tuple[str, float]], unit: str, floor: float | None = None, floor_name: str = "noise floor"
+) -> str:
     """Horizontal bars with their numbers; a dashed line marks the floor."""
     left, width = 230, 900
     most = max([value for _, value in bars] + [floor or 0.0]) or 1.0
@@ -41,9 +44,10 @@ def bar_chart(bars: list[tuple[str, float]], unit: str, floor: float | None = No
 
 
 def heat_map(rows: list[str], columns: list[str], values: list[list[float | None]], most: float = 6.0) -> str:
-    """Numbers on a background that reddens from 1 to `most`; None stays empty."""
-    left, top, width = 90, 150, 900
-    cell = min(74.0, (width - left - 10) / max(1, len(columns)))
+    """Ratios on a background that reddens with their logarithm, from 1 to the largest or `most`; None stays empty."""
+    left, top, right, width = 90, 150, 90, 900
+    cell = min(74.0, (width - left - right) / max(1, len(columns)))
+    hottest = max([most] + [value for row in values for value in row if value is not None])
     parts = []
     for index, name in enumerate(columns):
         x = left + (index + 0.5) * cell + 4
@@ -51,17 +55,18 @@ def heat_map(rows: list[str], columns: list[str], values: list[list[float | None
     for row, name in enumerate(rows):
         y = top + row * ROW
         parts.append(text(left - 8, y + 17, name, "end", "#1b1f24"))
-        parts += [_cell(left + i * cell, y, cell, value, most) for i, value in enumerate(values[row])]
+        parts += [_cell(left + i * cell, y, cell, value, hottest) for i, value in enumerate(values[row])]
     return document(width, top + ROW * len(rows) + 8, parts)
 
 
-def _cell(x: float, y: float, width: float, value: float | None, most: float) -> str:
+def _cell(x: float, y: float, width: float, value: float | None, hottest: float) -> str:
     if value is None:
         return ""
-    heat = min(1.0, max(0.0, (value - 1) / (most - 1)))
+    heat = max(0.0, math.log(max(value, 1e-9)) / math.log(hottest))
     fill = f"rgb({255 - int(48 * heat)},{250 - int(190 * heat)},{248 - int(190 * heat)})"
     box = f'<rect x="{x + 1:.1f}" y="{y + 1}" width="{width - 2:.1f}" height="{ROW - 2}" rx="2" fill="{fill}"/>'
-    return box + text(x + width / 2, y + 17, f"{value:.1f}", "middle", "#ffffff" if heat > 0.6 else "#1b1f24")
+    shown = f"{value:.1f}" if value < 99.5 else f"{value:.0f}"
+    return box + text(x + width / 2, y + 17, shown, "middle", "#ffffff" if heat > 0.6 else "#1b1f24")
 
 
 def interval_chart(intervals: list[Interval]) -> str:
@@ -74,12 +79,16 @@ def interval_chart(intervals: list[Interval]) -> str:
         low, high = min(known), max(known)
         slack = 0.08 * (high - low) or 1.0
         scale = (right - left) / (high - low + 2 * slack)
-        place = {key: left + (value - low + slack) * scale for key, value in vars(one).items() if isinstance(value, float)}
+        place = {
+            key: left + (value - low + slack) * scale for key, value in vars(one).items() if isinstance(value, float)
+        }
         parts.append(text(left - 12, y + 4, one.name, "end", "#1b1f24"))
         parts.append(f'<line x1="{left}" x2="{right}" y1="{y}" y2="{y}" stroke="#eaeef2"/>')
         if "neutral" in place:
             x = place["neutral"]
-            parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{y - 8}" y2="{y + 8}" stroke="{FLOOR}" stroke-width="2"/>')
+            parts.append(
+                f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{y - 8}" y2="{y + 8}" stroke="{FLOOR}" stroke-width="2"/>'
+            )
         parts.append(f'<line x1="{place["low"]:.1f}" x2="{place["high"]:.1f}" y1="{y}" y2="{y}" stroke="{PALETTE[0]}" '
                      'stroke-width="7" stroke-opacity="0.35"/>')  # fmt: skip
         parts.append(f'<circle cx="{place["value"]:.1f}" cy="{y}" r="4.5" fill="{PALETTE[0]}"/>')
