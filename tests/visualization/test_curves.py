@@ -1,14 +1,13 @@
 from pathlib import Path
 
-import pytest
 from PIL import Image
 
-from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.summary import summarise
+from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.evaluation.variant import Variant
 from tactile_cube.evaluation.verdict import judge
-from tactile_cube.visualization.curves import curriculum_ends, read_curve, write_learning_curves, write_robustness_map
+from tactile_cube.visualization.curves import write_learning_curves, write_robustness_map
 from tests.evaluation.synthetic import episode
 
 METRICS = (
@@ -21,26 +20,11 @@ def write_metrics(folder: Path, text: str = METRICS) -> Path:
     return folder
 
 
-def test_begin_and_end_of_the_curriculum_are_found(tmp_path: Path) -> None:
-    assert curriculum_ends(read_curve(write_metrics(tmp_path), "seed 0")) == [2000, 3000]
-
-
 def test_learning_curves_become_a_picture(tmp_path: Path) -> None:
     curve = read_curve(write_metrics(tmp_path), "seed 0")
     write_learning_curves([curve, curve], tmp_path / "curves.png", "table")
     with Image.open(tmp_path / "curves.png") as picture:
         assert picture.width > 500
-
-
-@pytest.mark.parametrize("text", ["", "steps,loss\n0,1\n"])
-def test_a_file_without_the_angle_is_refused(tmp_path: Path, text: str) -> None:
-    with pytest.raises(InputError, match=r"metrics\.csv: no column"):
-        read_curve(write_metrics(tmp_path, text), "x")
-
-
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be read"):
-        read_curve(tmp_path, "x")
 
 
 def test_a_robustness_map_has_a_panel_for_each_axis(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,7 @@ def write_results(path: Path, run: Run, variants: list[VariantResult]) -> None:
     """Write the results file."""
     data = {
         "format": FORMAT,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "protocol": run.protocol.name,
         "seconds": run.protocol.seconds,
         "success_share": run.protocol.success_share,

@@ -98,11 +98,10 @@ HEADER = (
 def row(result: EpisodeResult, name: str = "nominal") -> str:
     """Return an episode as a line of text; the variant's name is added when it is not the nominal one."""
     faces = "/".join(str(count) for count in result.faces_visited)
-    return (
-        f"{result.episode:4d} {result.final_angle:8.2f} {result.late_angle:6.2f} {result.duration:7.1f}  {result.verdict.value:<17}"
-        f"{result.ending:<12}{sum(result.finger_lifts):6d}{faces:>9}{math.degrees(result.max_tilt):7.1f}"
-        f"  {', '.join(result.exploits) or '-'}{'' if name == 'nominal' else f'   [{name}]'}"
-    )
+    measured = f"{result.final_angle:8.2f} {result.late_angle:6.2f} {result.duration:7.1f}"
+    counted = f"{sum(result.finger_lifts):6d}{faces:>9}{math.degrees(result.max_tilt):7.1f}"
+    remarks = f"{', '.join(result.exploits) or '-'}{'' if name == 'nominal' else f'   [{name}]'}"
+    return f"{result.episode:4d} {measured}  {result.verdict.value:<17}{result.ending:<12}{counted}  {remarks}"
 
 
 def sentence(name: str, summary: Summary) -> str:

@@ -33,8 +33,8 @@ class Verdict(StrEnum):
     - `regrasping`: kept the cube, turned it beyond `REGRASP_ANGLE` and was still turning it at the end (`LATE_ANGLE`),
       and fingers moved to new faces at least `REGRASP_FACE_CHANGES` times.
     - `holding`: kept the cube and turned it by less than `STILL_ANGLE`.
-    - `stuck_twisted`: kept the cube, turned it and came to rest, or never regrasped: the paper's failure (a). With a wide
-      range of start yaws a single twist and a half can exceed `REGRASP_ANGLE`; the rest gives it away.
+    - `stuck_twisted`: kept the cube, turned it and came to rest, or never regrasped: the paper's failure (a). With
+      a wide range of start yaws one long twist can exceed `REGRASP_ANGLE`; coming to rest gives it away.
     - `spun_and_dropped`: lost the cube after turning it by more than `STILL_ANGLE` without regrasping: failure (c).
     - `dropped`: lost the cube in any other way, be it before turning it or after regrasps.
     """

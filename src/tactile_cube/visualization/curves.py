@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
@@ -14,47 +12,11 @@ matplotlib.use("Agg")
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import VariantResult
+from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, curriculum_ends
 from tactile_cube.evaluation.verdict import REGRASP_ANGLE
 
-ANGLE, STEPS = "final_angle", "steps"
 CURRICULUM = ("T_s", "gravity")
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One training run.
-
-    Attributes:
-        label: for the legend.
-        columns: columns of its metrics.csv by name, each as long as the file has rows.
-    """
-
-    label: str
-    columns: dict[str, list[float]]
-
-
-def read_curve(path: Path, label: str) -> Curve:
-    """Read the metrics.csv of a run.
-
-    Args:
-        path: the file or the run's folder.
-        label: for the legend.
-
-    Raises:
-        InputError: the file is missing, or lacks steps or the mean final angle.
-    """
-    file = path / "metrics.csv" if path.is_dir() else path
-    try:
-        with file.open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(stream))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from error
-    for column in (STEPS, ANGLE):
-        if not rows or column not in rows[0]:
-            raise InputError(f"{file}: no column {column!r}; give the metrics.csv of a training run")
-    return Curve(label, {name: [float(row[name] or "nan") for row in rows] for name in rows[0]})
 
 
 def write_learning_curves(curves: Sequence[Curve], path: Path, title: str) -> None:
@@ -95,15 +57,6 @@ def _draw_curriculum(axes: Sequence[Axes], curve: Curve) -> None:
     axes[-1].set_ylim(bottom=0)
     axes[-1].legend(fontsize=8)
     axes[-1].grid(alpha=0.3)
-
-
-def curriculum_ends(curve: Curve) -> list[float]:
-    """Return the steps at which the curriculum begins and ends, or nothing where it never moved."""
-    values = curve.columns.get("gravity") or curve.columns.get("T_s") or []
-    moving = [
-        step for step, now, last in zip(curve.columns[STEPS][1:], values[1:], values, strict=False) if now != last
-    ]
-    return [moving[0], moving[-1]] if moving else []
 
 
 def write_robustness_map(variants: Sequence[VariantResult], path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -23,7 +24,7 @@ ARROW_LENGTH = 0.03
 POSE_RATE = 50.0
 """Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
 FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215))
-SHAPES = {"box": rr.Boxes3D, "cylinder": rr.Cylinders3D, "sphere": rr.Ellipsoids3D}
+SHAPES: dict[str, Any] = {"box": rr.Boxes3D, "cylinder": rr.Cylinders3D, "sphere": rr.Ellipsoids3D}
 SIGNALS = {"q": 1.0, "q_m": 0.75, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
 JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255))

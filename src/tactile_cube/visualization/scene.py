@@ -51,7 +51,7 @@ class Camera:
     height: float = 0.0
 
 
-SIDE = Camera(yaw=35.0, pitch=-8.0, distance=0.42, height=0.045)
+SIDE = Camera(yaw=35.0, pitch=-10.0, distance=0.33, height=0.03)
 BELOW = Camera(yaw=0.0, pitch=72.0, distance=0.30)
 
 

@@ -1,0 +1,176 @@
+"""The paper's results beside ours, as Markdown, from the results files of evaluate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tactile_cube.evaluation.results_file import read_results
+from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, cpu_hours, regrasping_begins
+
+Results = dict[str, Any]
+EVALUATE = "python -m tactile_cube.evaluate"
+SCRIPTED = "scripted"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One result of the paper.
+
+    Attributes:
+        what: the experiment.
+        paper: the paper's number. Source: paper, section IV and the authors' website.
+        protocol: of conf/protocol that repeats it.
+        ours: our number from the results.
+        policy: "scripted" for the hand-crafted trajectory; "" for any trained policy.
+    """
+
+    what: str
+    paper: str
+    protocol: str
+    ours: Callable[[Results], str]
+    policy: str = ""
+
+    @property
+    def command(self) -> str:
+        """The command that fills the row."""
+        policy = f"policy={self.policy} " if self.policy else ""
+        return f"{EVALUATE} {policy}protocol={self.protocol}"
+
+    def fits(self, results: Results) -> bool:
+        """Whether results fill this row."""
+        label = results["policy"]["label"]
+        fits_policy = label == SCRIPTED if self.policy else label not in ("hold", "random", SCRIPTED)
+        return bool(results["protocol"] == self.protocol) and fits_policy
+
+
+def paper_page(results: Sequence[Results], curves: Sequence[Curve]) -> str:
+    """Return the page: the paper's rows, robustness, other simulations, training runs.
+
+    Args:
+        results: what `read_results` gave, the newest last; the newest that fits fills a row.
+        curves: training runs.
+    """
+    parts = ["# The paper's results beside ours", INTRODUCTION, _paper_rows(results)]
+    parts += _variant_section("Robustness", "perturbations", results)
+    parts += _variant_section("Other simulations", "sim_to_sim", results)
+    parts += _training_section(curves)
+    return "\n\n".join(parts) + "\n"
+
+
+def read_all(folder: Path) -> list[Results]:
+    """Read every results file below a folder, the oldest first."""
+    return sorted((read_results(file) for file in folder.rglob("*.json")), key=lambda one: str(one["created"]))
+
+
+def _newest(results: Sequence[Results], fits: Callable[[Results], bool]) -> Results | None:
+    return next((one for one in reversed(results) if fits(one)), None)
+
+
+def _paper_rows(results: Sequence[Results]) -> str:
+    lines = ["| experiment | paper | here | policy, seed | CPU hours | command |", "|---|---|---|---|---|---|"]
+    for row in ROWS:
+        found = _newest(results, row.fits)
+        if found is None:
+            lines.append(f"| {row.what} | {row.paper} | not run | | | `{row.command}` |")
+            continue
+        made = f"{found['policy']['label']}, {found['seed']} | {found['cpu_hours']:.2f} | `{found['command']}`"
+        lines.append(f"| {row.what} | {row.paper} | {row.ours(found)} | {made} |")
+    return "\n".join(lines)
+
+
+def _summary(results: Results, variant: int = 0) -> dict[str, Any]:
+    summary: dict[str, Any] = results["variants"][variant]["summary"]
+    return summary
+
+
+def _successes(results: Results) -> str:
+    summary = _summary(results)
+    low, high = (round(100 * summary[key]) for key in ("success_low", "success_high"))
+    return f"{summary['successes']}/{summary['episodes']} (95 %: {low} to {high} %)"
+
+
+def _best(results: Results) -> str:
+    return f"{_summary(results)['best_angle']:.1f} rad"
+
+
+def _longest(results: Results) -> str:
+    """The episode that turned farthest: angle, turns, time, ending."""
+    best = max(results["variants"][0]["episodes"], key=lambda episode: episode["final_angle"])
+    turns = best["final_angle"] / (2 * math.pi)
+    minutes = best["duration"] / 60
+    return f"{best['final_angle']:.0f} rad, {turns:.1f} turns, {minutes:.1f} min, {best['ending'].replace('_', ' ')}"
+
+
+def _replayed(results: Results) -> str:
+    original, replay = _summary(results), _summary(results, -1)
+    return (
+        f"{replay['mean_angle']:.1f} +- {replay['std_angle']:.1f} rad of {original['best_angle']:.1f}; "
+        f"{replay['kept']}/{replay['episodes']} kept the cube"
+    )
+
+
+def _with_endings(results: Results) -> str:
+    summary = _summary(results)
+    kept = f"{summary['kept']}/{summary['episodes']} kept"
+    return f"best {summary['best_angle']:.1f}, mean {summary['mean_angle']:.1f} rad; {kept}"
+
+
+ROWS = (
+    Row("10 runs of 40 s, at least 80 % of the best run", "robot 8/10, simulation 9/10", "paper", _successes),
+    Row("best of these runs", "15 rad", "paper", _best),
+    Row("the same, 100 runs", "-", "many", _successes),
+    Row("endurance, at most 16 min", "289 rad, 46 turns, stopped by hand", "endurance", _longest),
+    Row("open-loop replay of a successful run", "fails after pi/2", "replay", _replayed),
+    Row("hand-crafted trajectory", "11 rad, then drops", "paper", _with_endings, SCRIPTED),
+)
+"""Source: paper, section IV, and the authors' website."""
+
+INTRODUCTION = (
+    "Written by `python -m tactile_cube.results` from the results files under docs/results/runs. Paper: Sievers, Pitz, "
+    "Bäuml, *Learning Purely Tactile In-Hand Manipulation with a Torque-Controlled Hand*, ICRA 2022. Here everything is "
+    "simulation; the paper's robot numbers are a real hand's."
+)
+
+
+def _variant_section(title: str, protocol: str, results: Sequence[Results]) -> list[str]:
+    """One line a variant, or the command where it was not run."""
+    found = _newest(results, lambda one: bool(one["protocol"] == protocol))
+    if found is None:
+        return [f"## {title}", f"Not run: `{EVALUATE} protocol={protocol}`"]
+    head = f"`{found['command']}`, {found['cpu_hours']:.2f} CPU hours, policy {found['policy']['label']}."
+    lines = ["| condition | mean angle [rad] | best | kept the cube | verdicts |", "|---|---|---|---|---|"]
+    for variant in found["variants"]:
+        summary = variant["summary"]
+        verdicts = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in summary["verdicts"].items() if n)
+        lines.append(
+            f"| {variant['variant']['name']} | {summary['mean_angle']:.2f} +- {summary['std_angle']:.2f} "
+            f"| {summary['best_angle']:.2f} | {summary['kept']}/{summary['episodes']} | {verdicts} |"
+        )
+    return [f"## {title}", head, "\n".join(lines)]
+
+
+def _training_section(curves: Sequence[Curve]) -> list[str]:
+    """When regrasping began in each training run, and what it cost."""
+    head = (
+        "Paper, million steps until regrasping: table 0.2 to 0.4, float 0.9 to 5.8, full 1.7 to 6.0 (some runs never)."
+    )
+    if not curves:
+        return ["## Training", head, "Not run: `python -m tactile_cube.train -m +experiment=table1`"]
+    lines = [
+        "| run | million steps | until regrasping | CPU hours until then | best mean angle [rad] | CPU hours in all |",
+        "|---|---|---|---|---|---|",
+    ]
+    for curve in curves:
+        row = regrasping_begins(curve)
+        begins = "-" if row is None else f"{curve.columns[STEPS][row] / 1e6:.2f}"
+        cost = "-" if row is None else f"{cpu_hours(curve, row):.2f}"
+        best = max(angle for angle in curve.columns[ANGLE] if not math.isnan(angle))
+        lines.append(
+            f"| {curve.label} | {curve.columns[STEPS][-1] / 1e6:.2f} | {begins} | {cost} | {best:.2f} "
+            f"| {cpu_hours(curve, -1):.2f} |"
+        )
+    return ["## Training", head, "\n".join(lines)]
