@@ -84,10 +84,13 @@ static void read_object(Handle client, int object, double *state) {
     for (int k = 0; k < 6; ++k) state[7 + k] = v[k];
 }
 
-/* Pushes the object at its centre with a force and a torque in the world frame. */
+/* Pushes the object at its centre with a force and a torque in the world frame. Two commands, because within one the
+ * entries of PyBullet 3.2.7 overlap. */
 static void push_object(Handle client, int object, const double *wrench, const double *state) {
     Handle command = b3ApplyExternalForceCommandInit(client);
     b3ApplyExternalForce(command, object, -1, wrench, state, WORLD_FRAME);
+    b3SubmitClientCommandAndWaitStatus(client, command);
+    command = b3ApplyExternalForceCommandInit(client);
     b3ApplyExternalTorque(command, object, -1, wrench + 3, WORLD_FRAME);
     b3SubmitClientCommandAndWaitStatus(client, command);
 }

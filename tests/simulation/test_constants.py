@@ -1,0 +1,53 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tactile_cube.errors import InputError
+from tactile_cube.simulation import EpisodeConstants, Start
+
+
+def test_one_number_means_all_joints_and_all_edges() -> None:
+    constants = EpisodeConstants(kp=4.0, cube_size=0.07)
+    np.testing.assert_array_equal(constants.kp, np.full(12, 4.0))
+    np.testing.assert_array_equal(constants.cube_size, np.full(3, 0.07))
+
+
+def test_a_replaced_constant_leaves_the_others() -> None:
+    constants = dataclasses.replace(EpisodeConstants(kd=np.linspace(0.2, 0.3, 12)), cube_mass=0.06)
+    assert constants.cube_mass == 0.06
+    np.testing.assert_array_equal(constants.kd, np.linspace(0.2, 0.3, 12))
+
+
+def test_vectors_cannot_be_changed_in_place() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        EpisodeConstants().kp[0] = 1.0  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("filter_time", -0.1, "filter_time is -0.1"),
+        ("cube_mass", 0.0, "cube_mass is 0.0; choose a value above 0"),
+        ("kd", -1.0, "kd is"),
+        ("kp", [1.0, 2.0], r"kp has shape \(2,\); give one number or 12"),
+        ("joint_offset", float("nan"), "joint_offset"),
+        ("elasticity_sign", 0, "elasticity_sign is 0"),
+        ("gravity_scale", float("nan"), "gravity_scale is nan"),
+    ],
+)
+def test_a_value_without_physical_meaning_is_refused_by_name(name: str, value: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        EpisodeConstants(**{name: value})  # type: ignore[arg-type]
+
+
+def test_a_start_normalises_its_quaternion_and_refuses_zero() -> None:
+    start = Start(np.zeros(12), cube_quaternion=(0, 0, 0, 2))
+    np.testing.assert_array_equal(start.cube_quaternion, [0, 0, 0, 1])
+    with pytest.raises(InputError, match="cube_quaternion is zero"):
+        Start(np.zeros(12), cube_quaternion=(0, 0, 0, 0))
+
+
+def test_a_start_with_too_few_joints_is_refused() -> None:
+    with pytest.raises(InputError, match=r"start.angles has shape \(3,\)"):
+        Start(np.zeros(3))

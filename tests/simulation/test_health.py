@@ -1,0 +1,32 @@
+import numpy as np
+import pytest
+
+from tactile_cube.simulation.health import find_fault
+
+CALM = np.zeros((4, 4))
+CUBE = np.array([0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
+
+
+def changed(array: np.ndarray, index: object, value: float) -> np.ndarray:
+    copy = array.copy()
+    copy[index] = value  # type: ignore[index]
+    return copy
+
+
+def test_a_calm_state_has_no_fault() -> None:
+    assert find_fault(CALM, CALM, CUBE, [-0.001, 0.002]) == ""
+
+
+@pytest.mark.parametrize(
+    ("state", "word"),
+    [
+        ((changed(CALM, (0, 0), np.nan), CALM, CUBE, []), "not a number"),
+        ((CALM, changed(CALM, (1, 2), -80.0), CUBE, []), "joint speed"),
+        ((CALM, CALM, changed(CUBE, 8, 6.0), []), "cube speed"),
+        ((CALM, CALM, changed(CUBE, 11, -200.0), []), "cube spin"),
+        ((CALM, CALM, CUBE, [0.0, -0.01]), "overlap"),
+        ((changed(CALM, (3, 3), 0.5), CALM, CUBE, []), "tendon stretch"),
+    ],
+)
+def test_what_cannot_be_is_named(state: tuple[np.ndarray, np.ndarray, np.ndarray, list[float]], word: str) -> None:
+    assert word in find_fault(*state)

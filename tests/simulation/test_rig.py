@@ -1,0 +1,109 @@
+from pathlib import Path
+
+import numpy as np
+import polars
+import pybullet
+import pytest
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects import MOTOR_POSITION, TORQUE, find_effect
+from tactile_cube.errors import InputError
+from tactile_cube.hand import DLR_HAND2, finger_urdf
+from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.simulation import RigWorld
+
+RECORDING = Path(__file__).parents[3] / "shared" / "recordings" / "finger_plain"
+SIGNALS = np.array([MOTOR_POSITION, TORQUE])
+# the true constants of finger_plain, from the notes that came with it
+TRUE = DrivetrainConstants(
+    kd=(0.23595, 0.22932, 0.22615),
+    static_friction=(0.02432, 0.02429, 0.01524),
+    reflected_inertia=(0.00281, 0.00315, 0.00318),
+)
+
+
+def commands(rows: int, joints: int) -> np.ndarray:
+    time = 0.002 * np.arange(rows)[:, None]
+    return 0.3 * np.sin(2 * np.pi * time * (1.0 + 0.7 * np.arange(joints))) + 0.2
+
+
+def both(plant: Plant, memory: np.ndarray, rows: int = 400, history: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    sent = commands(rows + history, plant.topology.joints)
+    fast = np.empty((rows, 2, plant.topology.joints))
+    plant.kernel.rollout(sent, history, 1, memory.copy(), SIGNALS, fast)
+    slow = np.empty_like(fast)
+    world = RigWorld(plant)
+    world.rollout(sent, history, 1, memory, SIGNALS, slow)
+    world.close()
+    return fast, slow
+
+
+def finger_plant(*effects: str) -> Plant:
+    return Plant([RigidBodyTree.from_urdf(finger_urdf(DLR_HAND2))], 0.002, [find_effect(name) for name in effects])
+
+
+def test_free_motion_in_bullet_agrees_with_the_fast_rollout() -> None:
+    plant = finger_plant()
+    memory = plant.memory(DrivetrainConstants(), gravity=(3.0, -2.0, -9.0))
+    plant.reset(memory, np.array([0.1, 0.2, 0.3]), np.array([1.0, -1.0, 0.5]))
+    fast, slow = both(plant, memory)
+    assert np.abs(fast[:, 0]).max() > 0.3
+    np.testing.assert_allclose(slow, fast, atol=1e-9)
+
+
+def test_it_is_bullet_that_moves_the_rig() -> None:
+    plant = finger_plant()
+    memory = plant.memory(DrivetrainConstants())
+    world = RigWorld(plant)
+    out, heavier = np.empty((50, 2, 3)), np.empty((50, 2, 3))
+    world.rollout(commands(50, 3), 0, 1, memory, SIGNALS, out)
+    pybullet.changeDynamics(world._body, 1, mass=1.0, physicsClientId=world._client)
+    world.rollout(commands(50, 3), 0, 1, memory, SIGNALS, heavier)
+    assert np.abs(out - heavier).max() > 1e-3
+    world.close()
+
+
+def test_mechanism_and_command_effects_reach_bullet() -> None:
+    plant = finger_plant("payload", "command_delay", "stribeck_friction")
+    payload, delay, friction = plant.effects
+    effects = [payload("q3"), delay("q2"), friction("q1")]
+    memory = plant.memory(DrivetrainConstants(), effects=effects)
+    fast, slow = both(plant, memory, history=20)
+    plain, _ = both(plant, plant.memory(DrivetrainConstants()))
+    np.testing.assert_allclose(slow, fast, atol=1e-9)
+    assert np.abs(fast - plain).max() > 1e-3
+
+
+def test_posture_offsets_move_into_the_frames() -> None:
+    plant = finger_plant()
+    memory = plant.memory(DrivetrainConstants())
+    plant.view(memory, "offset")[0] = [0.05, -0.1, 0.2, 0.2]
+    fast, slow = both(plant, memory)
+    np.testing.assert_allclose(slow, fast, atol=1e-9)
+
+
+def test_a_hand_of_several_chains_is_refused() -> None:
+    tree = RigidBodyTree.from_urdf(finger_urdf(DLR_HAND2))
+    with pytest.raises(InputError, match="moves one chain, this plant has 2"):
+        RigWorld(Plant([tree, tree], 0.002))
+
+
+@pytest.mark.skipif(not RECORDING.exists(), reason="the shared recordings are not here")
+@pytest.mark.parametrize(("dt", "bound"), [(0.0005, 1e-3), (0.002, 1.5e-3)])
+@pytest.mark.parametrize("kind", ["ramps_0", "multisine_1", "policy_2", "holds_0"])
+def test_a_finger_follows_the_recording_of_a_second_engine(kind: str, dt: float, bound: float) -> None:
+    trial = polars.read_parquet(RECORDING / "trials" / f"{kind}.parquet")
+    command, position, torque = (
+        trial.select([f"q{j}.{name}" for j in (1, 2, 3)]).to_numpy().astype(float)
+        for name in ("command", "position", "torque")
+    )
+    world = RigWorld.from_urdf((RECORDING / "rig.urdf").read_text(), dt)
+    memory = world.plant.memory(TRUE)
+    world.plant.reset(memory, position[:5].mean(axis=0) - torque[:5].mean(axis=0) / 25.0)
+    world.plant.view(memory, "reading")[:] = 0.0
+    out = np.empty((len(command), 1, 3))
+    world.rollout(command, 0, round(0.002 / dt), memory, SIGNALS[:1], out)
+    error = out[1:, 0] - position[:-1]  # a sample is taken when its command has acted for a period
+    error -= error.mean(axis=0)
+    assert np.sqrt((error**2).mean(axis=0)).max() < bound
+    world.close()
