@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tactile_cube.compiled import compiled
 
 Array = npt.NDArray[np.float64]
-GUESSES = 12
+GUESSES = 10
 SWEEPS = 4
 SMALLEST_PIVOT = 1e-14
 
@@ -24,7 +24,8 @@ def solve_speeds(
     """Speeds after a step under dry friction.
 
     Guesses which joints move and to which side, solves for their speeds, and accepts if the guess agrees with the
-    result; otherwise soft-thresholded coordinate descent (which converges from anywhere) makes the next guess.
+    result; otherwise soft-thresholded coordinate descent (which converges from anywhere), run twice as long each time,
+    makes the next guess.
 
     Args:
         M: (n, n) joint-space inertia, reflected inertia included [kg m^2].
@@ -36,6 +37,7 @@ def solve_speeds(
         factor: (n, n) scratch.
         trial: (n,) scratch.
     """
+    sweeps = SWEEPS
     for _ in range(GUESSES):
         for j in range(len(v)):
             side[j] = _side(v[j], limit[j], grip[j])
@@ -44,10 +46,11 @@ def solve_speeds(
             for j in range(len(v)):
                 v[j] = trial[j]
             return
-        for _ in range(SWEEPS):
+        for _ in range(sweeps):
             _descend(M, b, limit, grip, v)
-    for _ in range(GUESSES * SWEEPS):
-        _descend(M, b, limit, grip, v)
+        if not np.isfinite(v[0]):
+            return
+        sweeps *= 2
 
 
 @compiled

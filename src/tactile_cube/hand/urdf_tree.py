@@ -171,7 +171,7 @@ def _check_couplings(every: list[Joint]) -> None:
     for joint in every:
         if joint.coupling is not None and joint.coupling.joint not in leaders:
             raise InputError(
-                f"joint '{joint.name}' follows '{joint.coupling.joint}', which is no movable joint of its own; name one of "
+                f"joint '{joint.name}' follows '{joint.coupling.joint}', which does not move on its own; name one of "
                 f"{', '.join(sorted(leaders)) or 'none'}"
             )
 

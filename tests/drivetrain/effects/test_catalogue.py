@@ -1,0 +1,58 @@
+import pytest
+
+from tactile_cube.drivetrain.effects import Stage, catalogue, find_effect, matching_joints, resolve
+from tactile_cube.drivetrain.effects.stribeck_friction import StribeckFriction
+from tactile_cube.errors import InputError
+from tests.drivetrain.effects.laws import CableDrag
+
+HAND = ("ring_q1", "ring_q2", "thumb_q1", "thumb_q2")
+
+
+def test_names_are_found_in_the_catalogue_and_by_dotted_path() -> None:
+    assert find_effect("stribeck_friction") is StribeckFriction
+    assert find_effect("tests.drivetrain.effects.laws.CableDrag") is CableDrag
+
+
+def test_an_effect_is_placed_on_the_joint_named_after_the_at() -> None:
+    assert resolve(["stribeck_friction@q2"], ("q1", "q2")) == [(StribeckFriction, "q2")]
+
+
+def test_an_effect_without_joint_is_placed_on_all() -> None:
+    assert resolve(["stribeck_friction"], ("q1", "q2")) == [(StribeckFriction, "q1"), (StribeckFriction, "q2")]
+
+
+def test_a_finger_s_joint_stands_for_that_joint_of_every_finger() -> None:
+    assert matching_joints("q2", HAND) == ["ring_q2", "thumb_q2"]
+    assert matching_joints("ring_q2", HAND) == ["ring_q2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("striebeck", "'striebeck' is unknown"),
+        ("no_such_rig.Drag", "cannot import 'no_such_rig'"),
+        ("tests.drivetrain.effects.laws.Nothing", "no subclass of Effect named 'Nothing'"),
+        ("tests.drivetrain.effects.laws.NOT_AN_EFFECT", "no subclass of Effect"),
+        ("tests.drivetrain.effects.laws.Nameless", "lacks 'name'"),
+        ("stribeck_friction@q9", "joint 'q9' is unknown; the joints are q1, q2"),
+        ("stribeck_friction@", "joint '' is unknown"),
+    ],
+)
+def test_what_cannot_be_found_is_named(name: str, complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        resolve([name], ("q1", "q2"))
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_every_effect_describes_itself(name: str) -> None:
+    effect = catalogue()[name]
+    assert effect.name == name
+    assert isinstance(effect.stage, Stage)
+    assert effect.__doc__
+    names = [p.name for p in effect.parameters]
+    assert len(set(names)) == len(names)
+    for p in effect.parameters:
+        assert p.low <= p.neutral <= p.high
+        assert p.low <= p.typical <= p.high
+        assert p.unit
+        assert p.source
