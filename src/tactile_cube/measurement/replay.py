@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,9 @@ from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN, Parameters
 from tactile_cube.measurement.read_out import read_out
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.trial import Trial
-from tactile_cube.simulation.rig import RigWorld
+
+if TYPE_CHECKING:
+    from tactile_cube.simulation.rig import RigWorld
 
 Array = NDArray[np.float64]
 SIGNALS = np.array([MOTOR_POSITION, TORQUE, COMMAND])
@@ -87,7 +89,7 @@ class Replay:
             effects=tuple(sorted(classes, key=lambda cls: cls.name)),
             joint_names=recording.joints,
         )
-        self._world = RigWorld(self.plant) if engine == "pybullet" else None
+        self._world = _pybullet(self.plant) if engine == "pybullet" else None
 
     def close(self) -> None:
         """End the physics server, if there is one."""
@@ -158,3 +160,10 @@ class Replay:
             return level, slope, trial.command[0]
         torque = trial.gains.kp * (trial.command[0] - level) - trial.gains.kd * slope
         return level, slope, np.clip(torque, -trial.gains.torque_limit, trial.gains.torque_limit)
+
+
+def _pybullet(plant: Plant) -> "RigWorld":
+    """The PyBullet world, imported here because PyBullet greets everybody who imports it."""
+    from tactile_cube.simulation.rig import RigWorld
+
+    return RigWorld(plant)

@@ -42,11 +42,22 @@ def read_rig(path: Path) -> Rig:
         InputError: the file is missing, no XML, or no robot with a movable joint.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        root = ElementTree.fromstring(text)
+        return parse_rig(path.read_text(encoding="utf-8"), path)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; recording.yaml names it under 'rig'") from None
-    except (ElementTree.ParseError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a URDF: {error}") from None
+
+
+def parse_rig(text: str, path: Path) -> Rig:
+    """The rig in a URDF's text; `path` is what errors name.
+
+    Raises:
+        InputError: no XML, or no robot with a movable joint.
+    """
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
         raise InputError(f"{path}: not a URDF: {error}") from None
     joints = {joint.name: joint for joint in map(_joint, root.iter("joint")) if joint is not None}
     if root.tag != "robot" or not joints:

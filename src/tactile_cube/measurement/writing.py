@@ -25,17 +25,33 @@ class TrialTable:
     torque: Array | None = None
 
 
-def write_recording(folder: Path, description: Description, urdf: str, tables: Sequence[TrialTable]) -> None:
-    """Write a recording; `description.trials` is replaced by the entries of `tables`."""
+@dataclass(frozen=True)
+class RecordingTables:
+    """A recording to be written: recording.yaml (its trials come from the tables), the URDF's text, the trials."""
+
+    description: Description
+    urdf: str
+    tables: Sequence[TrialTable]
+
+
+def write_recording(folder: Path, recording: RecordingTables) -> None:
+    """Write a recording into a folder."""
+    description, tables = recording.description, recording.tables
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / description.rig).write_text(urdf, encoding="utf-8")
+    (folder / description.rig).write_text(recording.urdf, encoding="utf-8")
     entries = [table.entry for table in tables]
-    data = description.model_copy(update={"trials": entries}).model_dump(exclude_defaults=True, exclude_none=True)
-    ordered = {"format": 1, "rig": description.rig} | data
+    data = description.model_dump(exclude_defaults=True, exclude_none=True, exclude={"trials"})
+    ordered = {"format": 1, "rig": description.rig} | data | {"trials": [_entry(entry) for entry in entries]}
     text = yaml.safe_dump(ordered, sort_keys=False, allow_unicode=True)
     (folder / "recording.yaml").write_text(text, encoding="utf-8")
     for table in tables:
         write_table(folder / table.entry.file, table, description.joints)
+
+
+def _entry(entry: TrialEntry) -> dict[str, object]:
+    """File, initialisation and kind always, the rest where it was said."""
+    always = {"file": entry.file, "initialisation": entry.initialisation, "kind": entry.kind}
+    return always | entry.model_dump(exclude_defaults=True, exclude_none=True)
 
 
 def write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:

@@ -1,0 +1,24 @@
+"""An effect as a user writes it: `stribeck_friction@q3` or `stribeck_friction@q3: excess=0.08, velocity=0.3`."""
+
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.errors import InputError
+
+
+def parse_effect(text: str) -> tuple[str, dict[str, float]]:
+    """`NAME@JOINT` and parameter -> value; what is not given takes its typical value.
+
+    Raises:
+        InputError: an unknown effect or parameter, or a value that is no number.
+    """
+    name, _, assignments = text.partition(":")
+    name = name.strip()
+    parameters = {one.name: one.typical for one in find_effect(name.partition("@")[0]).parameters}
+    for assignment in filter(None, (part.strip() for part in assignments.split(","))):
+        key, equals, value = (part.strip() for part in assignment.partition("="))
+        if key not in parameters or not equals:
+            raise InputError(f"hidden: '{assignment}' in '{text}': {name} has the parameters {sorted(parameters)}")
+        try:
+            parameters[key] = float(value)
+        except ValueError:
+            raise InputError(f"hidden: '{assignment}' in '{text}': '{value}' is no number") from None
+    return name, parameters

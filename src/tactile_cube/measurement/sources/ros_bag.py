@@ -1,0 +1,125 @@
+"""A ROS 2 bag in MCAP (joint states and commands) as a recording; needs the extra `ros`, but no ROS."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.description import TrialEntry
+from tactile_cube.measurement.rig import read_rig
+from tactile_cube.measurement.sources.source import described
+from tactile_cube.measurement.writing import RecordingTables, TrialTable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RosBag:
+    """Imports bags, one trial each.
+
+    Attributes:
+        files: MCAP files.
+        urdf: path of the rig's URDF.
+        joints: actuated joints, named as in the joint states.
+        controller: kp, kd, torque_limit.
+        states: topic of sensor_msgs/JointState; effort, where there is one, becomes torque.
+        commands: topic of sensor_msgs/JointState, trajectory_msgs/JointTrajectory or std_msgs/Float64MultiArray (in the
+            order of `joints`).
+        nominal: stiffness, static_friction, reflected_inertia, as far as known.
+        gravity: (3,) in the base frame [m/s^2].
+        rate: samples per second; null: the median of the first bag.
+        read: `after` or `before` the control period; a state that arrives before its command is `before`.
+    """
+
+    files: Iterable[str]
+    urdf: str
+    joints: Iterable[str]
+    controller: Mapping[str, float]
+    states: str = "/joint_states"
+    commands: str = "/joint_commands"
+    nominal: Mapping[str, float] = field(default_factory=dict)
+    gravity: Iterable[float] = (0.0, 0.0, -9.81)
+    rate: float | None = None
+    read: str = "before"
+
+    def recordings(self, seed: int) -> dict[str, RecordingTables]:
+        """One recording of all bags."""
+        rig, joints = read_rig(Path(self.urdf)), list(self.joints)
+        tables = []
+        for name in self.files:
+            path = Path(name)
+            entry = TrialEntry(file=f"trials/{path.stem}.parquet", kind=path.stem, note=f"from {path.name}")
+            tables.append(self._trial(path, joints, entry))
+        rate = self.rate if self.rate is not None else float(np.round(1 / np.median(np.diff(tables[0].time)), 2))
+        description = described(
+            gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=dict(self.controller),
+            nominal=dict(self.nominal), sensors={"read": self.read},
+        )  # fmt: skip
+        return {"": RecordingTables(description, rig.text, tables)}
+
+    def _trial(self, path: Path, joints: list[str], entry: TrialEntry) -> TrialTable:
+        messages = _messages(path, (self.states, self.commands))
+        states = [(time, _by_joint(m, joints, path, "position")) for time, m in messages[self.states]]
+        efforts = [_effort(m, joints) for _, m in messages[self.states]]
+        orders = [(time, _by_joint(m, joints, path, "command")) for time, m in messages[self.commands]]
+        time, position = np.array([t for t, _ in states]), np.stack([values for _, values in states])
+        when, command = np.array([t for t, _ in orders]), np.stack([values for _, values in orders])
+        first = max(time[0], when[0])
+        keep = time >= first
+        held = np.searchsorted(when, time[keep], side="right") - 1
+        torque = np.stack([e for e in efforts if e is not None])[keep] if None not in efforts else None
+        return TrialTable(entry, time[keep] - time[keep][0], command[held], position[keep], torque)
+
+
+def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float, Any]]]:
+    """Topic -> (time [s], message); the header's stamp where a message has one, else when it was logged."""
+    try:
+        from mcap.exceptions import McapError
+        from mcap_ros2.reader import read_ros2_messages
+    except ImportError:
+        raise InputError("source=mcap needs the optional extra: pip install 'tactile-cube[ros]'") from None
+    found: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
+    try:
+        for message in read_ros2_messages(str(path), topics=list(topics)):
+            found[message.channel.topic].append((_stamp(message), message.ros_msg))
+    except (OSError, McapError) as error:
+        raise InputError(f"{path}: not a complete MCAP file: {error}") from None
+    for topic, messages in found.items():
+        if len(messages) < 2:
+            raise InputError(
+                f"{path}: {len(messages)} messages on topic '{topic}'; set source.states and source.commands"
+            )
+    return {topic: sorted(messages, key=lambda one: one[0]) for topic, messages in found.items()}
+
+
+def _stamp(message: Any) -> float:
+    header = getattr(message.ros_msg, "header", None)
+    if header is not None and (header.stamp.sec or header.stamp.nanosec):
+        return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
+    return float(message.log_time_ns) * 1e-9
+
+
+def _by_joint(message: Any, joints: list[str], path: Path, signal: str) -> Array:
+    """Positions in the order of `joints`."""
+    if hasattr(message, "points"):
+        names, values = message.joint_names, message.points[0].positions
+    elif hasattr(message, "position"):
+        names, values = message.name, message.position
+    else:
+        names, values = joints, message.data
+    table = dict(zip(names, values, strict=False))
+    missing = [joint for joint in joints if joint not in table]
+    if missing:
+        raise InputError(f"{path}: {signal} of joint '{missing[0]}' is missing; the messages have {list(names)}")
+    return np.array([table[joint] for joint in joints], dtype=np.float64)
+
+
+def _effort(message: Any, joints: list[str]) -> Array | None:
+    if len(message.effort) != len(message.name):
+        return None
+    table = dict(zip(message.name, message.effort, strict=True))
+    return np.array([table[joint] for joint in joints], dtype=np.float64)

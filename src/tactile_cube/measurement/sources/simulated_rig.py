@@ -1,0 +1,172 @@
+"""A recording of a simulated rig: commands, joint offsets, sensor noise, and effects that the reader does not know of."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
+from tactile_cube.measurement.bench import BENCH_KINDS, bench_trials
+from tactile_cube.measurement.description import Coupling, Description, TrialEntry, per_joint
+from tactile_cube.measurement.excitation import excitation, safe_range
+from tactile_cube.measurement.parameters import Parameters
+from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.replay import Engine, Replay
+from tactile_cube.measurement.rig import Rig, parse_rig, read_rig
+from tactile_cube.measurement.sources.hidden_effect import parse_effect
+from tactile_cube.measurement.sources.source import described
+from tactile_cube.measurement.trial import Gains, Trial
+from tactile_cube.measurement.writing import RecordingTables, TrialTable
+
+Array = NDArray[np.float64]
+SETTLING = 1.0  # [s] at the first command before a trial is logged
+BUILT_IN = {"finger": lambda: finger_urdf(DLR_HAND2), "hand": lambda: hand_urdf(DLR_HAND2)}
+
+
+@dataclass(frozen=True)
+class SimulatedRig:
+    """Simulates a bench session.
+
+    Attributes:
+        urdf: `finger`, `hand` or the path of a URDF.
+        gravity: (3,) in the base frame [m/s^2].
+        controller: kp [N m/rad], kd [N m s/rad], torque_limit [N m].
+        nominal: what the owner is to believe: stiffness, static_friction, reflected_inertia.
+        true_spread: relative half width by which the true constants differ from what is believed.
+        hidden: effects, `NAME@JOINT` or `NAME@JOINT: parameter=value, ...`, that recording.yaml does not mention.
+        kinds: kinds of trial, in this order in every initialisation.
+        initialisations: how often the robot is initialised anew.
+        offset: half width of the joint offsets that an initialisation brings [rad].
+        duration: of a trial [s].
+        rate: samples per second [Hz].
+        reach: share of each joint's range that is used.
+        noise: standard deviation of the position [rad].
+        resolution: of the position [rad].
+        torque_noise: standard deviation of the torque [N m].
+        step: simulation step [s]; finer than the one that the reader's model takes.
+        engine: `fast` or `pybullet`.
+        validation: also write fresh commands into `validation`.
+        joints: actuated joints; by default all that mimic no other.
+    """
+
+    urdf: str = "finger"
+    gravity: Iterable[float] = (0.0, 0.0, -9.81)
+    controller: Mapping[str, float] = field(default_factory=dict)
+    nominal: Mapping[str, float] = field(default_factory=dict)
+    true_spread: float = 0.1
+    hidden: Iterable[str] = ()
+    kinds: Iterable[str] = ("ramps", "multisine", "policy", "holds")
+    initialisations: int = 3
+    offset: float = 0.02
+    duration: float = 12.0
+    rate: float = 500.0
+    reach: float = 0.75
+    noise: float = 2e-4
+    resolution: float = 1e-4
+    torque_noise: float = 2e-3
+    step: float = 2.5e-4
+    engine: Engine = "fast"
+    validation: bool = True
+    joints: Iterable[str] | None = None
+
+    def recordings(self, seed: int) -> dict[str, RecordingTables]:
+        """The recording, and fresh commands on the last initialisation under `validation`."""
+        rng = np.random.default_rng(seed)
+        rig = self._rig()
+        description = self._description(rig)
+        effects = tuple(parse_effect(text) for text in self.hidden)
+        constants = self._true_constants(description, rng)
+        offsets = rng.uniform(-self.offset, self.offset, (self.initialisations, len(description.joints)))
+        commands = {kind: self._command(kind, rig, description, rng) for kind in self.kinds if kind not in BENCH_KINDS}
+        fresh = {kind: self._command(kind, rig, description, rng) for kind in commands}
+        rig_only = _unmeasured(description, rig, constants)
+        simulator = Replay(rig_only, [name for name, _ in effects], self.step, self.engine)
+        session = _Session(self, simulator, constants, effects, rng)
+        last = self.initialisations - 1
+        repeated = [
+            session.play(TrialEntry(file=f"trials/{kind}_{n}.parquet", initialisation=n, kind=kind), command, offset)
+            for n, offset in enumerate(offsets)
+            for kind, command in commands.items()
+        ]
+        bench = bench_trials(rig, description, self.kinds, self.initialisations, rng)
+        benched = [session.play(entry, command, offsets[entry.initialisation]) for entry, command in bench]
+        result = {"": RecordingTables(description, rig.text, repeated + benched)}
+        if self.validation:
+            entries = [TrialEntry(file=f"{kind}.parquet", initialisation=last, kind=kind) for kind in fresh]
+            played = [session.play(entry, fresh[entry.kind], offsets[last]) for entry in entries]
+            result["validation"] = RecordingTables(description, rig.text, played)
+        simulator.close()
+        return result
+
+    def _rig(self) -> Rig:
+        if self.urdf in BUILT_IN:
+            return parse_rig(BUILT_IN[self.urdf](), Path(f"{self.urdf}.urdf"))
+        return read_rig(Path(self.urdf))
+
+    def _description(self, rig: Rig) -> Description:
+        followers = {name: joint.mimics for name, joint in rig.joints.items() if joint.mimics is not None}
+        joints = (
+            list(self.joints) if self.joints is not None else [name for name in rig.joints if name not in followers]
+        )
+        coupled = {name: Coupling(joint=leader) for name, leader in followers.items() if leader in joints}
+        return described(
+            gravity=list(self.gravity), rate_hz=self.rate, joints=joints, coupled=coupled,
+            controller=dict(self.controller), nominal=dict(self.nominal),
+            sensors={"position_resolution": self.resolution},
+        )  # fmt: skip
+
+    def _true_constants(self, description: Description, rng: np.random.Generator) -> dict[str, Array]:
+        """Gains as stated; damping, friction and inertia differ from what is believed, joint by joint."""
+        joints = tuple(description.joints)
+        stated = {key: getattr(description.controller, key) for key in ("kp", "kd", "torque_limit")} | dict(
+            self.nominal
+        )
+        constants = {key: per_joint(value, joints, key) for key, value in stated.items()}
+        for key in ("kd", "static_friction", "reflected_inertia"):
+            constants[key] = constants[key] * rng.uniform(1 - self.true_spread, 1 + self.true_spread, len(joints))
+        return constants
+
+    def _command(self, kind: str, rig: Rig, description: Description, rng: np.random.Generator) -> Array:
+        ranges = np.array([safe_range(rig.joints[joint], self.reach) for joint in description.joints])
+        return excitation(kind, ranges[:, 0], ranges[:, 1], self.duration, self.rate, rng)
+
+
+@dataclass(frozen=True)
+class _Session:
+    """One rig with its true constants, and its sensors."""
+
+    settings: SimulatedRig
+    simulator: Replay
+    constants: dict[str, Array]
+    effects: tuple[tuple[str, dict[str, float]], ...]
+    rng: np.random.Generator
+
+    def play(self, entry: TrialEntry, command: Array, offset: Array) -> TrialTable:
+        """Simulate one trial and log it as the rig's sensors would."""
+        settle = round(SETTLING * self.settings.rate)
+        trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), self.simulator.recording, entry)
+        result = self.simulator.simulate([trial], Parameters(self.constants, self.effects, -offset))[0]
+        position = result.position[settle:] + self.rng.normal(0, self.settings.noise, command.shape)
+        if self.settings.resolution > 0:
+            position = np.round(position / self.settings.resolution) * self.settings.resolution
+        torque = result.torque[settle:] + self.rng.normal(0, self.settings.torque_noise, command.shape)
+        time = np.arange(len(command)) / self.settings.rate
+        return TrialTable(entry, time, command, position, torque)
+
+
+def _unmeasured(description: Description, rig: Rig, constants: dict[str, Array]) -> Recording:
+    """The rig as a recording without trials, as the replay wants it."""
+    gains = Gains(constants["kp"], constants["kd"], constants["torque_limit"])
+    return Recording(rig.path.parent, description, rig, gains, {}, ())
+
+
+def _silent_trial(command: Array, rig: Recording, entry: TrialEntry) -> Trial:
+    """A trial that starts at rest at its first command."""
+    time = np.arange(len(command)) / rig.rate
+    still = np.broadcast_to(command[0], command.shape)
+    valid = np.ones(len(command), dtype=bool)
+    torque = np.zeros_like(command)
+    return Trial(entry.kind, entry.file, entry.kind, entry.initialisation, time, command, still, torque, valid,
+                 rig.gains, entry.force, entry.clamped)  # fmt: skip

@@ -1,0 +1,21 @@
+"""What every source of recordings gives."""
+
+from typing import Protocol
+
+from tactile_cube.measurement.description import Description, TrialEntry
+from tactile_cube.measurement.writing import RecordingTables
+
+PLACEHOLDER = [TrialEntry(file="none")]
+
+
+class Source(Protocol):
+    """Makes recordings."""
+
+    def recordings(self, seed: int) -> dict[str, RecordingTables]:
+        """Sub-folder -> recording; `""` is the recording itself, `validation` what identification must not see."""
+        ...
+
+
+def described(**values: object) -> Description:
+    """A checked description whose trials are to come from the tables."""
+    return Description.model_validate({"format": 1, "trials": PLACEHOLDER} | values)
