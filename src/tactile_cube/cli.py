@@ -5,11 +5,12 @@ and `--cfg job` answer at once.
 """
 
 import ast
+import contextlib
 import functools
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -24,6 +25,7 @@ CONFIG = Path(__file__).parent / "conf"
 """The configuration tree; in a checkout a link to conf/ at the top."""
 
 USAGE_ERROR = 2
+INTERRUPTED = 130
 
 
 def verb(name: str) -> Callable[[Callable[["DictConfig"], None]], Callable[[], None]]:
@@ -52,25 +54,45 @@ def verb(name: str) -> Callable[[Callable[["DictConfig"], None]], Callable[[], N
 
 def _run(name: str, function: Callable[["DictConfig"], None]) -> None:
     import hydra
+
+    wants_traceback = os.environ.get("HYDRA_FULL_ERROR", "0") != "0"
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # else Hydra prints errors in its own way and exits with status 1
+
+    @functools.wraps(function)
+    def guarded(config: "DictConfig") -> None:
+        # inside Hydra, which otherwise adds lines of its own
+        with _errors_in_one_line(wants_traceback):
+            function(config)
+
+    with _errors_in_one_line(wants_traceback):
+        hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(guarded)()
+
+
+@contextlib.contextmanager
+def _errors_in_one_line(wants_traceback: bool) -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    except Exception as error:
+        message = None if wants_traceback else usage_error(error)
+        if message is None:
+            raise
+        fail(message)
+
+
+def usage_error(error: BaseException) -> str | None:
+    """What the user did wrong, in one line; None if the error is none of the user's."""
     from hydra.errors import HydraException
     from omegaconf.errors import OmegaConfBaseException
     from pydantic import ValidationError
 
-    wants_traceback = bool(os.environ.get("HYDRA_FULL_ERROR", "0") != "0")
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra would print errors in its own way and exit with status 1
-    try:
-        hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(function)()
-    except KeyboardInterrupt:
-        print("stopped", file=sys.stderr)
-        sys.exit(130)
-    except Exception as error:
-        if wants_traceback:
-            raise
-        cause = _find(error, InputError) or _find(error, ValidationError)
-        cause = cause or _find(error, (HydraException, OmegaConfBaseException))
-        if cause is None:
-            raise
-        fail(_one_line(cause))
+    for kinds in (InputError, ValidationError, (HydraException, OmegaConfBaseException)):
+        cause = _find(error, kinds)
+        if cause is not None:
+            return _one_line(cause)
+    return None
 
 
 def fail(message: str) -> NoReturn:
@@ -93,13 +115,15 @@ def _one_line(error: BaseException) -> str:
 
     if isinstance(error, ValidationError):
         return "; ".join(_describe(error.title, dict(entry)) for entry in error.errors())
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return " ".join(lines) or type(error).__name__
+    # Hydra appends where it searched, which nobody asked for
+    text = str(error).partition("Config search path:")[0]
+    return " ".join(text.split()) or type(error).__name__
 
 
 def _describe(title: str, entry: dict[str, Any]) -> str:
     group = title.removesuffix("Settings").lower()
-    key = ".".join([group, *(str(part) for part in entry["loc"])])
+    prefix = [] if group == "run" else [group]  # the run's own settings stand at the top
+    key = ".".join([*prefix, *(str(part) for part in entry["loc"])])
     message = str(entry["msg"]).removeprefix("Value error, ")
     if entry["type"] == "extra_forbidden":
         return f"{key}: no such setting"
@@ -159,7 +183,7 @@ def _summary(file: Path) -> str:
 def _groups(path: Path) -> dict[str, str | None]:
     groups: dict[str, str | None] = {}
     for entry in yaml.safe_load(path.read_text()).get("defaults", []):
-        if isinstance(entry, dict):
+        if isinstance(entry, dict) and "@" not in next(iter(entry)):  # "@": not a choice of its own
             ((group, option),) = entry.items()
             name = group.removeprefix("override ").removeprefix("optional ").split("@")[0].strip("/ ")
             if (CONFIG / name).is_dir() and name != "hydra":

@@ -1,7 +1,7 @@
 """Train a policy, or go on training it: the same command resumes.
 
 What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and policy_best.safetensors,
-checkpoint.pt (to go on from), ledger.json (CPU-hours), .hydra/ (configuration) and train.log.
+checkpoint.pt (to go on from), ledger.json (CPU-hours) and .hydra/ (configuration).
 """
 
 from typing import TYPE_CHECKING
@@ -25,14 +25,14 @@ def main(config: "DictConfig") -> None:
     from tactile_cube.training.build import build_run
     from tactile_cube.training.collection import CollectionError
     from tactile_cube.training.environment import as_environment
-    from tactile_cube.training.settings import CollectorSettings, TrainingSettings
+    from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
     plain = OmegaConf.to_container(config, resolve=True)
     folder = Path(HydraConfig.get().runtime.output_dir)
     try:
         run = build_run(
             folder=folder,
-            seed=config.seed,
+            seed=RunSettings(name=config.name, seed=config.seed).seed,
             environment=as_environment(instantiate(config.env)),
             make_agent=instantiate(config.agent, _partial_=True),
             collector=CollectorSettings(**plain["collector"]),

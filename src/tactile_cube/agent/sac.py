@@ -38,7 +38,7 @@ class Sac:
         self.settings = AgentSettings(**settings)
         if self.settings.precision != "fp32":
             raise InputError(f"agent.precision={self.settings.precision}: agent=sac computes in fp32; use agent=sac_fast")
-        self.device = torch.device(self.settings.device)
+        self.device = self.settings.torch_device()
         self.actor, *critics = build_networks(sizes, self.settings)
         self.loss = self._build_loss(critics).to(self.device)
         self.targets = SoftUpdate(self.loss, tau=self.settings.tau)

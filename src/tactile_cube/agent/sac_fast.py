@@ -63,7 +63,7 @@ class FastSac:
     def __init__(self, sizes: Sizes, **settings: Any):
         self.sizes = sizes
         self.settings = AgentSettings(**settings)
-        self.device = torch.device(self.settings.device)
+        self.device = self.settings.torch_device()
         self.networks = FlatNetworks(sizes, self.settings, self.device)
         modules = build_networks(sizes, self.settings)
         for flat, module in zip(self.networks.masters, modules, strict=True):

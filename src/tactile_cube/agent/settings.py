@@ -2,7 +2,10 @@
 
 from typing import Literal
 
+import torch
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
+
+from tactile_cube.errors import InputError
 
 
 class AgentSettings(BaseModel):
@@ -41,6 +44,16 @@ class AgentSettings(BaseModel):
     batch_size: PositiveInt = 256
     precision: Literal["fp32", "bf16"] = "fp32"
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?)$")
+
+    def torch_device(self) -> torch.device:
+        """The device, if it is there.
+
+        Raises:
+            InputError: a GPU is asked for and torch finds none.
+        """
+        if self.device != "cpu" and not torch.cuda.is_available():
+            raise InputError(f"agent.device={self.device}: torch finds no CUDA device here; use agent.device=cpu")
+        return torch.device(self.device)
 
     @property
     def temperature_learning_rate(self) -> float:

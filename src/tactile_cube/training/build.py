@@ -59,22 +59,26 @@ def build_run(
     if saved is None and training.init_from:
         warm_start(agent, Path(training.init_from))
     collection = build_collection(environment, agent.policy(), collector, training)
-    learner = Learner(
-        agent=agent,
-        replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
-        collection=collection,
-        episodes=EpisodeStatistics(environment.outcomes),
-        settings=training,
-        reward_weights=environment.reward_weights,
-        seed=seed,
-    )
-    if saved is not None:
-        learner.load_state_dict(saved["learner"])
-    in_process = isinstance(collection, SingleCollection)
-    processes = 1 if in_process else collector.workers + 1
-    ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
-    made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
-    run = Run(learner, folder, config, Loggers(made), ledger)
+    try:
+        learner = Learner(
+            agent=agent,
+            replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
+            collection=collection,
+            episodes=EpisodeStatistics(environment.outcomes),
+            settings=training,
+            reward_weights=environment.reward_weights,
+            seed=seed,
+        )
+        if saved is not None:
+            learner.load_state_dict(saved["learner"])
+        in_process = isinstance(collection, SingleCollection)
+        processes = 1 if in_process else collector.workers + 1
+        ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
+        made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
+        run = Run(learner, folder, config, Loggers(made), ledger)
+    except BaseException:
+        collection.close()  # worker processes would keep the program from ending
+        raise
     run.best_angle = saved["best_angle"] if saved is not None else 0.0
     return run
 

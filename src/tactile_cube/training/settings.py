@@ -6,6 +6,20 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
 
+class RunSettings(BaseModel):
+    """What tells runs apart.
+
+    Attributes:
+        name: of the run, part of its folder's name.
+        seed: of everything random.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str = Field(min_length=1)
+    seed: NonNegativeInt
+
+
 class CollectorSettings(BaseModel):
     """How many worlds are stepped where.
 
