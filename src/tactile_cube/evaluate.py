@@ -1,4 +1,4 @@
-"""Verb: try a policy, judge every episode, film the best one."""
+"""Try a policy, judge every episode, film the best one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verb: write a policy for a robot as ONNX or plain arrays, with the contract it is to be run by."""
+"""Write a policy for a robot as ONNX or plain arrays, with the contract it is to be run by."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verb: write the paper's results beside ours, and the learning curves."""
+"""Write the paper's results beside ours, and the learning curves."""
 
 from __future__ import annotations
 

@@ -44,7 +44,9 @@ def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
     try:
         made = hydra.utils.instantiate(settings)
     except hydra.errors.InstantiationException as error:
-        raise InputError(f"policy={source.label}: its environment cannot be made again: {error}") from error
+        if isinstance(error.__cause__, InputError):
+            raise error.__cause__ from None
+        raise InputError(f"environment of policy={source.label}: {error}") from error
     if not isinstance(made, EnvConfig):
         raise InputError(f"policy={source.label}: its configuration has no environment of this package")
     return made

@@ -131,8 +131,8 @@ ROWS = (
 
 INTRODUCTION = (
     "Written by `python -m tactile_cube.results` from the results files under docs/results/runs. Paper: Sievers, Pitz, "
-    "Bäuml, *Learning Purely Tactile In-Hand Manipulation with a Torque-Controlled Hand*, ICRA 2022. Here everything is "
-    "simulation; the paper's robot numbers are a real hand's."
+    "Bäuml, *Learning Purely Tactile In-Hand Manipulation with a Torque-Controlled Hand*, ICRA 2022. Here everything "
+    "is simulation; the paper's robot numbers are a real hand's."
 )
 
 

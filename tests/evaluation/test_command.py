@@ -1,0 +1,45 @@
+"""`python -m tactile_cube.evaluate`, as a user types it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def evaluate(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tactile_cube.evaluate", *words]
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=250)
+
+
+def test_a_baseline_is_judged_filmed_and_recorded(tmp_path: Path) -> None:
+    run = evaluate(tmp_path, "policy=hold", "protocol=smoke", "protocol.seconds=1", f"hydra.run.dir={tmp_path}/run")
+    assert run.returncode == 0, run.stderr
+    assert "2 holding" in run.stdout
+    data = json.loads((tmp_path / "run" / "results.json").read_text())
+    assert [row["verdict"] for row in data["variants"][0]["episodes"]] == ["holding", "holding"]
+    for ending in (".gif", ".png", ".rrd", ".npz"):
+        assert list((tmp_path / "run").glob(f"episode*{ending}")), ending
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["policy=nobody"], "policy=nobody: no such file"),
+        (["policy=hold", "+task.filter_time=-1"], "task.filter_time is -1"),
+    ],
+)
+def test_wrong_values_end_with_a_clear_message_and_status_2(tmp_path: Path, words: list[str], message: str) -> None:
+    run = evaluate(tmp_path, *words, "film=false")
+    assert run.returncode == 2
+    assert message in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_help_is_quick_and_says_how_to_open_the_recording(tmp_path: Path) -> None:
+    run = evaluate(tmp_path, "--help")
+    assert run.returncode == 0
+    assert "rerun outputs/evaluate" in run.stdout
