@@ -16,7 +16,7 @@ def main(config: DictConfig) -> None:
     from tactile_cube.evaluation.training_curve import read_curve
     from tactile_cube.visualization.curves import write_learning_curves
 
-    curves = [read_curve(Path(run), label=Path(run).stem) for run in config.training]
+    curves = [read_curve(Path(run), label=Path(run).stem) for run in config.curves]
     page = Path(config.page)
     page.parent.mkdir(parents=True, exist_ok=True)
     page.write_text(paper_page(read_all(Path(config.runs)), curves), encoding="utf-8")
