@@ -14,7 +14,7 @@ help: ## print these targets
 .venv/installed: pyproject.toml requirements.txt
 	@echo "installing into .venv (a few minutes the first time)"
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements.txt --editable '.[dev,ros,onnx]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.txt --editable '.[dev,ros,onnx]'
 	@touch $@
 
 train: .venv/installed ## teach the hand; Ctrl-C saves, the same command goes on

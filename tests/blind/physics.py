@@ -87,6 +87,62 @@ INFINITE = ("rate_limit", "saturation", "stop_upper", "torque_limit", "stiffness
 ONES = ("gain", "stribeck_velocity", "transmission_order", "cogging_order", "detent_width", "drift_time")
 
 
+VECTORS = tuple(name for name in Plant._fields if name not in MATRICES)
+(
+    KP,
+    KD,
+    TORQUE_LIMIT,
+    STIFFNESS,
+    STATIC_FRICTION,
+    REFLECTED_INERTIA,
+    OFFSET,
+    DELAY,
+    RATE_LIMIT,
+    ERROR_DEAD_ZONE,
+    TORQUE_DEAD_ZONE,
+    SATURATION,
+    LAG,
+    VELOCITY_LAG,
+    GAIN,
+    BIAS,
+    BACKLASH,
+    CUBIC_STIFFNESS,
+    TRANSMISSION,
+    TRANSMISSION_ORDER,
+    TRANSMISSION_PHASE,
+    VISCOUS,
+    STRIBECK,
+    STRIBECK_VELOCITY,
+    LOAD_FRICTION,
+    ASYMMETRY,
+    PRESLIDING,
+    DRIFT,
+    DRIFT_TIME,
+    DRAG,
+    COGGING,
+    COGGING_ORDER,
+    COGGING_PHASE,
+    SPRING,
+    SPRING_CENTRE,
+    DETENT,
+    DETENT_CENTRE,
+    DETENT_WIDTH,
+    STOP_LOWER,
+    STOP_UPPER,
+    STOP_STIFFNESS,
+    POSITION_VELOCITY,
+    DISTURBANCE,
+    DISTURBANCE_FREQUENCY,
+    DISTURBANCE_PHASE,
+    ACCELERATION_FRICTION,
+    RELAY,
+    RELAY_CENTRE,
+    RELAY_WIDTH,
+    EVEN_DRAG,
+) = range(len(VECTORS))
+CROSSTALK, VISCOUS_COUPLING, DRY_COUPLING, NEIGHBOUR_FRICTION = range(len(MATRICES))
+
+
 def neutral(joints: int) -> Plant:
     """A plant in which every effect is off (and every controller gain zero)."""
     values = {}
@@ -229,12 +285,12 @@ def _closed_loop(p, i, error, speed, gap):
     """Controller torque, the drive's stretch in the loop; `error` is q_d minus the joint's reading, `gap` the play."""
     torque = 0.0
     for _ in range(40):
-        stretch = _deflection(torque, p.stiffness[i], p.cubic_stiffness[i])
-        wanted = p.kp[i] * _dead_zone(error - gap - stretch, p.error_dead_zone[i]) - p.kd[i] * speed
-        wanted = _dead_zone(wanted, p.torque_dead_zone[i])
-        limit = min(p.torque_limit[i], p.saturation[i])
+        stretch = _deflection(torque, p[STIFFNESS, i], p[CUBIC_STIFFNESS, i])
+        wanted = p[KP, i] * _dead_zone(error - gap - stretch, p[ERROR_DEAD_ZONE, i]) - p[KD, i] * speed
+        wanted = _dead_zone(wanted, p[TORQUE_DEAD_ZONE, i])
+        limit = min(p[TORQUE_LIMIT, i], p[SATURATION, i])
         wanted = min(max(wanted, -limit), limit)
-        change = (wanted - torque) / (1.0 + p.kp[i] / p.stiffness[i])
+        change = (wanted - torque) / (1.0 + p[KP, i] / p[STIFFNESS, i])
         torque += change
         if abs(change) < 1e-10:
             break
@@ -244,14 +300,14 @@ def _closed_loop(p, i, error, speed, gap):
 @njit(cache=True)
 def _drive(p, i, error, speed):
     """Controller torque and position of the play: pressed to the side that transmits torque, floating in between."""
-    half = 0.5 * p.backlash[i]
+    half = 0.5 * p[BACKLASH, i]
     torque = _closed_loop(p, i, error, speed, half)
     if half == 0.0 or torque > 0.0:
         return torque, half
     torque = _closed_loop(p, i, error, speed, -half)
     if torque < 0.0:
         return torque, -half
-    return 0.0, min(max(error - p.kd[i] * speed / p.kp[i], -half), half)
+    return 0.0, min(max(error - p[KD, i] * speed / p[KP, i], -half), half)
 
 
 @njit(cache=True)
@@ -265,7 +321,8 @@ def _stick_or_slip(v, inverse, low, high, impulse):
             wanted = min(max(impulse[i] + out[i] / inverse[i, i], low[i]), high[i])
             change = wanted - impulse[i]
             impulse[i] = wanted
-            out -= inverse[:, i] * change
+            for j in range(n):
+                out[j] -= inverse[j, i] * change
             moved += abs(change)
         if moved < 1e-14:
             break
@@ -273,33 +330,33 @@ def _stick_or_slip(v, inverse, low, high, impulse):
 
 
 @njit(cache=True)
-def _joint_torques(p, i, t, q, v, relay):
+def _joint_torques(p, m, i, t, q, v, relay):
     """Torques that depend on the motion alone, friction excepted."""
-    torque = -p.viscous[i] * v[i] - p.drag[i] * v[i] * abs(v[i]) - p.even_drag[i] * v[i] * v[i]
-    torque += p.cogging[i] * np.sin(p.cogging_order[i] * q[i] + p.cogging_phase[i])
-    torque -= p.spring[i] * (q[i] - p.spring_centre[i])
-    x = (q[i] - p.detent_centre[i]) / p.detent_width[i]
-    torque -= p.detent[i] * x * np.exp(0.5 - 0.5 * x * x)
-    torque += p.position_velocity[i] * q[i] * v[i]
-    torque += p.disturbance[i] * np.sin(6.283185307179586 * p.disturbance_frequency[i] * t + p.disturbance_phase[i])
-    torque += p.relay[i] * relay[i]
-    if q[i] > p.stop_upper[i]:
-        torque -= p.stop_stiffness[i] * (q[i] - p.stop_upper[i]) + max(0.002 * p.stop_stiffness[i] * v[i], 0.0)
-    if q[i] < p.stop_lower[i]:
-        torque -= p.stop_stiffness[i] * (q[i] - p.stop_lower[i]) + min(0.002 * p.stop_stiffness[i] * v[i], 0.0)
+    torque = -p[VISCOUS, i] * v[i] - p[DRAG, i] * v[i] * abs(v[i]) - p[EVEN_DRAG, i] * v[i] * v[i]
+    torque += p[COGGING, i] * np.sin(p[COGGING_ORDER, i] * q[i] + p[COGGING_PHASE, i])
+    torque -= p[SPRING, i] * (q[i] - p[SPRING_CENTRE, i])
+    x = (q[i] - p[DETENT_CENTRE, i]) / p[DETENT_WIDTH, i]
+    torque -= p[DETENT, i] * x * np.exp(0.5 - 0.5 * x * x)
+    torque += p[POSITION_VELOCITY, i] * q[i] * v[i]
+    torque += p[DISTURBANCE, i] * np.sin(6.283185307179586 * p[DISTURBANCE_FREQUENCY, i] * t + p[DISTURBANCE_PHASE, i])
+    torque += p[RELAY, i] * relay[i]
+    if q[i] > p[STOP_UPPER, i]:
+        torque -= p[STOP_STIFFNESS, i] * (q[i] - p[STOP_UPPER, i]) + max(0.002 * p[STOP_STIFFNESS, i] * v[i], 0.0)
+    if q[i] < p[STOP_LOWER, i]:
+        torque -= p[STOP_STIFFNESS, i] * (q[i] - p[STOP_LOWER, i]) + min(0.002 * p[STOP_STIFFNESS, i] * v[i], 0.0)
     for j in range(q.shape[0]):
-        torque -= p.viscous_coupling[i, j] * v[j] + p.dry_coupling[i, j] * np.tanh(v[j] / 0.02)
+        torque -= m[VISCOUS_COUPLING, i, j] * v[j] + m[DRY_COUPLING, i, j] * np.tanh(v[j] / 0.02)
     return torque
 
 
 @njit(cache=True)
-def _friction_level(p, i, t, q, v, load, acceleration):
+def _friction_level(p, m, i, t, q, v, load, acceleration):
     """Dry friction [N m] of joint i, without its asymmetry."""
-    level = p.static_friction[i] * (1.0 + p.drift[i] * (1.0 - np.exp(-max(t, 0.0) / p.drift_time[i])))
-    level += p.stribeck[i] * np.exp(-((v[i] / p.stribeck_velocity[i]) ** 2))
-    level += p.load_friction[i] * abs(load) + p.acceleration_friction[i] * abs(acceleration)
+    level = p[STATIC_FRICTION, i] * (1.0 + p[DRIFT, i] * (1.0 - np.exp(-max(t, 0.0) / p[DRIFT_TIME, i])))
+    level += p[STRIBECK, i] * np.exp(-((v[i] / p[STRIBECK_VELOCITY, i]) ** 2))
+    level += p[LOAD_FRICTION, i] * abs(load) + p[ACCELERATION_FRICTION, i] * abs(acceleration)
     for j in range(q.shape[0]):
-        level += p.neighbour_friction[i, j] * (1.0 + np.sin(4.0 * q[j]))
+        level += m[NEIGHBOUR_FRICTION, i, j] * (1.0 + np.sin(4.0 * q[j]))
     return level
 
 
@@ -307,18 +364,18 @@ def _friction_level(p, i, t, q, v, load, acceleration):
 def _log(p, q, held, filtered, state, position, torque, joint):
     """What the sensors say at the end of the interval in which a command was in force."""
     for i in range(q.shape[0]):
-        error = held[i] - q[i] - p.offset[i]
-        error -= p.transmission[i] * np.sin(p.transmission_order[i] * q[i] + p.transmission_phase[i])
+        error = held[i] - q[i] - p[OFFSET, i]
+        error -= p[TRANSMISSION, i] * np.sin(p[TRANSMISSION_ORDER, i] * q[i] + p[TRANSMISSION_PHASE, i])
         gap = 0.0
-        if p.backlash[i] > 0.0:
+        if p[BACKLASH, i] > 0.0:
             gap = _drive(p, i, error, filtered[i])[1]
-        position[i] = held[i] - error + _deflection(state[i], p.stiffness[i], p.cubic_stiffness[i]) + gap
+        position[i] = held[i] - error + _deflection(state[i], p[STIFFNESS, i], p[CUBIC_STIFFNESS, i]) + gap
         torque[i] = state[i]
         joint[i] = q[i]
 
 
 @njit(cache=True)
-def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, command, start, rate, settle, step):
+def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, m, command, start, rate, settle, step):
     """Sampled motor positions and torques (samples, joints) under a command held between its samples."""
     samples, n = command.shape
     per = round(1.0 / (rate * step))
@@ -332,38 +389,38 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, comma
         t = k * step
         qm, vm = q + 0.5 * step * v, v + 0.5 * step * acceleration
         for i in range(n):
-            late = int(np.floor((t - p.delay[i]) * rate + 1e-6))
+            late = int(np.floor((t - p[DELAY, i]) * rate + 1e-6))
             target = command[min(max(late, 0), samples - 1), i]
-            most = p.rate_limit[i] * step
+            most = p[RATE_LIMIT, i] * step
             held[i] += min(max(target - held[i], -most), most)
             filtered[i] = (
-                vm[i] if p.velocity_lag[i] <= 0 else filtered[i] + (vm[i] - filtered[i]) * step / p.velocity_lag[i]
+                vm[i] if p[VELOCITY_LAG, i] <= 0 else filtered[i] + (vm[i] - filtered[i]) * step / p[VELOCITY_LAG, i]
             )
-            error = held[i] - qm[i] - p.offset[i]
-            error -= p.transmission[i] * np.sin(p.transmission_order[i] * qm[i] + p.transmission_phase[i])
-            if p.lag[i] > 0.0:
-                stretch = _deflection(state[i], p.stiffness[i], p.cubic_stiffness[i])
-                wanted = p.kp[i] * (error - stretch) - p.kd[i] * filtered[i]
-                wanted = min(max(wanted, -p.torque_limit[i]), p.torque_limit[i])
-                state[i] += (wanted - state[i]) * step / p.lag[i]
+            error = held[i] - qm[i] - p[OFFSET, i]
+            error -= p[TRANSMISSION, i] * np.sin(p[TRANSMISSION_ORDER, i] * qm[i] + p[TRANSMISSION_PHASE, i])
+            if p[LAG, i] > 0.0:
+                stretch = _deflection(state[i], p[STIFFNESS, i], p[CUBIC_STIFFNESS, i])
+                wanted = p[KP, i] * (error - stretch) - p[KD, i] * filtered[i]
+                wanted = min(max(wanted, -p[TORQUE_LIMIT, i]), p[TORQUE_LIMIT, i])
+                state[i] += (wanted - state[i]) * step / p[LAG, i]
             else:
                 state[i] = _drive(p, i, error, filtered[i])[0]
-            edge = p.relay_centre[i] + (-0.5 if relay[i] > 0 else 0.5) * p.relay_width[i]
+            edge = p[RELAY_CENTRE, i] + (-0.5 if relay[i] > 0 else 0.5) * p[RELAY_WIDTH, i]
             relay[i] = 1.0 if qm[i] > edge else -1.0
         for i in range(n):
-            load[i] = p.gain[i] * state[i] + p.bias[i]
+            load[i] = p[GAIN, i] * state[i] + p[BIAS, i]
             for j in range(n):
-                load[i] += p.crosstalk[i, j] * state[j]
-            torque[i] = load[i] + _joint_torques(p, i, t, qm, vm, relay)
-            level = _friction_level(p, i, t, qm, vm, load[i], acceleration[i])
-            if p.presliding[i] > 0.0:
+                load[i] += m[CROSSTALK, i, j] * state[j]
+            torque[i] = load[i] + _joint_torques(p, m, i, t, qm, vm, relay)
+            level = _friction_level(p, m, i, t, qm, vm, load[i], acceleration[i])
+            if p[PRESLIDING, i] > 0.0:
                 way = 1.0 if vm[i] >= 0 else -1.0
-                bristle[i] = way + (bristle[i] - way) * np.exp(-abs(vm[i]) * step / p.presliding[i])
+                bristle[i] = way + (bristle[i] - way) * np.exp(-abs(vm[i]) * step / p[PRESLIDING, i])
                 torque[i] -= level * bristle[i]
                 level = 0.0
-            low[i], high[i] = -step * level * (1.0 - p.asymmetry[i]), step * level * (1.0 + p.asymmetry[i])
+            low[i], high[i] = -step * level * (1.0 - p[ASYMMETRY, i]), step * level * (1.0 + p[ASYMMETRY, i])
         mass, bias = mass_and_bias(axes, origins, coms, masses, inertias, gravity, select @ qm + shift, select @ vm)
-        inverse, reduced_bias = _reduced(mass, bias, select, p.reflected_inertia)
+        inverse, reduced_bias = _reduced(mass, bias, select, p[REFLECTED_INERTIA])
         free = v + step * (inverse @ (torque - reduced_bias))
         after = _stick_or_slip(free, inverse, low, high, impulse)
         acceleration = (after - v) / step
@@ -383,4 +440,7 @@ def simulate(
     sensors say at the end of the interval in which command k was in force.
     """
     select, shift = rig.selection()
-    return _run(*rig.arrays(), np.array(rig.gravity), select, shift, plant, command, start, rate, settle, step)
+    vectors = np.stack([getattr(plant, name) for name in VECTORS])
+    matrices = np.stack([getattr(plant, name) for name in MATRICES])
+    gravity = np.array(rig.gravity)
+    return _run(*rig.arrays(), gravity, select, shift, vectors, matrices, command, start, rate, settle, step)

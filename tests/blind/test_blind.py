@@ -1,0 +1,166 @@
+"""The blind world against a second engine, its recordings, the judge's rules, and a few quick draws with the real verbs."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+import yaml
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import generator
+import hidden
+import judge
+from physics import mass_and_bias, neutral, simulate
+from rig import RIGS
+from scoring import score
+
+QUICK = 3.0
+
+
+@pytest.mark.parametrize("kind", sorted(RIGS))
+def test_dynamics_equal_those_of_mujoco(kind: str) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    rig = RIGS[kind](np.random.default_rng(3))
+    header = '<mujoco><compiler fusestatic="false" balanceinertia="false"/></mujoco><link name="base"/>'
+    model = mujoco.MjModel.from_xml_string(rig.urdf().replace('<link name="base"/>', header))
+    model.opt.gravity[:] = rig.gravity
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = (np.random.default_rng(i).normal(size=len(rig.links)) for i in (1, 2))
+    mujoco.mj_forward(model, data)
+    bias = mass_and_bias(*rig.arrays(), np.array(rig.gravity), data.qpos.copy(), data.qvel.copy())[1]
+    np.testing.assert_allclose(bias, data.qfrc_bias, rtol=1e-6, atol=1e-9)
+
+
+def test_a_joint_sticks_without_creeping_and_slips_at_its_friction() -> None:
+    rig = RIGS["pendulum"](np.random.default_rng(0))
+    rig.gravity = (0.0, 0.0, 0.0)
+    one = np.ones(1)
+    plant = neutral(1)._replace(
+        kp=5 * one, kd=0.3 * one, torque_limit=one, stiffness=50 * one, static_friction=0.05 * one, reflected_inertia=0.004 * one
+    )  # fmt: skip
+    start = np.zeros(1)
+    held = simulate(rig, plant, np.full((1000, 1), 0.009), 500.0, start)[2]
+    moved = simulate(rig, plant, np.full((1000, 1), 0.03), 500.0, start)[2]
+    assert np.abs(held).max() < 1e-12
+    assert moved[-1, 0] > 0.005
+
+
+@pytest.mark.parametrize("name", ["stribeck_friction", "command_delay", "backlash", "cogging", "joint_stop"])
+def test_a_hidden_effect_moves_the_joint_beyond_the_noise(name: str) -> None:
+    assert generator.draw(1, QUICK, [name], "pendulum")[2]["visible"]
+
+
+def test_every_catalogue_name_is_drawn_within_sixty_seeds() -> None:
+    rng = np.random.default_rng(0)
+    drawn = {name for seed in range(10_000, 10_060) for name in generator.names_for(seed, rng)[1]}
+    assert set(hidden.NAMED) | set(hidden.UNNAMED) <= drawn
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("draw")
+    generator.write(2, out, QUICK, ["command_delay"], "pendulum")
+    return out
+
+
+def test_a_recording_repeats_each_command_and_tells_nothing_of_the_truth(folder: Path) -> None:
+    described = yaml.safe_load((folder / "recording" / "recording.yaml").read_text())
+    joint = described["joints"][0]
+    tables = {
+        trial["file"]: pl.read_parquet(folder / "recording" / trial["file"])
+        for trial in described["trials"]
+        if trial["kind"] == described["trials"][0]["kind"]
+    }
+    commands = [t[f"{joint}.command"].to_list()[:100] for t in tables.values()]
+    assert len(commands) > 1
+    assert all(c == commands[0] for c in commands)
+    texts = [p.read_text() for p in (folder / "recording").rglob("*") if p.suffix in (".yaml", ".urdf", ".json")]
+    assert not any("delay" in text for text in texts)
+
+
+def test_the_same_seed_writes_the_same_recording(folder: Path, tmp_path: Path) -> None:
+    generator.write(2, tmp_path, QUICK, ["command_delay"], "pendulum")
+    files = sorted(p.relative_to(folder) for p in folder.rglob("*.parquet"))
+    assert files
+    assert all(pl.read_parquet(folder / f).equals(pl.read_parquet(tmp_path / f)) for f in files)
+
+
+def _truth(*effects: tuple[str, str], catalogue: bool = True) -> dict[str, Any]:
+    keys = {"any_joint": False, "in_catalogue": catalogue, "distinct": 5.0, "signal": 5.0}
+    made = [{"name": n, "joints": [j], "absorbed": n in hidden.ABSORBED, **keys} for n, j in effects]
+    return {"effects": made, "rig": "finger", "repeat_scatter": 3e-4}
+
+
+def _answer(verdict: str, *effects: tuple[str, str], rivals: tuple[str, ...] = ()) -> dict[str, Any]:
+    return {"verdict": verdict, "effects": [{"name": n, "joints": [j], "rivals": list(rivals)} for n, j in effects]}
+
+
+PLAY, COGS, RUB = ("backlash", "q1"), ("cogging", "q2"), ("coulomb_friction", "q1")
+
+
+@pytest.mark.parametrize(
+    ("truth", "answer", "ratio", "outcome"),
+    [
+        (_truth(), _answer("adequate"), 3.0, "right"),
+        (_truth(), _answer("missing_effect", PLAY), 1.0, "wrong"),
+        (_truth(), _answer("unknown_effect"), 1.0, "wrong"),
+        (_truth(PLAY), _answer("missing_effect", PLAY), 2.0, "right"),
+        (_truth(PLAY), _answer("missing_effect", ("backlash", "q2")), 1.0, "wrong"),
+        (_truth(PLAY), _answer("missing_effect", PLAY, COGS), 1.0, "wrong"),
+        (_truth(PLAY), _answer("missing_effect", COGS, rivals=("backlash@q1",)), 1.0, "wrong"),
+        (_truth(PLAY), _answer("ambiguous", ("cogging", "q1"), rivals=("backlash",)), 2.0, "acceptable"),
+        (_truth(PLAY), _answer("ambiguous", COGS, rivals=("backlash@q1",)), 2.0, "acceptable"),
+        (_truth(PLAY), _answer("ambiguous", COGS, rivals=("backlash",)), 1.0, "wrong"),
+        (_truth(PLAY), _answer("adequate"), 1.05, "acceptable"),
+        (_truth(PLAY), _answer("adequate"), 1.5, "wrong"),
+        (_truth(PLAY), _answer("unknown_effect"), 1.0, "wrong"),
+        (_truth(RUB), _answer("adequate"), 1.0, "acceptable"),
+        (_truth(PLAY, COGS), _answer("missing_effect", COGS, PLAY), 1.0, "right"),
+        (_truth(PLAY, COGS), _answer("missing_effect", COGS), 1.5, "wrong"),
+        (_truth(PLAY, catalogue=False), _answer("unknown_effect"), 3.0, "right"),
+        (_truth(PLAY, catalogue=False), _answer("ambiguous", COGS), 3.0, "acceptable"),
+        (_truth(PLAY, catalogue=False), _answer("missing_effect", COGS), 1.0, "wrong"),
+    ],
+)
+def test_the_judge(truth: dict[str, Any], answer: dict[str, Any], ratio: float, outcome: str) -> None:
+    assert score(truth, answer, ratio).outcome == outcome
+
+
+def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    judged: list[int] = []
+
+    def verbs(verb: str, out: Path, *words: str) -> dict[str, Any]:
+        out.mkdir(parents=True)
+        (out / "model.yaml").write_text("")
+        return {**_answer("adequate"), "error": {"overall": 3e-4}}
+
+    def written(seed: int, out: Path, seconds: float | None) -> dict[str, Any]:
+        judged.append(seed)
+        (out / "recording").mkdir(parents=True)
+        return {"seed": seed, **_truth()}
+
+    monkeypatch.setattr(judge, "run_verb", verbs)
+    monkeypatch.setattr(judge, "write", written)
+    for draws in (2, 3):
+        monkeypatch.setattr(sys, "argv", ["judge.py", "--draws", str(draws), "--out", str(tmp_path)])
+        judge.main()
+    assert judged == [10_000, 10_001, 10_002]
+    summary = json.loads((tmp_path / "identification.json").read_text())
+    assert summary["false_alarms"] == [0, 3]
+    assert summary["right"] == 3
+
+
+@pytest.mark.skipif(importlib.util.find_spec("tactile_cube.diagnose") is None, reason="the diagnose verb is not there")
+@pytest.mark.parametrize(("seed", "names"), [(3, []), (4, ["command_delay"]), (6, ["stribeck_friction"])])
+def test_diagnosis_of_a_short_recording(seed: int, names: list[str], tmp_path: Path) -> None:
+    generator.write(seed, tmp_path, QUICK, names, "pendulum")
+    truth = json.loads((tmp_path / "truth.json").read_text())
+    answer = judge.run_verb("diagnose", tmp_path / "answer", f"recording={tmp_path / 'recording'}")
+    assert answer is not None, (tmp_path / "answer" / "words.txt").read_text()
+    assert score(truth, answer, None).outcome in ("right", "acceptable"), answer["verdict"]
