@@ -22,14 +22,14 @@ class Payload(Effect):
 
     @staticmethod
     def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102
-        link = (..., place.chain, place.outermost)
-        mass, com = view("mass")[link], view("com")[link]
+        chain, link = place.chain, place.outermost
+        mass, com = view("mass")[..., chain, link], view("com")[..., chain, link, :]
         length = np.maximum(np.linalg.norm(com, axis=-1), 1e-9)[..., None]
-        point = com / length * p[..., 1, None]
+        lever = com / length * p[..., 1, None] - com
         total = np.maximum(mass + p[..., 0], 1e-6)
-        lever = point - com
         reduced = mass * p[..., 0] / total
         square = np.sum(lever * lever, axis=-1)[..., None, None] * np.eye(3)
-        view("inertia")[link] += reduced[..., None, None] * (square - lever[..., :, None] * lever[..., None, :])
-        view("com")[link] = com + lever * (p[..., 0] / total)[..., None]
-        view("mass")[link] = total
+        spread = square - lever[..., :, None] * lever[..., None, :]
+        view("inertia")[..., chain, link, :, :] += reduced[..., None, None] * spread
+        view("com")[..., chain, link, :] += lever * (p[..., 0] / total)[..., None]
+        view("mass")[..., chain, link] = total

@@ -1,0 +1,59 @@
+"""The model that a rig's owner already has, and the bounds within which its constants may differ from what he believes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.model import Model, Unknown
+from tactile_cube.measurement.recording import Recording
+
+Array = NDArray[np.float64]
+TOLERANCE = {"kd": (0.75, 1.3), "static_friction": (0.5, 1.6), "reflected_inertia": (0.6, 1.6), "stiffness": (0.8, 1.25)}
+"""Part of the nominal value at which a constant still counts as the nominal one; more is an effect that is missing."""
+LARGEST_CREEP = 1.0  # [rad/s per N m] joints that stick give way slowly where friction is regularised
+LARGEST_OFFSET = 0.06  # [rad]
+
+
+def nominal_model(recording: Recording) -> Model:
+    """What the recording's owner states."""
+    n = len(recording.joints)
+    gains = recording.gains
+    constants = {
+        "kp": np.array(gains.kp, dtype=float),
+        "kd": np.array(gains.kd, dtype=float),
+        "torque_limit": np.array(gains.torque_limit, dtype=float),
+        "stiffness": np.array(recording.nominal.get("stiffness", np.full(n, np.inf)), dtype=float),
+        "static_friction": np.array(recording.nominal.get("static_friction", np.zeros(n)), dtype=float),
+        "reflected_inertia": np.array(recording.nominal.get("reflected_inertia", np.zeros(n)), dtype=float),
+        "friction_creep": np.zeros(n),
+    }
+    return Model(constants, (), {trial.initialisation: np.zeros(n) for trial in recording.trials})
+
+
+def base_unknowns(recording: Recording) -> tuple[Unknown, ...]:
+    """Constants that a refit may change, and the joint offsets of each initialisation."""
+    nominal = nominal_model(recording).constants
+    joints = range(len(recording.joints))
+    constants = [
+        Unknown("constant", key, j, nominal[key][j] * low, nominal[key][j] * high, 0.2 * nominal[key][j])
+        for key, (low, high) in TOLERANCE.items()
+        for j in joints
+        if 0.0 < nominal[key][j] < np.inf
+    ]
+    creeps = [
+        Unknown("constant", "friction_creep", j, 0.0, LARGEST_CREEP, 0.05)
+        for j in joints
+        if nominal["static_friction"][j] > 0.0
+    ]
+    return (*constants, *creeps, *offset_unknowns(recording))
+
+
+def offset_unknowns(recording: Recording) -> tuple[Unknown, ...]:
+    """The joint offsets of each initialisation of a recording."""
+    initialisations = sorted({trial.initialisation for trial in recording.trials})
+    return tuple(
+        Unknown("posture", "offset", j, -LARGEST_OFFSET, LARGEST_OFFSET, 0.05, initialisation)
+        for initialisation in initialisations
+        for j in range(len(recording.joints))
+    )

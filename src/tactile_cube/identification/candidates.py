@@ -1,0 +1,132 @@
+"""What may be missing: every effect in every form, at one joint or at all, with values to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.identification.model import Model, Term, Unknown
+from tactile_cube.measurement.recording import Recording
+
+Array = NDArray[np.float64]
+EffectClass = type[Effect]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect in one form at one or more joints.
+
+    Attributes:
+        effect: its class.
+        joints: where it acts.
+        form: parameters that are fitted, and their starts.
+    """
+
+    effect: EffectClass
+    joints: tuple[str, ...]
+    form: Mapping[str, float]
+
+    @property
+    def label(self) -> str:
+        """Readable and unique: `backlash(play)@q2`."""
+        return f"{self.effect.name}({', '.join(self.form)})@{'+'.join(self.joints)}"
+
+    @property
+    def size(self) -> int:
+        """Fitted numbers."""
+        return len(self.form) * len(self.joints)
+
+    def added_to(self, model: Model, values: Mapping[str, float] | None = None) -> tuple[Model, tuple[Unknown, ...]]:
+        """The model with the effect at its start (or at `values`), and the unknowns that this adds."""
+        known = {p.name: p.neutral for p in self.effect.parameters} | dict(self.form) | dict(values or {})
+        terms = tuple(Term(self.effect, joint, known, tuple(self.form)) for joint in self.joints)
+        first = len(model.terms)
+        unknowns = tuple(u for k, term in enumerate(terms) for u in term_unknowns(term, first + k, self.form))
+        return replace(model, terms=(*model.terms, *terms)), unknowns
+
+
+def term_unknowns(term: Term, place: int, form: Mapping[str, float]) -> tuple[Unknown, ...]:
+    """The unknowns of a term; the size of its start is the scale of each."""
+    parameters = {p.name: p for p in term.effect.parameters}
+    sizes = {name: abs(form.get(name, 0.0)) or abs(parameters[name].typical) for name in term.fitted}
+    fallback = max([size for size in sizes.values() if size > 0.0], default=1.0)
+    return tuple(
+        Unknown("effect", name, place, parameters[name].low, parameters[name].high, sizes[name] or fallback)
+        for name in term.fitted
+    )
+
+
+def model_unknowns(model: Model) -> tuple[Unknown, ...]:
+    """The unknowns of all effects that a model has."""
+    return tuple(
+        u
+        for place, term in enumerate(model.terms)
+        for u in term_unknowns(term, place, {k: v for k, v in term.values.items() if abs(v) < 1e6})
+    )
+
+
+def forms(effect: EffectClass) -> tuple[Mapping[str, float], ...]:
+    """The forms of an effect; all its parameters at their typical values if it names none."""
+    return effect.forms or ({p.name: p.typical for p in effect.parameters},)
+
+
+def candidates(recording: Recording, effects: Sequence[EffectClass]) -> list[Candidate]:
+    """Every effect in every form at every single joint where it can act."""
+    seen = [_Seen(recording, j) for j in range(len(recording.joints))]
+    return [
+        Candidate(effect, (joint,), start)
+        for effect in effects
+        for j, joint in enumerate(recording.joints)
+        if _possible(effect, recording, joint)
+        for form in forms(effect)
+        for start in _starts(effect.name, form, seen[j])
+    ]
+
+
+def _possible(effect: EffectClass, recording: Recording, joint: str) -> bool:
+    if effect.name == "coupling_error":
+        return any(coupling.joint == joint for coupling in recording.coupled.values())
+    if effect.name in ("torque_crosstalk", "joint_coupling"):
+        return len(recording.joints) > 1
+    return True
+
+
+class _Seen:
+    """What a recording shows of a joint, to place thresholds where they matter."""
+
+    def __init__(self, recording: Recording, joint: int) -> None:
+        self.position = np.concatenate([trial.position[:, joint] for trial in recording.trials])
+        self.low, self.high = np.quantile(self.position, [0.002, 0.998])
+        speeds = [np.abs(np.diff(trial.command[:, joint])) / trial.step for trial in recording.trials]
+        self.command_speed = float(np.quantile(np.concatenate(speeds), 0.995))
+        kp, kd = recording.gains.kp[joint], recording.gains.kd[joint]
+        torques = [
+            np.abs(kp * (trial.command - trial.position)[:, joint] - kd * trial.velocity()[:, joint])
+            for trial in recording.trials
+        ]
+        self.torque = np.quantile(np.concatenate(torques), [0.9, 0.97, 0.997])
+
+
+def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[str, float]]:
+    span = seen.high - seen.low
+    if name == "torque_saturation":
+        return [{"limit": float(level)} for level in seen.torque]
+    if name == "rate_limit":
+        return [{"speed": share * seen.command_speed} for share in (0.8, 0.4, 0.15)]
+    if name == "joint_stop":
+        side, edge = ("upper", seen.high) if "upper" in form else ("lower", seen.low)
+        sign = 1.0 if side == "upper" else -1.0
+        return [{**form, side: edge - sign * share * span} for share in (0.03, 0.12, 0.3)]
+    return [form]
+
+
+def placed(candidate: Candidate, recording: Recording) -> dict[str, float]:
+    """Values of parameters that are not fitted but depend on the recording: the range of a position-dependent torque."""
+    if candidate.effect.name != "position_torque":
+        return {}
+    seen = _Seen(recording, recording.joints.index(candidate.joints[0]))
+    return {"first": float(seen.low), "last": float(seen.high)}

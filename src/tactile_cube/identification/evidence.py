@@ -1,0 +1,59 @@
+"""Judging fitted models on trials that the fit never saw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import wilcoxon
+
+from tactile_cube.identification.base import offset_unknowns
+from tactile_cube.identification.gauss_newton import fit
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.problem import Problem
+from tactile_cube.measurement.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """How a model does on held-out segments.
+
+    Attributes:
+        model: with the joint offsets of the held-out initialisations.
+        costs: (G,) marginal squared error of each segment, in units of the sensor's variance.
+        samples: (G,) measured numbers in each.
+        residual: (G, R) weighted.
+    """
+
+    model: Model
+    costs: Array
+    samples: Array
+    residual: Array = field(repr=False)
+
+    @property
+    def error(self) -> float:
+        """RMS error in units of the sensor noise; 1 is a perfect model."""
+        return float(np.sqrt(self.costs.sum() / self.samples.sum()))
+
+
+def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
+    """Error of a model on held-out segments; only the joint offsets of unseen initialisations are fitted there."""
+    fitted = fit(problem, model, offset_unknowns(held_out), iterations=3)
+    samples = np.count_nonzero(problem.weight, axis=1)
+    return Judgement(fitted.model, problem.cost(fitted.residual), samples, fitted.residual)
+
+
+def gain(before: Judgement, after: Judgement) -> float:
+    """Share of the squared error that the second model takes away."""
+    return float(1.0 - after.costs.sum() / before.costs.sum())
+
+
+def p_value(before: Judgement, after: Judgement) -> float:
+    """Probability of such paired differences if the second model were no better (Wilcoxon, one-sided)."""
+    difference = (before.costs - after.costs)[before.samples > 0]
+    if len(difference) < 5 or not np.any(difference):
+        return 1.0
+    return float(wilcoxon(difference, alternative="greater").pvalue)

@@ -1,0 +1,106 @@
+"""A model of a rig as a point in parameter space: constants, joint offsets, effects; and the numbers that are fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects.effect import Effect
+
+Array = NDArray[np.float64]
+EffectClass = type[Effect]
+Key = TypeVar("Key", str, int)
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect at a joint with values for all its parameters; `fitted` names those that a fit may change."""
+
+    effect: EffectClass
+    joint: str
+    values: Mapping[str, float]
+    fitted: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """As a user writes it: `backlash@q2`."""
+        return f"{self.effect.name}@{self.joint}"
+
+
+@dataclass(frozen=True)
+class Model:
+    """Constants of the drive (key -> (n,)), effects, and the joint offsets of each robot initialisation.
+
+    Attributes:
+        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia.
+        terms: effects in force.
+        posture: initialisation -> (n,) true minus measured angle [rad].
+    """
+
+    constants: Mapping[str, Array]
+    terms: tuple[Term, ...]
+    posture: Mapping[int, Array]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that is fitted.
+
+    Attributes:
+        kind: a constant of the drive, a joint offset, or a parameter of an effect.
+        key: the constant or the parameter.
+        place: joint of a constant or an offset, index of the term of an effect.
+        low: smallest value.
+        high: largest value.
+        scale: size of a noticeable change; finite differences take a part of it.
+        initialisation: of a joint offset.
+    """
+
+    kind: Literal["constant", "posture", "effect"]
+    key: str
+    place: int
+    low: float
+    high: float
+    scale: float
+    initialisation: int = 0
+
+    def of(self, model: Model) -> float:
+        """Its value in a model."""
+        if self.kind == "constant":
+            return float(model.constants[self.key][self.place])
+        if self.kind == "posture":
+            return float(model.posture[self.initialisation][self.place])
+        return float(model.terms[self.place].values[self.key])
+
+    def put(self, model: Model, value: float) -> Model:
+        """The model with another value, kept within the bounds."""
+        value = min(max(value, self.low), self.high)
+        if self.kind == "constant":
+            return replace(model, constants=_changed(model.constants, self.key, self.place, value))
+        if self.kind == "posture":
+            return replace(model, posture=_changed(model.posture, self.initialisation, self.place, value))
+        term = model.terms[self.place]
+        new = replace(term, values={**term.values, self.key: value})
+        return replace(model, terms=(*model.terms[: self.place], new, *model.terms[self.place + 1 :]))
+
+
+def _changed(arrays: Mapping[Key, Array], key: Key, place: int, value: float) -> dict[Key, Array]:
+    changed = arrays[key].copy()
+    changed[place] = value
+    return {**arrays, key: changed}
+
+
+def put_all(model: Model, unknowns: tuple[Unknown, ...], values: Array) -> Model:
+    """The model with all unknowns set."""
+    for unknown, value in zip(unknowns, values, strict=True):
+        model = unknown.put(model, float(value))
+    return model
+
+
+def read_all(model: Model, unknowns: tuple[Unknown, ...]) -> Array:
+    """Values (P,) of the unknowns in a model."""
+    return np.array([unknown.of(model) for unknown in unknowns])

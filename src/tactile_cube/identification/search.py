@@ -1,0 +1,216 @@
+"""The search for what is missing: screen, refit, judge on held-out trials, add, until the floor is reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.identification.base import base_unknowns, nominal_model
+from tactile_cube.identification.candidates import Candidate, candidates, model_unknowns, placed
+from tactile_cube.identification.evidence import Judgement, gain, judge, p_value
+from tactile_cube.identification.gauss_newton import Fit, fit
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.problem import Problem
+from tactile_cube.identification.screening import Score, screen
+from tactile_cube.identification.shooting import Shooting
+from tactile_cube.identification.stretches import Stretches, cut
+from tactile_cube.measurement.recording import Recording
+
+Array = NDArray[np.float64]
+FLOOR = 1.1  # error / sensor noise at which nothing is left to explain
+SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
+SIGNIFICANT = 0.01  # after Holm's correction
+REFITTED, FINALISTS = 12, 4  # candidates that are refitted with the base's columns frozen, and with everything free
+PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
+STRETCHES = 12  # enough data to search on; the final fit takes all
+DEEPEST = 3  # effects in combination
+BEAM = 2  # alternatives that are pursued at each depth
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects with everything refitted.
+
+    Attributes:
+        effects: candidates in the order in which they were added.
+        fit: on the fitted trials.
+        judgement: on the held-out trials.
+        p_value: of the last effect, corrected for the number of candidates.
+        gain: held-out share that the last effect explains.
+    """
+
+    effects: tuple[Candidate, ...]
+    fit: Fit = field(repr=False)
+    judgement: Judgement = field(repr=False)
+    p_value: float
+    gain: float
+
+    @property
+    def error(self) -> float:
+        """Held-out error in units of the sensor noise."""
+        return self.judgement.error
+
+    @property
+    def label(self) -> str:
+        """Readable."""
+        return " & ".join(c.label for c in self.effects) or "base"
+
+    @property
+    def size(self) -> int:
+        """Numbers fitted beyond the base."""
+        return sum(c.size for c in self.effects)
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything that a search has tried.
+
+    Attributes:
+        base: the refitted base model.
+        nominal: the model before any fit, judged on the held-out trials.
+        levels: explanations with 1, 2, ... effects, best first.
+        scores: screening of the first level, best first.
+    """
+
+    base: Explanation
+    nominal: Judgement
+    levels: tuple[tuple[Explanation, ...], ...]
+    scores: tuple[Score, ...]
+
+
+class Search:
+    """A recording with its trials split, and the effects that may be missing."""
+
+    def __init__(
+        self,
+        fitted: Recording,
+        held_out: Recording,
+        noise: Array,
+        effects: Sequence[type[Effect]],
+        say: Callable[[str], None],
+    ) -> None:
+        """Prepare the problems.
+
+        Args:
+            fitted: trials to fit.
+            held_out: trials to judge by.
+            noise: (n,) of the position sensors [rad].
+            effects: classes to search.
+            say: takes progress lines.
+        """
+        self.say = say
+        self.fitted, self.held_out = fitted, held_out
+        self.shooting = Shooting(fitted, effects)
+        self.all_stretches = cut(fitted, noise)
+        self.problem = Problem(self.shooting, some(self.all_stretches, STRETCHES))
+        self.judges = Problem(self.shooting, some(cut(held_out, noise), STRETCHES))
+        self.candidates = candidates(fitted, effects)
+        self.start = nominal_model(fitted)
+        self.start_held_out = nominal_model(held_out)
+
+    def run(self) -> Findings:
+        """The whole search."""
+        base = self.fit_base()
+        nominal = judge(self.judges, self.held_out, self.with_postures(self.start))
+        levels: list[tuple[Explanation, ...]] = []
+        scores: tuple[Score, ...] = ()
+        beam = (base,)
+        while len(levels) < DEEPEST and min(e.error for e in beam) > FLOOR:
+            found = [e for parent in beam for e in self.extend(parent)]
+            if not scores:
+                scores = tuple(self.last_scores)
+            better = [e for e in found if e.gain > SMALLEST_GAIN and e.p_value < SIGNIFICANT]
+            if not better:
+                break
+            better.sort(key=lambda e: e.judgement.costs.sum())
+            levels.append(tuple(better))
+            beam = tuple(better[:BEAM])
+        return Findings(base, nominal, tuple(levels), scores)
+
+    def fit_base(self) -> Explanation:
+        """Refit what the model already has."""
+        self.problem.linearise_starts(self.start)
+        first = fit(self.problem, self.start, base_unknowns(self.fitted), iterations=4)
+        self.problem.linearise_starts(first.model)
+        second = fit(self.problem, first.model, first.unknowns, iterations=3)
+        self.judges.linearise_starts(self.with_postures(second.model))
+        judgement = judge(self.judges, self.held_out, self.with_postures(second.model))
+        self.say(f"base refitted: held-out error {judgement.error:.2f} x sensor noise")
+        return Explanation((), second, judgement, 1.0, 0.0)
+
+    def with_postures(self, model: Model) -> Model:
+        """The model with joint offsets for the held-out initialisations too."""
+        return Model(model.constants, model.terms, {**self.start_held_out.posture, **model.posture})
+
+    def extend(self, parent: Explanation) -> list[Explanation]:
+        """The best ways to add one effect to an explanation."""
+        self.problem.linearise_starts(parent.fit.model)
+        prediction, columns = self.problem.columns(parent.fit.model, parent.fit.unknowns)
+        residual = self.problem.residual(prediction)
+        frozen = Fit(parent.fit.model, parent.fit.unknowns, parent.fit.cost, residual, columns, parent.fit.information)
+        self.last_scores = screen(
+            self.problem, frozen, self.candidates, [placed(c, self.fitted) for c in self.candidates]
+        )
+        chosen = with_groups(self.last_scores)[:REFITTED]
+        self.say(f"screened {len(self.candidates)} candidates, refitting {len(chosen)}")
+        refitted = sorted((self.refit(frozen, candidate) for candidate in chosen), key=lambda pair: pair[1].cost)
+        return [self.finish(parent, candidate, fitted) for candidate, fitted in refitted[:FINALISTS]]
+
+    def refit(self, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
+        """Fit a candidate's numbers beside the frozen columns of its parent."""
+        model, unknowns = candidate.added_to(frozen.model, placed(candidate, self.fitted))
+        fitted = fit(self.problem, model, unknowns, iterations=6, frozen=frozen)
+        self.say(f"  {np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)):8.3f}  {candidate.label}")
+        return candidate, fitted
+
+    def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit) -> Explanation:
+        """Fit everything and judge on the held-out trials."""
+        unknowns = (*base_unknowns(self.fitted), *model_unknowns(refitted.model))
+        self.problem.linearise_starts(refitted.model)
+        fitted = fit(self.problem, refitted.model, unknowns, iterations=4)
+        model = self.with_postures(fitted.model)
+        self.judges.linearise_starts(model)
+        judgement = judge(self.judges, self.held_out, model)
+        corrected = min(1.0, p_value(parent.judgement, judgement) * len(self.candidates))
+        explanation = Explanation(
+            (*parent.effects, candidate), fitted, judgement, corrected, gain(parent.judgement, judgement)
+        )
+        self.say(f"  held-out error {explanation.error:.3f}  p {corrected:.1e}  {explanation.label}")
+        return explanation
+
+
+def some(stretches: Stretches, count: int) -> Stretches:
+    """About `count` stretches, spread over trials and over the time within trials."""
+    by_trial = [np.flatnonzero(stretches.trial == k) for k in np.unique(stretches.trial)]
+    order = [
+        int(rows[(turn + k) % len(rows)])
+        for turn in range(max(len(rows) for rows in by_trial))
+        for k, rows in enumerate(by_trial)
+        if turn < len(rows)
+    ]
+    return stretches.take(np.array(sorted(order[:count])))
+
+
+def with_groups(scores: Sequence[Score]) -> list[Candidate]:
+    """Candidates worth a refit, best first; an effect that helps at several joints also stands for all of them."""
+    best: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Score] = {}
+    for score in scores:
+        key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
+        best.setdefault(key, score)
+    ranked = [(score.gain, score.candidate) for score in best.values() if score.gain > 0.0]
+    families: dict[tuple[str, tuple[str, ...]], list[Score]] = {}
+    for (name, form, _), score in best.items():
+        families.setdefault((name, form), []).append(score)
+    for members in families.values():
+        useful = [m for m in members if m.gain > 0.0]
+        if len(useful) > 1 and sum(m.gain for m in useful) > 1.3 * max(m.gain for m in useful):
+            first = useful[0].candidate
+            joints = tuple(m.candidate.joints[0] for m in useful)
+            ranked.append((sum(m.gain for m in useful), Candidate(first.effect, joints, first.form)))
+    ranked.sort(key=lambda pair: -pair[0])
+    most = ranked[0][0] if ranked else 0.0
+    return [candidate for gained, candidate in ranked if gained > PROMISING * most]

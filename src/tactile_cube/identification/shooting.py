@@ -1,0 +1,108 @@
+"""Simulates many models at once, each through all stretches of a recording, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.signals import MOTOR_POSITION
+from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.stretches import Stretches
+from tactile_cube.measurement.recording import Recording
+
+Array = NDArray[np.float64]
+CONSTANTS = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
+POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] finite differences of a segment's start
+
+
+class Shooting:
+    """The drivetrain of a rig, with every effect that may be tried compiled in."""
+
+    def __init__(self, recording: Recording, effects: Sequence[type[Effect]]) -> None:
+        """Build the plant; its kernel is compiled once and kept on disk.
+
+        Args:
+            recording: rig, controller and sampling step.
+            effects: classes that a model may use.
+        """
+        coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
+        self.recording = recording
+        self.tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
+        self.plant = Plant([self.tree], dt=recording.step, effects=tuple(effects), joint_names=recording.joints)
+        self.workers = min(4, len(os.sched_getaffinity(0)))
+
+    def positions(self, models: Sequence[Model], stretches: Stretches) -> Array:
+        """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
+        joints = len(self.recording.joints)
+        return self._simulate(models, np.zeros((len(models), 2 * joints)), stretches)
+
+    def start_sensitivity(self, model: Model, stretches: Stretches) -> Array:
+        """d position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
+        joints = len(self.recording.joints)
+        nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
+        moved = self._simulate([model] * (2 * joints + 1), np.vstack([nudge, np.zeros(2 * joints)]), stretches)
+        return (moved[:-1] - moved[-1]) / nudge.max(axis=1)[:, None, None, None]
+
+    def _simulate(self, models: Sequence[Model], nudge: Array, stretches: Stretches) -> Array:
+        count, rows = len(stretches), stretches.measured.shape[1]
+        out = np.zeros((len(models), count, rows, 1, len(self.recording.joints)))
+        with ThreadPoolExecutor(self.workers) as pool:
+            list(pool.map(lambda k: self._one(models[k], nudge[k], stretches, out[k]), range(len(models))))
+        return out[:, :, :, 0]
+
+    def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
+        memory = self._memory(model, stretches)
+        count = len(stretches)
+        starts = stretches.position.copy()
+        starts[:, 0] = self.plant.view(memory, "q")
+        self.plant.kernel.segments_batch(
+            stretches.commands,
+            np.arange(count),
+            np.full(count, out.shape[1]),
+            stretches.history,
+            1,
+            stretches.segment,
+            starts,
+            stretches.speed,
+            np.tile(nudge, (count, 1)),
+            memory,
+            np.array([MOTOR_POSITION]),
+            0,
+            count,
+            out,
+        )
+
+    def _memory(self, model: Model, stretches: Stretches) -> Array:
+        """One block (S, size) for each stretch, at rest at its start."""
+        single = self.memory(model)
+        memory = np.tile(single, (len(stretches), 1))
+        posture = np.array([model.posture[int(k)] for k in stretches.initialisation])
+        self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * posture[:, self.tree.follow]
+        self.plant.reset(memory, self._links(model, stretches), stretches.speed[:, 0])
+        self.plant.view(memory, "step")[:, 0] = stretches.time / self.plant.dt
+        return memory
+
+    def memory(self, model: Model) -> Array:
+        """Memory (size,) of the plant with a model's constants and effects."""
+        constants = DrivetrainConstants(**{key: model.constants[key] for key in CONSTANTS})
+        memory: Array = self.plant.memory(constants, gravity=self.recording.gravity)
+        self.plant.view(memory, "friction_creep")[:] = model.constants["friction_creep"]
+        self.plant.view(memory, "command_torque_limit")[:] = np.inf
+        for term in model.terms:
+            self.plant.set_effect(memory, term.effect, term.joint, term.values)
+        return memory
+
+    def _links(self, model: Model, stretches: Stretches) -> Array:
+        """Link positions (S, n) at the first row: measured less the drive's deflection."""
+        constants = model.constants
+        error = stretches.commands[:, stretches.history] - stretches.position[:, 0]
+        torque = constants["kp"] * error - constants["kd"] * stretches.speed[:, 0]
+        limit = constants["torque_limit"]
+        return stretches.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
