@@ -25,7 +25,9 @@ def test_results_come_back_with_every_episode(tmp_path: Path) -> None:
     assert data["variants"][0]["summary"]["best_angle"] == pytest.approx(5.0)
 
 
-@pytest.mark.parametrize("content", ["", "[]", '{"format": "something else"}', "{"])
+@pytest.mark.parametrize(
+    "content", ["", "[]", "{}", '{"format": "tactile_cube results 1"}', '{"format": "something else"}', "{"]
+)
 def test_other_files_are_refused_by_name(tmp_path: Path, content: str) -> None:
     path = tmp_path / "results.json"
     path.write_text(content)

@@ -16,6 +16,8 @@ from tactile_cube.evaluation.policy_source import PolicySource
 from tactile_cube.evaluation.protocol import Protocol
 
 FORMAT = "tactile_cube results 1"
+KEYS = ("created", "protocol", "policy", "seed", "command", "cpu_hours", "variants")
+"""What everybody who reads a results file relies on."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,9 @@ def read_results(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not a results file of evaluate: {error}") from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError(f"{path}: not a results file of evaluate (expected format {FORMAT!r})")
+    missing = [key for key in KEYS if key not in data]
+    if missing:
+        raise InputError(f"{path}: results without {', '.join(missing)}; run evaluate again")
     return data
 
 
