@@ -127,7 +127,7 @@ def test_statics_under_gravity_and_a_load_balance() -> None:
     assert 3.69 * (0.5 - q) == pytest.approx(0.2 * 9.81 * 0.1 * math.sin(q) + 0.05, abs=1e-9)
 
 
-def test_smaller_steps_converge_with_second_order() -> None:
+def test_smaller_steps_converge() -> None:
     errors, finest = [], None
     for substeps in (32, 4, 2, 1):
         plant = Plant([finger()], dt=0.004 / substeps)

@@ -1,0 +1,118 @@
+"""Stepping the mechanism without contacts, as text for a kernel: single steps, rollouts, multiple shooting.
+
+The names in capitals are offsets into the memory, see `memory_layout`; C chains, N dofs and n joints in each.
+"""
+
+FREE_STEP = '''
+@inner
+def free_step(command, memory):
+    """One step of the mechanism without contacts: semi-implicit Euler, as Bullet."""
+    dt = memory[DT]
+    for c in range(C):
+        x = signals_of(c, memory)
+        q, v = memory[Q + c * n : Q + (c + 1) * n], memory[V + c * n : V + (c + 1) * n]
+        expand(
+            FOLLOW, memory[RATIO + c * N : RATIO + (c + 1) * N], memory[OFFSET + c * N : OFFSET + (c + 1) * N], q, v,
+            memory[Q_ALL : Q_ALL + N], memory[V_ALL : V_ALL + N],
+        )
+        find_equations(c, memory[Q_ALL : Q_ALL + N], memory[V_ALL : V_ALL + N], memory)
+        for j in range(n):
+            x[POSITION, j] = q[j]
+            x[VELOCITY, j] = v[j]
+            x[CONTACT, j] = memory[EXTERNAL_TORQUE + c * n + j]
+            x[LOAD, j] = memory[JOINT_BIAS + j] - x[CONTACT, j]
+            x[TIME, j] = memory[STEP] * dt
+            x[COMMAND, j] = command[c * n + j]
+        effects_command(x, c, dt, memory)
+        drive(x, c, dt, memory)
+        next_speeds(x, c, dt, memory)
+        for j in range(n):
+            x[ACCELERATION, j] = memory[JOINT_ACCELERATION + j]
+            v[j] = memory[SPEED + j]
+            q[j] += dt * v[j]
+    memory[STEP] += 1.0
+
+
+@inner
+def listen(command, memory):
+    """A step before the start: only effects on the command remember it."""
+    for c in range(C):
+        x = signals_of(c, memory)
+        for j in range(n):
+            x[COMMAND, j] = command[c * n + j]
+        effects_command(x, c, memory[DT], memory)
+
+
+@inner
+def roll(commands, length, history, substeps, memory, rows, out):
+    """Signals of each command row, read at one substep of it: the last one, or memory[READING] if that is earlier."""
+    reading = min(int(memory[READING]), substeps - 1)
+    for k in range(history + length):
+        for s in range(substeps):
+            if k < history:
+                listen(commands[k], memory)
+                continue
+            free_step(commands[k], memory)
+            if s == reading:
+                for r in range(len(rows)):
+                    for a in range(C * n):
+                        out[k - history, r, a] = memory[SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+
+
+@inner
+def start_segment(position, speed, nudge, follow_sensor, memory):
+    """Puts the sensor to its measured position and the joints to their measured speed; effects keep their past."""
+    for a in range(C * n):
+        column = a % n
+        x = signals_of(a // n, memory)
+        deflection = x[MOTOR_POSITION, column] - x[POSITION, column] if follow_sensor else 0.0
+        memory[Q + a] = position[a] - deflection + nudge[a]
+        memory[V + a] = speed[a] + nudge[C * n + a]
+
+
+@inner
+def roll_segments(commands, length, history, substeps, segment, position, speed, nudge, memory, rows, out):
+    reading = min(int(memory[READING]), substeps - 1)
+    for k in range(history + length):
+        if k >= history and (k - history) % segment == 0:
+            part = (k - history) // segment
+            start_segment(position[part], speed[part], nudge, part > 0, memory)
+        for s in range(substeps):
+            if k < history:
+                listen(commands[k], memory)
+                continue
+            free_step(commands[k], memory)
+            if s == reading:
+                for r in range(len(rows)):
+                    for a in range(C * n):
+                        out[k - history, r, a] = memory[SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+
+
+@outer
+def step(command, memory):
+    free_step(command, borrowed(memory))
+
+
+@outer
+def rollout(commands, history, substeps, memory, rows, out):
+    roll(commands, len(out), history, substeps, borrowed(memory), rows, out)
+
+
+@outer
+def rollout_batch(commands, which, lengths, history, substeps, memory, rows, out):
+    for b in range(len(memory)):
+        roll(commands[which[b]], lengths[which[b]], history, substeps, borrowed(memory[b]), rows, out[b])
+
+
+@outer
+def segments_batch(
+    commands, which, lengths, history, substeps, segment, position, speed, nudge, memory, rows, first, last, out
+):
+    """Blocks first..last of a batch, started anew from `position`, `speed` (S, K, n) every `segment` rows."""
+    for b in range(first, last):
+        s = which[b]
+        roll_segments(
+            commands[s], lengths[s], history, substeps, segment, position[s], speed[s], nudge[b],
+            borrowed(memory[b]), rows, out[b],
+        )
+'''

@@ -1,0 +1,112 @@
+"""Generated machine code: kept on disk, safe for several processes, renewed when a law changes."""
+
+import ctypes
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect
+from tactile_cube.drivetrain.kernel import cache_directory, load_kernel
+from tactile_cube.errors import InputError
+from tests.drivetrain.rigs import finger, wheel
+
+LAW = """
+from tactile_cube.drivetrain.effects import JOINT_TORQUE, Effect, Parameter, Stage
+
+class Pull(Effect):
+    name = "pull"
+    stage = Stage.JOINT_TORQUE
+    parameters = (Parameter("torque", "N m", 0.0, -1.0, 1.0, 0.1, "test"),)
+
+    @staticmethod
+    def law(x, j, p, s, dt):
+        return x[JOINT_TORQUE, j] + {factor} * p[0]
+"""
+
+
+def test_the_same_plant_uses_the_same_module() -> None:
+    plants = [Plant([wheel(inertia)], dt=dt) for inertia, dt in ((1e-3, 0.002), (2e-3, 0.001))]
+    modules = {id(load_kernel(p.topology, p.effects, p.layout)) for p in plants}
+    assert len(modules) == 1
+
+
+def test_the_cache_follows_xdg_cache_home(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_directory() == tmp_path / "tactile_cube"
+
+
+def test_an_unwritable_cache_home_is_replaced_by_the_temporary_directory(tmp_path, monkeypatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    assert tmp_path in cache_directory().parents
+
+
+def test_a_changed_law_gets_a_new_kernel(tmp_path, monkeypatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    names = []
+    for factor in (1, 2):
+        (tmp_path / "my_changing_rig.py").write_text(LAW.format(factor=factor))
+        importlib.invalidate_caches()
+        sys.modules.pop("my_changing_rig", None)
+        plant = Plant([wheel()], dt=0.002, effects=[find_effect("my_changing_rig.Pull")])
+        names.append(load_kernel(plant.topology, plant.effects, plant.layout).__name__)
+    assert names[0] != names[1]
+
+
+def test_an_effect_that_cannot_be_imported_is_refused() -> None:
+    class Local(Effect):
+        name = "local"
+        stage = Stage.FRICTION
+        parameters = (Parameter("size", "N m", 0.0, 0.0, 1.0, 0.1, "test"),)
+
+    with pytest.raises(InputError, match="file of its own"):
+        _ = Plant([wheel()], dt=0.002, effects=[Local]).kernel
+
+
+def test_the_c_function_gives_the_same_torques_to_the_bit() -> None:
+    plant = Plant([finger()], dt=0.002)
+    memory = plant.memory(DrivetrainConstants())
+    plant.view(memory, "goal")[:] = 0.3
+    q, v = np.array([0.1, 0.2, 0.3, 0.31]), np.array([0.5, -0.2, 0.1, 0.1])
+    torque, other, copy = np.zeros(4), np.zeros(4), memory.copy()
+    plant.kernel.control_step(0, q, v, torque, memory)
+    address = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 4)(plant.kernel.control_address)
+    address(0, *(array.ctypes.data for array in (q, v, other, copy)))
+    assert np.array_equal(torque, other)
+    assert np.array_equal(memory, copy)
+    assert np.any(torque != 0.0)
+
+
+def test_processes_that_start_at_once_share_one_cache(tmp_path) -> None:
+    program = (
+        "import numpy as np; from tactile_cube.drivetrain import DrivetrainConstants, Plant; "
+        "from tests.drivetrain.rigs import wheel; p = Plant([wheel()], dt=0.002); "
+        "m = p.memory(DrivetrainConstants()); p.kernel.step(np.ones(1), m); print(p.view(m, 'v')[0])"
+    )
+    root = Path(__file__).parents[2]
+    environment = {"XDG_CACHE_HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "PYTHONPATH": str(root)}
+    jobs = [
+        subprocess.Popen([sys.executable, "-c", program], env=environment, cwd=root, stdout=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    outputs = [job.communicate(timeout=250)[0] for job in jobs]
+    assert all(job.returncode == 0 for job in jobs)
+    assert outputs[0] == outputs[1] != b""
+    files = list((tmp_path / "tactile_cube").glob("*.py"))
+    assert len(files) == 1
+    assert not list((tmp_path / "tactile_cube").glob("tmp*"))
+
+
+def test_an_array_with_gaps_is_refused() -> None:
+    plant = Plant([wheel()], dt=0.002)
+    memory = np.zeros(2 * plant.size)
+    with pytest.raises(ValueError, match="contiguous"):
+        plant.kernel.step(np.ones(1), memory[::2])
