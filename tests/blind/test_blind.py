@@ -1,4 +1,4 @@
-"""The blind world against a second engine, its recordings, the judge's rules, and a few quick draws with the real verbs."""
+"""The blind world against a second engine, its recordings, the rules of the judge, quick draws with real verbs."""
 
 import importlib.util
 import json
@@ -40,10 +40,9 @@ def test_dynamics_equal_those_of_mujoco(kind: str) -> None:
 def test_a_joint_sticks_without_creeping_and_slips_at_its_friction() -> None:
     rig = RIGS["pendulum"](np.random.default_rng(0))
     rig.gravity = (0.0, 0.0, 0.0)
-    one = np.ones(1)
-    plant = neutral(1)._replace(
-        kp=5 * one, kd=0.3 * one, torque_limit=one, stiffness=50 * one, static_friction=0.05 * one, reflected_inertia=0.004 * one
-    )  # fmt: skip
+    values = {"kp": 5.0, "kd": 0.3, "torque_limit": 1.0, "stiffness": 50.0}
+    values |= {"static_friction": 0.05, "reflected_inertia": 0.004}
+    plant = neutral(1)._replace(**{name: np.array([value]) for name, value in values.items()})
     start = np.zeros(1)
     held = simulate(rig, plant, np.full((1000, 1), 0.009), 500.0, start)[2]
     moved = simulate(rig, plant, np.full((1000, 1), 0.03), 500.0, start)[2]
