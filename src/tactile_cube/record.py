@@ -32,9 +32,8 @@ def main(config: DictConfig) -> None:
             print(f"warning: {line}", file=sys.stderr)
         seconds = sum(trial.duration for trial in recording.trials)
         kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
-        print(
-            f"{out / name}: {len(recording.trials)} trials ({kinds}), {seconds:.0f} s, joints {', '.join(recording.joints)}"
-        )
+        joints = ", ".join(recording.joints)
+        print(f"{out / name}: {len(recording.trials)} trials ({kinds}), {seconds:.0f} s, joints {joints}")
     print(f"next: python -m tactile_cube.compare recording={out}")
 
 

@@ -42,7 +42,7 @@ def ramps(time: Array, rng: np.random.Generator) -> Array:
         speed = float(np.exp(rng.uniform(np.log(0.1), np.log(1.5))))
         corners.append(corners[-1] + max(0.1, abs(goal - values[-1]) / speed))
         values.append(goal)
-    return np.interp(time, corners, values)
+    return np.asarray(np.interp(time, corners, values))
 
 
 def holds(time: Array, rng: np.random.Generator) -> Array:
@@ -52,7 +52,7 @@ def holds(time: Array, rng: np.random.Generator) -> Array:
         corners += [corners[-1] + rng.uniform(0.6, 1.4), 0.0]
         corners[-1] = corners[-2] + 0.15
         values += [values[-1], float(rng.uniform())]
-    return np.interp(time, corners, values)
+    return np.asarray(np.interp(time, corners, values))
 
 
 def multisine(time: Array, rng: np.random.Generator) -> Array:

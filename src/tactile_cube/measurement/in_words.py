@@ -21,17 +21,19 @@ def where_it_fails(table: Sequence[Regime], errors: dict[str, float], floor: Noi
 
 def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor) -> str:
     ratio = error / floor.joints[joint]
-    size = f"({ratio:.2g} times the noise floor)"
+    size = f"({_two_digits(ratio)} times the noise floor)"
     if ratio < WORTH_SAYING:
-        return f"{joint} follows the model: {1e3 * error:.2g} mrad {size}"
+        return f"{joint} follows the model: {_two_digits(1e3 * error)} mrad {size}"
     standing_out = [row for row in rows if row.error > STANDS_OUT * error and row.share > RARE]
     places = _worst_of_each(standing_out, PLACES)[:2] or _worst_of_each(standing_out, COMPANY)[:1]
     if not places:
-        return f"{joint} {_verb(rows, error)} everywhere, {1e3 * error:.2g} mrad {size}"
+        return f"{joint} {_verb(rows, error)} everywhere, {_two_digits(1e3 * error)} mrad {size}"
     first, more = places[0], "".join(f", {_place(row)}" for row in places[1:])
     kind = next((row for row in _worst_of_each(standing_out, ("kind",)) if row is not first), None)
     mostly = f", most of all in {kind.regime}" if kind is not None else ""
-    return f"{joint} {_verb([first], error)} {_place(first)}, {1e3 * first.error:.2g} mrad{more}{mostly} {size}"
+    return (
+        f"{joint} {_verb([first], error)} {_place(first)}, {_two_digits(1e3 * first.error)} mrad{more}{mostly} {size}"
+    )
 
 
 def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime]:
@@ -65,3 +67,7 @@ def _place(row: Regime) -> str:
     if row.dimension == "neighbours":
         return f"with {row.regime}"
     return row.regime
+
+
+def _two_digits(value: float) -> str:
+    return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"

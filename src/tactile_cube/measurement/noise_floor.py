@@ -12,6 +12,7 @@ from tactile_cube.measurement.repeats import aligned_repeats
 from tactile_cube.measurement.trial import Trial
 
 Array = NDArray[np.float64]
+LEAST = 1e-6  # [rad] no sensor is better; keeps the ratio of error to floor finite
 SMOOTHING = 0.05  # [s] a position that changes faster than this is taken for noise where nothing was repeated
 
 
@@ -41,6 +42,7 @@ def noise_floor(recording: Recording, step_size: ErrorSummary | None = None) -> 
         variance, source = _scatter(groups), "repeats"
     else:
         variance, source = sensor_noise(recording) ** 2, "guess"
+    variance = np.maximum(variance, LEAST**2)
     measured = NoiseFloor(
         float(np.sqrt(variance.mean())),
         dict(zip(recording.joints, map(float, np.sqrt(variance)), strict=True)),
@@ -69,7 +71,7 @@ def _scatter(groups: list[list[Array]]) -> Array:
         deviation = stack - stack.mean(axis=0)
         total += np.nansum(deviation**2, axis=(0, 1))
         freedom += np.isfinite(deviation[0]).sum(axis=0) * (len(group) - 1)
-    return total / freedom
+    return np.asarray(total / freedom)
 
 
 def sensor_noise(recording: Recording) -> Array:
@@ -77,7 +79,7 @@ def sensor_noise(recording: Recording) -> Array:
     fast = np.concatenate([_fast_part(trial)[trial.valid] for trial in recording.trials])
     sensors = recording.description.sensors
     least = sensors.position_resolution**2 / 12 + sensors.position_noise**2
-    return np.sqrt(np.maximum(np.median(np.abs(fast), axis=0) ** 2 / 0.6745**2, least))
+    return np.asarray(np.sqrt(np.maximum(np.median(np.abs(fast), axis=0) ** 2 / 0.6745**2, least)))
 
 
 def _fast_part(trial: Trial) -> Array:
@@ -88,4 +90,4 @@ def _fast_part(trial: Trial) -> Array:
     weights = (basis @ np.linalg.pinv(basis))[half]
     padded = np.pad(trial.position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
     smooth = np.stack([np.convolve(column, weights, mode="valid") for column in padded.T], axis=1)
-    return (trial.position - smooth) / np.sqrt(1 - weights[half])
+    return np.asarray((trial.position - smooth) / np.sqrt(1 - weights[half]))

@@ -11,7 +11,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
-DEFAULTS = {"stiffness": np.inf, "static_friction": 0.0, "reflected_inertia": 0.0}
+DEFAULTS = {"stiffness": np.inf, "static_friction": 0.0, "reflected_inertia": 0.0, "friction_creep": 0.0}
 CONTROLLER = ("kp", "kd", "torque_limit")
 TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
 
@@ -21,7 +21,8 @@ class Parameters:
     """Every number that a simulation of a rig needs beside its URDF.
 
     Attributes:
-        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia, each (joints,).
+        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia and friction_creep (how fast a
+            sticking joint gives way, rad/s per N m), each (joints,).
         effects: (`NAME@JOINT`, parameter -> value) of each effect.
         posture: (joints,) true minus measured angle [rad], the negative joint offset.
     """
@@ -48,7 +49,8 @@ def draw_parameters(
     Args:
         recording: its owner's values are the centre.
         model: values with an interval are drawn from the interval.
-        spread: relative half width for a constant without an interval; `offset` is the half width [rad] of joint offsets.
+        spread: relative half width for a constant without an interval; `offset` is the half width [rad] of joint
+            offsets.
         rng: source of randomness.
     """
     constants = {

@@ -11,8 +11,8 @@ def read_out(
 ) -> tuple[Array, Array]:
     """Position [rad] and torque [N m] at the end of each control period, from the signals at its beginnings.
 
-    At the end of period k the links are where period k + 1 finds them, but the drive still feels command k: the jump from
-    command k to k + 1 is taken out of torque and elastic deflection, except where the torque is at its limit.
+    At the end of period k the links are where period k + 1 finds them, but the drive still feels command k: the jump
+    from command k to k + 1 is taken out of torque and elastic deflection, except where the torque is at its limit.
 
     Args:
         position: (..., T + 1, joints) motor positions at the beginning of each period [rad].

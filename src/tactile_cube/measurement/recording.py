@@ -88,6 +88,11 @@ class Recording:
         """Whether commands are torques [N m]."""
         return self.description.controller.mode == "torque"
 
+    def stated(self, constant: str, joint: str) -> float | None:
+        """What the owner states of a constant of one joint, or None."""
+        values = getattr(self.gains, constant, self.nominal.get(constant))
+        return None if values is None else float(values[self.joints.index(joint)])
+
     def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> "Recording":
         """The same rig with these trials alone."""
         return replace(self, trials=tuple(trials))

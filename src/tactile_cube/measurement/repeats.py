@@ -17,8 +17,9 @@ SHORTEST = 0.8  # share of the shorter trial that must overlap
 def aligned_repeats(trials: Sequence[Trial]) -> list[list[Array]]:
     """Groups of two or more repeats; each is (n, joints) positions [rad], nan where it says nothing about noise.
 
-    Trials repeat each other if they are of one kind and their commands agree after a shift in time. Left out are bridged
-    samples and a joint's wait at its start, which differs from repeat to repeat and which a simulation starts from.
+    Trials repeat each other if they are of one kind and their commands agree after a shift in time. Left out are
+    bridged samples and a joint's wait at its start, which differs from repeat to repeat and which a simulation starts
+    from.
     """
     groups: list[list[Array]] = []
     waiting = list(trials)

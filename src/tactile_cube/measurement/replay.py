@@ -123,11 +123,20 @@ class Replay:
         return Simulated(*read_out(position, torque, command, *limits))
 
     def _memory(self, trial: Trial, parameters: Parameters) -> Array:
-        constants = DrivetrainConstants(**self._constants(trial, parameters))
+        own = self._constants(trial, parameters)
+        constants = DrivetrainConstants(
+            kp=own["kp"],
+            kd=own["kd"],
+            torque_limit=own["torque_limit"],
+            stiffness=own["stiffness"],
+            static_friction=own["static_friction"],
+            reflected_inertia=own["reflected_inertia"],
+        )
         effects = [
             cls(joint, **values) for name, values in parameters.effects for cls, joint in self._classes[name]
         ]  # fmt: skip
         memory: Array = self.plant.memory(constants, gravity=self.recording.gravity, effects=effects)
+        self.plant.view(memory, "friction_creep")[:] = own.get("friction_creep", 0.0)
         self.plant.view(memory, "offset")[0] += self.tree.ratio * parameters.posture[self.tree.follow]
         position, velocity, torque = self.start(trial)
         self.plant.reset(memory, position - torque / parameters.constants["stiffness"], velocity)

@@ -21,7 +21,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial; `command[k]` acts from `time[k]` to `time[k + 1]`, and `sensors.read` says when `position[k]` was read.
+    """One trial; `command[k]` acts from `time[k]` to `time[k + 1]`, `sensors.read` says when `position[k]` was read.
 
     Attributes:
         name: file name without its ending.

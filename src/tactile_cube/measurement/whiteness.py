@@ -128,7 +128,7 @@ def _memory(values: Array) -> float:
 def _autocorrelation(values: Array) -> Array:
     centred = values - values.mean()
     full = signal.correlate(centred, centred, mode="full", method="fft")[len(values) - 1 :]
-    return full / full[0] if full[0] > 0 else np.eye(1, len(values))[0]
+    return np.asarray(full / full[0] if full[0] > 0 else np.eye(1, len(values))[0])
 
 
 def _filled(values: Array) -> Array:
@@ -136,4 +136,4 @@ def _filled(values: Array) -> Array:
     good = np.isfinite(values)
     if good.all():
         return values
-    return np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+    return np.asarray(np.interp(np.arange(len(values)), np.flatnonzero(good), values[good]))

@@ -64,7 +64,7 @@ def write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
             columns[f"{joint}.torque"] = table.torque[:, index].astype(np.float32)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".npz":
-        np.savez_compressed(path, **columns)
+        np.savez_compressed(path, allow_pickle=False, **columns)
     elif path.suffix == ".csv":
         polars.DataFrame(columns).write_csv(path)
     else:

@@ -5,7 +5,8 @@ from tactile_cube.measurement.comparison import Comparison
 from tactile_cube.measurement.noise_floor import NoiseFloor
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.visualization import comparison_figures as figures
-from tactile_cube.visualization.report import Callout, Figure, Listing, Report, Section, Table, Tile
+from tactile_cube.visualization.numbers import mrad, p_value, short
+from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Report, Section, Table, Tile, Tone
 
 AT_THE_FLOOR = 1.3
 MOST_OVERLAYS = 6
@@ -48,21 +49,16 @@ def answer(comparison: Comparison) -> str:
     )
     if ratio <= AT_THE_FLOOR:
         return f"{head} The model is as good as this recording can tell."
-    return f"{head} That is {ratio:.2g} times the noise: {comparison.sentences[0]}."
-
-
-def mrad(value: float) -> str:
-    """An angle in mrad with three digits."""
-    return f"{1e3 * value:.3g} mrad"
+    return f"{head} That is {short(ratio)} times the noise: {comparison.sentences[0]}."
 
 
 def _tiles(comparison: Comparison) -> list[Tile]:
     worst = max(comparison.errors.joints, key=lambda j: comparison.errors.joints[j] / comparison.floor.joints[j])
-    tone = "good" if comparison.ratio <= AT_THE_FLOOR else "warn"
+    tone: Tone = "good" if comparison.ratio <= AT_THE_FLOOR else "warn"
     tiles = [
         Tile(mrad(comparison.errors.overall), "error, all joints (RMS)", tone),
         Tile(mrad(comparison.floor.overall), f"noise floor ({floor_source(comparison.floor)})"),
-        Tile(f"{comparison.ratio:.2g} x", "error / noise floor", tone),
+        Tile(f"{short(comparison.ratio)} x", "error / noise floor", tone),
         Tile(worst, f"worst joint: {mrad(comparison.errors.joints[worst])}"),
     ]
     if comparison.band is not None:
@@ -98,7 +94,8 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
     ]
     warnings = [Callout(line, "warn") for line in recording.warnings]
     text = [
-        "The same commands that the rig received were given to the simulation. It started where the rig started and then "
+        "The same commands that the rig received were given to the simulation. It started where the rig started and "
+        "then "
         "ran freely to the end of each trial: nothing pulls it back to the measurement."
     ]
     return Section("What was compared", text, [Table(("", ""), rows), *warnings])
@@ -115,10 +112,12 @@ def error_section(comparison: Comparison) -> Section:
     source = (
         "The noise floor is the scatter of trials that repeated one command"
         if floor.source == "repeats"
-        else "Nothing was repeated, so the noise floor is a guess from the fast part of the signals and the sensor's resolution"
+        else "Nothing was repeated, so the noise floor is a guess from the fast part of the signals and the "
+        "sensor's resolution"
     )
     text = [
-        f"{source}, together with the error of the simulator's own time step. A perfect model would score 1 in the column "
+        f"{source}, together with the error of the simulator's own time step. A perfect model would score 1 in the "
+        "column "
         "'error / floor'; a model that scores 3 leaves something out that is three times as large as the noise."
     ]
     header = ("joint", "error (RMS)", "noise floor", "error / floor", "of it time step")
@@ -129,11 +128,13 @@ def error_section(comparison: Comparison) -> Section:
 def where_section(comparison: Comparison) -> Section:
     """In words, and as a map of joints and regimes."""
     caption = (
-        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A bright cell in a "
-        "pale row is a hint at what is missing: friction shows just after reversals and at low speed, delay and inertia "
+        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A bright cell "
+        "in a "
+        "pale row is a hint at what is missing: friction shows just after reversals and at low speed, delay and "
+        "inertia "
         "at high speed, gravity and springs by posture."
     )
-    blocks = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
+    blocks: list[Block] = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
     return Section("Where it fails", (), blocks)
 
 
@@ -166,7 +167,8 @@ def band_section(comparison: Comparison) -> list[Section]:
     if comparison.band is None:
         return []
     text = [
-        f"{comparison.band.simulations} simulations with constants drawn from their ranges. A policy that is trained on these "
+        f"{comparison.band.simulations} simulations with constants drawn from their ranges. A policy that is "
+        "trained on these "
         "ranges has met the real rig if the measured line lies in the band: 95 % of the samples should, and "
         f"{100 * comparison.band.inside:.0f} % do."
     ]
@@ -188,12 +190,13 @@ def band_section(comparison: Comparison) -> list[Section]:
 def test_section(comparison: Comparison) -> Section:
     """Whiteness and cross-correlation tests."""
     text = [
-        "If nothing is missing, what is left is noise: it neither remembers itself (whiteness) nor goes with any other signal "
+        "If nothing is missing, what is left is noise: it neither remembers itself (whiteness) nor goes with any "
+        "other signal "
         "(cross-correlation). A free-running simulation integrates every small error, so a short memory is normal."
     ]
-    memory = [(w.joint, f"{1e3 * w.correlation_time:.0f} ms", _p(w.p_value)) for w in comparison.whiteness]
+    memory = [(w.joint, f"{1e3 * w.correlation_time:.0f} ms", p_value(w.p_value)) for w in comparison.whiteness]
     strongest = [
-        (f"{c.joint} residual", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", _p(c.p_value))
+        (f"{c.joint} residual", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", p_value(c.p_value))
         for c in comparison.cross_correlations[:MOST_CORRELATIONS]
     ]
     blocks = [
@@ -221,17 +224,17 @@ def next_section(comparison: Comparison, model_path: str | None) -> Section:
 def method_section() -> Section:
     """How the numbers were made."""
     lines = [
-        "Error: root mean square of measured minus simulated angle over all samples of all trials; the mean difference of each joint "
+        "Error: root mean square of measured minus simulated angle over all samples of all trials; the mean "
+        "difference of each joint "
         "in each robot initialisation is removed first, because a joint's zero is calibrated anew each time.",
-        "Noise floor: standard deviation of repeats of one command about their mean, and, added in quadrature, the difference "
+        "Noise floor: standard deviation of repeats of one command about their mean, and, added in quadrature, the "
+        "difference "
         "between the simulation at its own time step and at an eighth of it.",
-        "Just after a reversal: within 0.2 s after a joint's velocity changed its sign. Standstill, low, medium and high speed: "
+        "Just after a reversal: within 0.2 s after a joint's velocity changed its sign. Standstill, low, medium and "
+        "high speed: "
         "below 0.02, 0.3, 1.5 rad/s and above. Low and high load: below and above half of the largest torque.",
-        "Whiteness: Ljung-Box test over 20 lags. Cross-correlation: the strongest within 0.1 s; its p-value allows for the memory "
+        "Whiteness: Ljung-Box test over 20 lags. Cross-correlation: the strongest within 0.1 s; its p-value allows "
+        "for the memory "
         "of both signals.",
     ]
     return Section("How this was computed", (), [Listing(lines)], folded=True)
-
-
-def _p(value: float) -> str:
-    return "< 0.001" if value < 1e-3 else f"{value:.3f}"

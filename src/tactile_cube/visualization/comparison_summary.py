@@ -15,7 +15,9 @@ def summary(comparison: Comparison) -> str:
     lines += ["", f"noise floor: {floor_source(comparison.floor)}, with the simulator's own time step"]
     if comparison.band is not None:
         inside = 100 * comparison.band.inside
-        lines.append(f"measured inside the band of {comparison.band.simulations} simulations: {inside:.0f} % of the samples")
+        lines.append(
+            f"measured inside the band of {comparison.band.simulations} simulations: {inside:.0f} % of the samples"
+        )
     return "\n".join([*lines, "", *(f"- {sentence}" for sentence in comparison.sentences)])
 
 

@@ -9,6 +9,8 @@ from typing import Literal
 from jinja2 import Environment
 from markupsafe import Markup
 
+Tone = Literal["good", "warn", "plain"]
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -45,7 +47,7 @@ class Callout:
     """A sentence that must not be missed: good, warn or plain."""
 
     text: str
-    tone: Literal["good", "warn", "plain"] = "plain"
+    tone: Tone = "plain"
     kind: Literal["callout"] = "callout"
 
 
@@ -77,7 +79,7 @@ class Tile:
 
     value: str
     label: str
-    tone: Literal["good", "warn", "plain"] = "plain"
+    tone: Tone = "plain"
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class Report:
 
     title: str
     answer: str
-    tone: Literal["good", "warn", "plain"]
+    tone: Tone
     tiles: Sequence[Tile] = ()
     sections: Sequence[Section] = ()
     footer: str = ""

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from html import escape
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,7 @@ def thinned(x: Array, y: Array) -> tuple[Array, Array]:
         return x, y
     edges = np.linspace(0, len(x), MOST_POINTS // 2 + 1).astype(int)
     chosen: list[int] = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         piece = y[a:b]
         if np.isfinite(piece).any():
             chosen += sorted({a + int(np.nanargmin(piece)), a + int(np.nanargmax(piece))})

@@ -50,7 +50,7 @@ class BamXl330:
             controller={"kp": stiffness(HELD_OUT), "kd": STALL_TORQUE / NO_LOAD_SPEED, "torque_limit": STALL_TORQUE},
             nominal={"static_friction": 0.01, "reflected_inertia": REFLECTED_INERTIA},
             sensors={"read": "before", "position_resolution": 2 * np.pi / 4096},
-            source="Rhoban/bam xl330 (Apache-2.0); kp = firmware gain x stall torque, kd = back-EMF, both from the data sheet",
+            source="Rhoban/bam xl330 (Apache-2.0); kp = gain x stall torque, kd = back-EMF, from the data sheet",
         )  # fmt: skip
         return {name: RecordingTables(description, urdf, tables) for name, tables in parts.items()}
 

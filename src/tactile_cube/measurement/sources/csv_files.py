@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from glob import glob
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from tactile_cube.measurement.tables import Table, read_table
 from tactile_cube.measurement.writing import RecordingTables, TrialTable
 
 Array = NDArray[np.float64]
+Value = TypeVar("Value")
 ANGLE_UNITS = {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
@@ -117,7 +119,7 @@ def _unit(name: str, units: Mapping[str, float], key: str) -> float:
     return units[name]
 
 
-def _one_each[T](values: Iterable[T] | None, paths: list[Path], key: str, default: list[T]) -> list[T]:
+def _one_each(values: Iterable[Value] | None, paths: list[Path], key: str, default: list[Value]) -> list[Value]:
     chosen = default if values is None else list(values)
     if len(chosen) != len(paths):
         raise InputError(f"source.{key}: {len(chosen)} values for {len(paths)} files; give one each")

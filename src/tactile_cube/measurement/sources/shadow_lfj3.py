@@ -1,4 +1,4 @@
-"""Little finger of a Shadow Dexterous Hand: 36 open-loop runs of one tendon-driven joint, a real machine that repeats poorly.
+"""Little finger of a Shadow Dexterous Hand: open-loop runs of one tendon-driven joint that repeats poorly.
 
 Source: github.com/rtkg/motion_primitives (BSD), Krug, AASS Oerebro, 2012.
 """
@@ -39,7 +39,7 @@ class ShadowLfj3:
         columns = [str(name) for name in archive.pop("columns")]
         description = described(
             gravity=[0.0, 0.0, 0.0], rate_hz=RATE, joints=["LFJ3"], controller={"mode": "torque"}, nominal=NOMINAL,
-            source="rtkg/motion_primitives (BSD); effort is the command to a tendon-force loop, 1 unit taken for 1 mN m",
+            source="rtkg/motion_primitives (BSD); effort commands a tendon-force loop; 1 unit is taken for 1 mN m",
         )  # fmt: skip
         urdf = single_joint_urdf("shadow_lfj3", "LFJ3", 0.0, 0.0, 1e-6, limit=1.7)
         runs = {"": TRAINED_ON, "validation": HELD_OUT}

@@ -1,4 +1,4 @@
-"""A recording of a simulated rig: commands, joint offsets, sensor noise, and effects that the reader does not know of."""
+"""A recording of a simulated rig: commands, joint offsets, sensor noise, effects that the reader does not know of."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -16,7 +16,8 @@ def single_joint_urdf(
 <link name="arm">
 <inertial><origin xyz="0 0 {-length:g}"/><mass value="{mass:g}"/>
 <inertia ixx="{inertia:g}" iyy="{inertia:g}" izz="{inertia:g}" ixy="0" ixz="0" iyz="0"/></inertial>
-<visual><origin xyz="0 0 {-height / 2:g}"/><geometry><cylinder radius="{radius}" length="{height:g}"/></geometry></visual>
+<visual><origin xyz="0 0 {-height / 2:g}"/>
+<geometry><cylinder radius="{radius}" length="{height:g}"/></geometry></visual>
 </link>
 <joint name="{joint}" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="{axis}"/>
 <limit lower="{-limit:g}" upper="{limit:g}" effort="10" velocity="30"/></joint>

@@ -28,8 +28,8 @@ REPEATED = "repetitive_motion"
 class So101Sage:
     """Imports one joint of some of the arm's motions.
 
-    The arm's masses are not part of the data set: the joint is described with its drive alone. That fits the joints that
-    carry no weight, the rotation about the vertical and the roll of the wrist.
+    The arm's masses are not part of the data set: the joint is described with its drive alone. That fits the joints
+    that carry no weight, the rotation about the vertical and the roll of the wrist.
 
     Attributes:
         folder: where the NPZ files lie.

@@ -1,0 +1,284 @@
+"""The report of `diagnose` and `identify`: what is missing, how sure, how far the error falls, what to record next."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.visualization.comparison_report import (
+    band_section,
+    overlay_section,
+    recording_section,
+    test_section,
+    where_section,
+)
+from tactile_cube.visualization.numbers import mrad, p_value, short
+from tactile_cube.visualization.report import Callout, Figure, Listing, Report, Section, Table, Tile, Tone
+from tactile_cube.visualization.svg import SIMULATED, Axes, Band, Line, line_chart
+from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_chart
+
+Array = NDArray[np.float64]
+STAGES = {
+    "nominal": "as stated by the owner",
+    "refitted": "known constants refitted",
+    "with_effects": "with what was found",
+}
+VERDICTS: dict[str, tuple[Tone, str]] = {
+    "adequate": ("good", "Nothing is missing: the model is as good as this recording can tell."),
+    "missing_effect": ("good", "The missing effect was found"),
+    "ambiguous": ("warn", "Several effects explain this recording equally well"),
+    "unknown_effect": ("warn", "Something is missing that no effect of the catalogue explains"),
+}
+MOST_RANKED = 15
+
+
+@dataclass(frozen=True)
+class ResidualShape:
+    """The torque that the model lacks at a joint, averaged over bins of another signal.
+
+    Attributes:
+        joint: where it is missing.
+        against: the signal, with its unit, e.g. `position of q3 [rad]`.
+        centres: (bins,) of the signal.
+        mean: (bins,) [N m].
+        spread: (bins,) standard deviation [N m].
+        explained: share of the missing torque that a smooth function of this signal explains.
+    """
+
+    joint: str
+    against: str
+    centres: Array
+    mean: Array
+    spread: Array
+    explained: float
+
+
+def diagnosis_report(
+    diagnosis: Mapping[str, Any],
+    before: Comparison,
+    after: Comparison | None,
+    command: str,
+    model_path: str | None = None,
+    shapes: Sequence[ResidualShape] = (),
+    expectation: str = "",
+) -> Report:
+    """The page of a diagnosis.
+
+    Args:
+        diagnosis: the content of diagnosis.json.
+        before: the model as it was, beside the recording.
+        after: the recommended model beside the recording; None if it is the same.
+        command: the command line that made it.
+        model_path: the recommended model's file.
+        shapes: shape of what stays unexplained.
+        expectation: what the next experiment is expected to show.
+    """
+    tone, said = VERDICTS[diagnosis["verdict"]]
+    sections = [
+        _verdict_section(diagnosis),
+        staircase_section(diagnosis["error"], {}),
+        *effect_section(diagnosis["effects"]),
+        *shape_section(shapes),
+        *ranking_section(diagnosis["ranking"]),
+        next_section(diagnosis, model_path, before, expectation),
+        recording_section(before.recording, before.model),
+        where_section(before),
+        overlay_section(after or before),
+        *([] if after is None else [test_section(after)]),
+    ]
+    return Report(
+        title=f"What is missing? {before.recording.name}",
+        answer=f"{said}: {_names(diagnosis['effects'])}." if _names(diagnosis["effects"]) else said,
+        tone=tone,
+        tiles=_tiles(diagnosis),
+        sections=sections,
+        footer=f"Made by tactile_cube in {diagnosis['seconds']:.0f} s: {command}",
+    )
+
+
+def identification_report(
+    after: Comparison,
+    stages: Mapping[str, float | None],
+    joints: Mapping[str, Mapping[str, float]],
+    command: str,
+    model_path: str,
+) -> Report:
+    """The page of an identification: the staircase of errors, the values found, the fitted model beside the recording.
+
+    Args:
+        after: the fitted model beside the recording.
+        stages: name of a stage -> held-out error [rad], in order, and `noise_floor`.
+        joints: the same stage -> joint -> error [rad].
+        command: the command line that made it.
+        model_path: the model file that was written.
+    """
+    steps = [value for key, value in stages.items() if key != "noise_floor" and value is not None]
+    effects = after.model.effects if after.model is not None else []
+    found = [{"name": e.name, "joints": [e.joint or "object"], "parameters": e.parameters} for e in effects]
+    train = Listing([f"python -m tactile_cube.train +experiment=finetune model={model_path}"], code=True)
+    return Report(
+        title=f"Identified: {after.recording.name}",
+        answer=f"The error on trials that the fit never saw fell from {mrad(steps[0])} to {mrad(steps[-1])}; "
+        f"{mrad(stages['noise_floor'] or after.floor.overall)} would be noise alone.",
+        tone="good",
+        sections=[
+            staircase_section(stages, joints),
+            *effect_section(found),
+            value_section(after),
+            recording_section(after.recording, after.model),
+            where_section(after),
+            overlay_section(after),
+            *band_section(after),
+            test_section(after),
+            Section(
+                "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
+            ),
+        ],
+        footer=f"Made by tactile_cube: {command}",
+    )
+
+
+def staircase_section(stages: Mapping[str, float | None], joints: Mapping[str, Mapping[str, float]]) -> Section:
+    """The error after each step, down to the noise floor."""
+    bars = [(STAGES.get(key, key), 1e3 * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
+    floor = stages.get("noise_floor")
+    caption = (
+        "RMS position error on trials that were held out from the fit; the dashed line is what noise alone would leave."
+    )
+    blocks: list[Figure | Table] = [Figure(bar_chart(bars, "mrad", None if floor is None else 1e3 * floor), caption)]
+    if joints:
+        names = list(next(iter(joints.values())))
+        rows = [(STAGES.get(stage, stage), *(mrad(row[name]) for name in names)) for stage, row in joints.items()]
+        blocks.append(Table(("", *names), rows))
+    return Section("How the error falls", (), blocks)
+
+
+def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
+    """Every effect that was found: parameters with intervals, held-out gain, rivals."""
+    if not effects:
+        return []
+    intervals, lines = [], []
+    for effect in effects:
+        place = ", ".join(effect["joints"])
+        for name, estimate in effect["parameters"].items():
+            one = estimate if isinstance(estimate, Mapping) else estimate.model_dump()
+            label = f"{effect['name']}@{place}: {name}"
+            intervals.append(Interval(label, one["value"], one["low"], one["high"], one["unit"]))
+        if "heldout_gain" in effect:
+            lines.append(
+                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the error on held-out trials "
+                f"(p {p_value(effect['p_value'])})"
+                + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
+            )
+    blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
+    blocks.append(Figure(interval_chart(intervals), "Values and 95 % intervals, each on a scale of its own."))
+    return [Section("What was found, and how sure that is", (), blocks)]
+
+
+def shape_section(shapes: Sequence[ResidualShape]) -> list[Section]:
+    """What the missing torque depends on, where no effect of the catalogue explains it."""
+    if not shapes:
+        return []
+    text = [
+        "The torque that the model lacks, averaged over bins of one signal at a time. A clear curve is a law of "
+        "that signal "
+        "alone; write it as an effect of your own, fit it, and see whether the error falls."
+    ]
+    blocks = []
+    for one in sorted(shapes, key=lambda shape: -shape.explained):
+        axes = Axes(one.against, f"{one.joint} [mN m]", height=200)
+        low, high = 1e3 * (one.mean - one.spread), 1e3 * (one.mean + one.spread)
+        band = Band("+- one standard deviation", one.centres, low, high)
+        chart = line_chart(axes, [Line("missing torque", one.centres, 1e3 * one.mean, SIMULATED, 2.0)], [band])
+        blocks.append(Figure(chart, f"{one.joint} against {one.against}: explains {100 * one.explained:.0f} % of it."))
+    return [Section("The shape of what is unexplained", text, blocks)]
+
+
+def ranking_section(ranking: Sequence[Any]) -> list[Section]:
+    """The candidates that were weighed, best first."""
+    rows = [row for row in ranking if isinstance(row, Mapping)][:MOST_RANKED]
+    if not rows:
+        return []
+    keys = [key for key, value in rows[0].items() if isinstance(value, str | int | float)]
+    table = Table([key.replace("_", " ") for key in keys], [[_cell(row.get(key)) for key in keys] for row in rows])
+    return [Section("What else was weighed", (), [table], folded=True)]
+
+
+def value_section(comparison: Comparison) -> Section:
+    """The constants of the model and their intervals, beside what the owner believed."""
+    rows = []
+    if comparison.model is not None:
+        for key, by_joint in comparison.model.values.items():
+            for joint, one in by_joint.items():
+                interval = f"{short(one.low)} .. {short(one.high)}" if one.high > one.low else "not fitted"
+                believed = comparison.recording.stated(key, joint)
+                stated = "" if believed is None else short(believed)
+                rows.append((f"{key} {joint}", short(one.value), interval, stated, one.unit))
+    return Section("The constants", (), [Table(("", "value", "95 % interval", "owner's value", "unit"), rows)])
+
+
+def next_section(diagnosis: Mapping[str, Any], model_path: str | None, before: Comparison, expectation: str) -> Section:
+    """What to record or to type next."""
+    if diagnosis["next_experiment"]:
+        text = [
+            "This recording cannot decide. Play these commands on the rig, add the trials to the recording, "
+            "diagnose again:"
+        ]
+        lines = [str(diagnosis["next_experiment"])]
+        blocks: list[Listing | Callout] = [Listing(lines, code=True)]
+        return Section("What to record next", text, [*blocks, *([Callout(expectation)] if expectation else [])])
+    folder = before.recording.folder
+    if diagnosis["effects"]:
+        names = [f"{e['name']}@{joint}" for e in diagnosis["effects"] for joint in e["joints"]]
+        text = ["Fit exactly these effects and train with the result:"]
+        lines = [f"python -m tactile_cube.identify recording={folder} effects=[{','.join(names)}]"]
+        lines.append(f"python -m tactile_cube.train +experiment=finetune model={model_path or 'MODEL.yaml'}")
+    elif diagnosis["verdict"] == "adequate":
+        text, lines = (
+            ["Train with the refitted constants:"],
+            [f"python -m tactile_cube.train +experiment=finetune model={model_path}"],
+        )
+    else:
+        text = ["Look at the shape above, write the law as an effect of your own, and fit it:"]
+        lines = [
+            f"python -m tactile_cube.identify recording={folder} effects=[my_rig.MyEffect@{_first_joint(diagnosis)}]"
+        ]
+    return Section("What to do next", text, [Listing(lines, code=True)])
+
+
+def _first_joint(diagnosis: Mapping[str, Any]) -> str:
+    return str((diagnosis["unexplained_joints"] or ["JOINT"])[0])
+
+
+def _verdict_section(diagnosis: Mapping[str, Any]) -> Section:
+    lines = []
+    for effect in diagnosis["effects"]:
+        values = [f"{name} {short(p['value'])} {p['unit']}" for name, p in effect["parameters"].items()]
+        lines.append(f"{effect['name']} at {', '.join(effect['joints'])}: {', '.join(values)}")
+    if diagnosis["unexplained_joints"]:
+        lines.append(f"not explained: {', '.join(diagnosis['unexplained_joints'])}")
+    return Section("The answer", (), [Listing(lines or ["no effect has to be added"])])
+
+
+def _tiles(diagnosis: Mapping[str, Any]) -> list[Tile]:
+    errors = diagnosis["error"]
+    tiles = [Tile(diagnosis["verdict"].replace("_", " "), "verdict", VERDICTS[diagnosis["verdict"]][0])]
+    for key, label in (
+        ("nominal", "error as stated"),
+        ("with_effects", "error with what was found"),
+        ("noise_floor", "noise floor"),
+    ):
+        if errors.get(key) is not None:
+            tiles.append(Tile(mrad(errors[key]), label))
+    return tiles
+
+
+def _names(effects: Sequence[Mapping[str, Any]]) -> str:
+    return " and ".join(f"{effect['name']} at {', '.join(effect['joints'])}" for effect in effects)
+
+
+def _cell(value: object) -> str:
+    return short(value) if isinstance(value, float) else str(value)
