@@ -1,7 +1,7 @@
 """The wrapper that all verbs share: quick help, configuration by Hydra, and errors in one line.
 
-A verb is a module of this package with a function decorated by `verb`; it imports nothing slow at its top, so that `--help`
-and `--cfg job` answer at once.
+A verb is a module of this package with a function decorated by `verb`; it imports nothing slow at its top, so that
+`--help` and `--cfg job` answer at once.
 """
 
 import ast
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 CONFIG = Path(__file__).parent / "conf"
 """The configuration tree; in a checkout a link to conf/ at the top."""
 
+Kinds = type[BaseException] | tuple[type[BaseException], ...]
 USAGE_ERROR = 2
 INTERRUPTED = 130
 
@@ -101,7 +102,7 @@ def fail(message: str) -> NoReturn:
     sys.exit(USAGE_ERROR)
 
 
-def _find(error: BaseException | None, kinds: Any) -> BaseException | None:
+def _find(error: BaseException | None, kinds: Kinds) -> BaseException | None:
     """The first error of some kind among an error and its causes."""
     while error is not None:
         if isinstance(error, kinds):

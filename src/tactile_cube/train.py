@@ -4,7 +4,7 @@ What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors
 checkpoint.pt (to go on from), ledger.json (CPU-hours) and .hydra/ (configuration).
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tactile_cube.cli import verb
 
@@ -27,7 +27,7 @@ def main(config: "DictConfig") -> None:
     from tactile_cube.training.environment import as_environment
     from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
-    plain = OmegaConf.to_container(config, resolve=True)
+    plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
     folder = Path(HydraConfig.get().runtime.output_dir)
     try:
         run = build_run(

@@ -31,7 +31,9 @@ def test_log_prob_is_that_of_torchrl() -> None:
     mean, log_sigma, noise = torch.randn(6, 3), 0.3 * torch.randn(6, 3) - 1, torch.randn(6, 3)
     pre_tanh = mean + log_sigma.exp() * noise
     expected = TanhNormal(mean, log_sigma.exp()).log_prob(torch.tanh(pre_tanh))
-    torch.testing.assert_close(squashed_log_prob(noise, log_sigma, pre_tanh).squeeze(-1), expected, rtol=1e-3, atol=1e-3)
+    torch.testing.assert_close(
+        squashed_log_prob(noise, log_sigma, pre_tanh).squeeze(-1), expected, rtol=1e-3, atol=1e-3
+    )
 
 
 def test_behaviour_draws_uniform_actions_while_random() -> None:

@@ -14,7 +14,9 @@ from tactile_cube.errors import InputError
 
 def saved(path: Path) -> Actor:
     actor = Actor(Sizes(10, 0, 3), (16, 8))
-    save_policy(path, actor, PolicyInfo.describe(actor, seed=4, steps=1000, time_constant=0.25, config={"env": {"stack": 5}}))
+    save_policy(
+        path, actor, PolicyInfo.describe(actor, seed=4, steps=1000, time_constant=0.25, config={"env": {"stack": 5}})
+    )
     return actor
 
 
@@ -28,7 +30,7 @@ def test_policy_comes_back_as_it_was(tmp_path: Path) -> None:
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="nowhere.safetensors: no such policy file"):
+    with pytest.raises(InputError, match=r"nowhere\.safetensors: no such policy file"):
         load_policy(tmp_path / "nowhere.safetensors")
 
 

@@ -9,7 +9,7 @@ import torch
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.training.collection import CollectionError, MultiSyncCollection, SingleCollection
-from tests.training.tiny_env import SIZES, LENGTH, TinyEnv, tiny_environment
+from tests.training.tiny_env import LENGTH, SIZES, TinyEnv, tiny_environment
 
 
 class StuckEnv(TinyEnv):
@@ -26,9 +26,10 @@ def start(make=None, timeout: float = 30.0, processes: int = 1) -> MultiSyncColl
     return MultiSyncCollection(make or tiny_environment().make, actor, 4, 5, processes, timeout, "fork")
 
 
-def collect(collection: MultiSyncCollection) -> None:
-    collection.launch(Actor(SIZES, (8,)), False, (0, 0.0))
-    collection.take()
+def collect(collection: MultiSyncCollection, blocks: int = 1) -> None:
+    for _ in range(blocks):
+        collection.launch(Actor(SIZES, (8,)), False, (0, 0.0))
+        collection.take()
 
 
 def test_killed_worker_is_reported_within_seconds() -> None:
@@ -38,8 +39,7 @@ def test_killed_worker_is_reported_within_seconds() -> None:
     began = time.perf_counter()
     os.kill(collection._processes[0].pid, signal.SIGKILL)
     with pytest.raises(CollectionError, match="worker"):
-        for _ in range(3):
-            collect(collection)
+        collect(collection, blocks=3)
     collection.close()
     assert time.perf_counter() - began < 20.0
 
@@ -47,7 +47,7 @@ def test_killed_worker_is_reported_within_seconds() -> None:
 def test_stuck_worker_is_reported_after_the_timeout() -> None:
     collection = start(make=StuckEnv, timeout=2.0)
     began = time.perf_counter()
-    with pytest.raises(CollectionError, match="collector.timeout=2 s"):
+    with pytest.raises(CollectionError, match=r"collector\.timeout=2 s"):
         collect(collection)
     collection.close()
     assert time.perf_counter() - began < 20.0
@@ -56,8 +56,7 @@ def test_stuck_worker_is_reported_after_the_timeout() -> None:
 def test_failing_world_is_reported() -> None:
     collection = start(make=tiny_environment(fail_at=3).make, timeout=20.0)
     with pytest.raises(CollectionError, match="worker"):
-        for _ in range(3):
-            collect(collection)
+        collect(collection, blocks=3)
     collection.close()
 
 

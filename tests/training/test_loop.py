@@ -24,7 +24,9 @@ def finish(run: Run) -> torch.Tensor:
 
 
 def weights(run: Run) -> torch.Tensor:
-    return torch.cat([v.flatten().double() for v in run.learner.agent.state_dict()["loss"].values() if v.dtype.is_floating_point])
+    return torch.cat(
+        [v.flatten().double() for v in run.learner.agent.state_dict()["loss"].values() if v.dtype.is_floating_point]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +60,9 @@ def test_resumed_run_equals_an_uninterrupted_one(tmp_path: Path, agent_settings:
     resumed = tiny_run(tmp_path / "parts", agent_settings=agent_settings)
     assert resumed.learner.steps == 80
     assert torch.equal(finish(resumed), expected)
-    assert (tmp_path / "whole/metrics.csv").read_text().count("\n") == (tmp_path / "parts/metrics.csv").read_text().count("\n")
+    assert (tmp_path / "whole/metrics.csv").read_text().count("\n") == (
+        tmp_path / "parts/metrics.csv"
+    ).read_text().count("\n")
     assert whole.learner.episodes.summary() == resumed.learner.episodes.summary()
 
 
@@ -122,7 +126,7 @@ def test_second_ctrl_c_stops_at_once_and_keeps_the_last_checkpoint(
 
 def test_changed_settings_are_not_mixed_into_a_run(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path, steps=80))
-    with pytest.raises(InputError, match="agent.learning_rate was 0.01, is 0.5"):
+    with pytest.raises(InputError, match=r"agent\.learning_rate was 0.01, is 0.5"):
         tiny_run(tmp_path, agent_settings={"learning_rate": 0.5})
     fresh = tiny_run(tmp_path, agent_settings={"learning_rate": 0.5}, resume="never")
     assert fresh.learner.steps == 0
@@ -130,7 +134,7 @@ def test_changed_settings_are_not_mixed_into_a_run(tmp_path: Path) -> None:
 
 def test_damaged_checkpoint_is_named(tmp_path: Path) -> None:
     (tmp_path / "checkpoint.pt").write_bytes(b"not a checkpoint")
-    with pytest.raises(InputError, match="checkpoint.pt: damaged checkpoint"):
+    with pytest.raises(InputError, match=r"checkpoint\.pt: damaged checkpoint"):
         tiny_run(tmp_path)
 
 

@@ -62,7 +62,7 @@ class TinyEnv(EnvBase):
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
         mask = torch.ones_like(self._count, dtype=torch.bool)
-        if tensordict is not None and "_reset" in tensordict.keys():
+        if tensordict is not None and "_reset" in tensordict:
             mask = tensordict["_reset"].reshape(mask.shape)
         fresh = self.scale * 0.1 * torch.randn_like(self._theta)
         self._theta = torch.where(mask, fresh, self._theta)

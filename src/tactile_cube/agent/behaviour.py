@@ -7,11 +7,11 @@ from tensordict.nn import TensorDictModuleBase
 from tactile_cube.agent.networks import Actor
 
 
-class Behaviour(TensorDictModuleBase):
+class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
     """Policy of the collectors: reads "observation", writes "action".
 
-    Whether actions are random travels with the weights as a buffer, so that it reaches every worker in the same iteration
-    and survives a resume. Noise comes from torch's global generator of the worker.
+    Whether actions are random travels with the weights as a buffer, so that it reaches every worker in the same
+    iteration and survives a resume. Noise comes from torch's global generator of the worker.
 
     Args:
         actor: its own copy, never the learner's.

@@ -1,9 +1,10 @@
 """A perceptron whose parameters and gradients are views of flat vectors, with its backward pass written out.
 
-One flat vector makes the optimiser, the target update and the cast to bfloat16 one operation each, and a written backward
-pass computes what is used and nothing else: no weight gradients of the critics in the actor's loss, for example.
+One flat vector makes the optimiser, the target update and the cast to bfloat16 one operation each, and a written
+backward pass computes what is used and nothing else: no weight gradients of the critics in the actor's loss, say.
 """
 
+import itertools
 from collections.abc import Sequence
 
 import torch
@@ -11,13 +12,13 @@ from torch import Tensor, nn
 
 LAYER_NORM_EPS = 1e-5
 
-Activations = list[tuple[Tensor, Tensor, Tensor | None, Tensor | None]]
-"""Of each layer: its input, its product before normalisation, and the normalisation's mean and 1/sigma."""
+Activation = tuple[Tensor, Tensor, Tensor | None, Tensor | None]
+"""A layer's input, its product before normalisation, and the normalisation's mean and 1/sigma."""
 
 
 def parameter_count(sizes: Sequence[int]) -> int:
     """Weights and biases of a perceptron with these widths."""
-    return sum((fan_in + 1) * fan_out for fan_in, fan_out in zip(sizes[:-1], sizes[1:], strict=True))
+    return sum((fan_in + 1) * fan_out for fan_in, fan_out in itertools.pairwise(sizes))
 
 
 class FlatPerceptron:
@@ -36,9 +37,9 @@ class FlatPerceptron:
         self.layers = _layer_views(self.sizes, weights)
         self.gradients = _layer_views(self.sizes, gradients) if gradients is not None else []
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Activations]:
+    def forward(self, x: Tensor) -> tuple[Tensor, list[Activation]]:
         """Output (batch, sizes[-1]) and what `backward` needs."""
-        kept: Activations = []
+        kept: list[Activation] = []
         for weight, bias in self.layers[:-1]:
             product = torch.addmm(bias, x, weight)
             normalised, mean, inverse = self._normalise(product)
@@ -48,7 +49,7 @@ class FlatPerceptron:
         kept.append((x, x, None, None))
         return torch.addmm(bias, x, weight), kept
 
-    def backward(self, kept: Activations, gradient: Tensor, rows: slice) -> Tensor:
+    def backward(self, kept: list[Activation], gradient: Tensor, rows: slice) -> Tensor:
         """Write the parameters' gradients of the given rows; give the gradient at the first layer's product, all rows.
 
         Args:
@@ -78,7 +79,7 @@ class FlatPerceptron:
         normalised, mean, inverse = torch.native_layer_norm(product, (product.shape[1],), None, None, LAYER_NORM_EPS)
         return normalised, mean, inverse
 
-    def _normalise_backward(self, gradient: Tensor, kept: tuple[Tensor, Tensor, Tensor | None, Tensor | None]) -> Tensor:
+    def _normalise_backward(self, gradient: Tensor, kept: Activation) -> Tensor:
         if not self.layer_norm:
             return gradient
         _, product, mean, inverse = kept
@@ -106,7 +107,7 @@ class FlatPerceptron:
 
 def _layer_views(sizes: tuple[int, ...], flat: Tensor) -> list[tuple[Tensor, Tensor]]:
     views, start = [], 0
-    for fan_in, fan_out in zip(sizes[:-1], sizes[1:], strict=True):
+    for fan_in, fan_out in itertools.pairwise(sizes):
         weight = flat[start : start + fan_in * fan_out].view(fan_in, fan_out)
         start += fan_in * fan_out
         views.append((weight, flat[start : start + fan_out]))

@@ -1,5 +1,6 @@
 """Actor and critic of the paper: two hidden layers of 512, the actor without any privileged input."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -16,7 +17,7 @@ LOG_SCALE_LOW, LOG_SCALE_HIGH = -5.0, 2.0
 def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:
     """Linear layers with ReLU between them, e.g. sizes (120, 512, 512, 24)."""
     layers: list[nn.Module] = []
-    for fan_in, fan_out in zip(sizes[:-2], sizes[1:-1], strict=True):
+    for fan_in, fan_out in itertools.pairwise(sizes):
         layers.append(nn.Linear(fan_in, fan_out))
         if layer_norm:
             # No scale and shift: the next layer has both.

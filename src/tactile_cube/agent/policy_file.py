@@ -1,7 +1,7 @@
 """A policy on disk: safetensors with the actor's layers and, as metadata, what is needed to run it.
 
-Tensors are named `actor.<layer>.weight` (out, in) and `actor.<layer>.bias` (out,), layer 0 first, ReLU between layers; the
-last layer gives mean and raw log sigma side by side, and the action is tanh(mean).
+Tensors are named `actor.<layer>.weight` (out, in) and `actor.<layer>.bias` (out,), layer 0 first, ReLU between layers;
+the last layer gives mean and raw log sigma side by side, and the action is tanh(mean).
 """
 
 import json
@@ -102,8 +102,8 @@ def require_sizes(path: Path | str, info: PolicyInfo, observation_size: int, act
     """Refuse a policy of other shape than the environment's."""
     if (info.observation_size, info.action_size) != (observation_size, action_size):
         raise InputError(
-            f"{path}: policy maps {info.observation_size} observations to {info.action_size} actions, the environment has "
-            f"{observation_size} and {action_size}; use a policy trained with this observation stack"
+            f"{path}: policy maps {info.observation_size} observations to {info.action_size} actions, the environment "
+            f"has {observation_size} and {action_size}; use a policy trained with this observation stack"
         )
 
 

@@ -3,7 +3,6 @@
 import copy
 from typing import Any
 
-import torch
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torch import Tensor
@@ -13,6 +12,7 @@ from torchrl.objectives import SACLoss, SoftUpdate
 
 from tactile_cube.agent.batch import Batch, Sizes
 from tactile_cube.agent.networks import Actor, build_networks
+from tactile_cube.agent.optimizer import build_optimizer
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.errors import InputError
 
@@ -37,12 +37,15 @@ class Sac:
         self.sizes = sizes
         self.settings = AgentSettings(**settings)
         if self.settings.precision != "fp32":
-            raise InputError(f"agent.precision={self.settings.precision}: agent=sac computes in fp32; use agent=sac_fast")
+            raise InputError(
+                f"agent.precision={self.settings.precision}: agent=sac knows fp32 only; use agent=sac_fast"
+            )
         self.device = self.settings.torch_device()
         self.actor, *critics = build_networks(sizes, self.settings)
         self.loss = self._build_loss(critics).to(self.device)
         self.targets = SoftUpdate(self.loss, tau=self.settings.tau)
-        self.optimizer = self._build_optimizer()
+        networks = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
+        self.optimizer = build_optimizer(networks, self.loss.log_alpha, self.settings)
 
     def _build_loss(self, critics: list[Any]) -> SACLoss:
         loss = SACLoss(
@@ -55,16 +58,6 @@ class Sac:
         )
         loss.make_value_estimator(gamma=self.settings.gamma)
         return loss
-
-    def _build_optimizer(self) -> torch.optim.AdamW:
-        networks = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
-        temperature = {"params": [self.loss.log_alpha], "lr": self.settings.temperature_learning_rate, "weight_decay": 0.0}
-        return torch.optim.AdamW(
-            [{"params": networks}, temperature],
-            lr=self.settings.learning_rate,
-            weight_decay=self.settings.weight_decay,
-            fused=True,
-        )
 
     def losses(self, batch: Batch) -> TensorDict:
         """SACLoss on a batch: loss_qvalue, loss_actor, loss_alpha, alpha, entropy."""

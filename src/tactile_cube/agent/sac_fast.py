@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from tactile_cube.agent.batch import Batch, Sizes
-from tactile_cube.agent.flat_perceptron import FlatPerceptron, parameter_count
+from tactile_cube.agent.flat_perceptron import Activation, FlatPerceptron, parameter_count
 from tactile_cube.agent.networks import (
     LOG_SCALE_HIGH,
     LOG_SCALE_LOW,
@@ -19,6 +19,7 @@ from tactile_cube.agent.networks import (
     log_scale,
     squashed_log_prob,
 )
+from tactile_cube.agent.optimizer import build_optimizer
 from tactile_cube.agent.settings import AgentSettings
 
 
@@ -42,9 +43,7 @@ class FlatNetworks:
         self.actor = FlatPerceptron(self.layout["actor"], self.working[:actor], self.gradient[:actor])
         parts = [slice(actor + i * critic, actor + (i + 1) * critic) for i in (0, 1)]
         norm = settings.layer_norm
-        self.critics = [
-            FlatPerceptron(self.layout["critic"], self.working[p], self.gradient[p], norm) for p in parts
-        ]
+        self.critics = [FlatPerceptron(self.layout["critic"], self.working[p], self.gradient[p], norm) for p in parts]
         halves = self.target_working.chunk(2)
         self.targets = [FlatPerceptron(self.layout["critic"], half, None, norm) for half in halves]
         self.masters = [FlatPerceptron(self.layout["actor"], self.master[:actor], None)]
@@ -65,27 +64,22 @@ class FastSac:
         self.settings = AgentSettings(**settings)
         self.device = self.settings.torch_device()
         self.networks = FlatNetworks(sizes, self.settings, self.device)
-        modules = build_networks(sizes, self.settings)
-        for flat, module in zip(self.networks.masters, modules, strict=True):
-            flat.copy_from(module.body)
+        actor, *critics = build_networks(sizes, self.settings)
+        for flat, body in zip(self.networks.masters, [actor.body, *(critic.body for critic in critics)], strict=True):
+            flat.copy_from(body)
         self.networks.target_master.copy_(self.networks.critic_part)
         self.networks.refresh()
-        self._actor_module = copy.deepcopy(modules[0]).requires_grad_(False)
+        self._actor_module = copy.deepcopy(actor).requires_grad_(False)
         self.log_alpha = torch.tensor(self.settings.alpha_init, device=self.device).log()
-        self.optimizer = self._build_optimizer()
+        self._give_gradients()
+        self.optimizer = build_optimizer([self.networks.master], self.log_alpha, self.settings)
 
-    def _build_optimizer(self) -> torch.optim.AdamW:
-        master = self.networks.master
+    def _give_gradients(self) -> None:
+        networks = self.networks
         # a float32 gradient is the working gradient itself; a bfloat16 one is cast before the step
-        master.grad = self.networks.gradient if master.dtype == self.networks.gradient.dtype else torch.zeros_like(master)
+        same = networks.master.dtype == networks.gradient.dtype
+        networks.master.grad = networks.gradient if same else torch.zeros_like(networks.master)
         self.log_alpha.grad = torch.zeros_like(self.log_alpha)
-        temperature = {"params": [self.log_alpha], "lr": self.settings.temperature_learning_rate, "weight_decay": 0.0}
-        return torch.optim.AdamW(
-            [{"params": [master]}, temperature],
-            lr=self.settings.learning_rate,
-            weight_decay=self.settings.weight_decay,
-            fused=True,
-        )
 
     @torch.no_grad()
     def update(self, batch: Batch) -> dict[str, Tensor]:
@@ -110,7 +104,8 @@ class FastSac:
         first, second = slice(0, size), slice(size, 2 * size)
         alpha = self.log_alpha.exp()
 
-        output, actor_kept = self.networks.actor.forward(self._cast(torch.cat((batch.next_observation, batch.observation))))
+        observations = self._cast(torch.cat((batch.next_observation, batch.observation)))
+        output, actor_kept = self.networks.actor.forward(observations)
         mean, raw = output.float().chunk(2, -1)
         noise = torch.cat([torch.randn_like(mean[first]), torch.randn_like(mean[second])])
         log_sigma = log_scale(raw)
@@ -127,8 +122,8 @@ class FastSac:
         a = action[second]
         pre_gradient = 2.0 * share * a + action_gradient * (1.0 - a.square())
         sigma_gradient = pre_gradient * deviation[second] - share
-        raw_gradient = sigma_gradient * (0.5 * (LOG_SCALE_HIGH - LOG_SCALE_LOW)) * (1.0 - torch.tanh(raw[second]).square())
-        self._actor_backward(actor_kept, torch.cat((pre_gradient, raw_gradient), -1), second)
+        slope = 0.5 * (LOG_SCALE_HIGH - LOG_SCALE_LOW) * (1.0 - torch.tanh(raw[second]).square())
+        self._actor_backward(actor_kept, torch.cat((pre_gradient, sigma_gradient * slope), -1), second)
 
         mean_log_prob = log_prob[second].mean()
         self.log_alpha.grad.copy_(-(mean_log_prob + self.settings.target_entropy))  # type: ignore[union-attr]
@@ -175,7 +170,7 @@ class FastSac:
             action_gradient += critic.input_gradient(at_first[second], columns).float()
         return loss, torch.minimum(q1[second], q2[second]), action_gradient
 
-    def _actor_backward(self, kept: Any, gradient: Tensor, rows: slice) -> None:
+    def _actor_backward(self, kept: list[Activation], gradient: Tensor, rows: slice) -> None:
         mine = [(x[rows], product[rows], mean, inverse) for x, product, mean, inverse in kept]
         self.networks.actor.backward(mine, self._cast(gradient), slice(None))
 

@@ -116,7 +116,9 @@ def _fit(path: Path, load: Callable[[], None]) -> None:
         load()
     except (RuntimeError, KeyError, ValueError) as error:
         reason = str(error).splitlines()[0]
-        raise InputError(f"training.init_from={path}: networks of other shape or kind than agent.* asks for ({reason})") from error
+        raise InputError(
+            f"training.init_from={path}: networks of other shape than agent.* asks for ({reason})"
+        ) from error
 
 
 def _saved_state(folder: Path, training: TrainingSettings, config: dict[str, Any]) -> dict[str, Any] | None:

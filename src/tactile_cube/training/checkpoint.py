@@ -45,7 +45,7 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
         state: dict[str, Any] = torch.load(path, weights_only=True)
     except Exception as error:  # torch raises half a dozen kinds for damaged files
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: damaged checkpoint ({reason}); delete it or start over with training.resume=never") from error
+        raise InputError(f"{path}: damaged checkpoint ({reason}); training.resume=never starts over") from error
     return state
 
 
@@ -57,8 +57,8 @@ def require_same_settings(path: Path, saved: dict[str, Any], now: dict[str, Any]
     if changed:
         more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
         raise InputError(
-            f"{path}: saved with other settings ({'; '.join(changed[:3])}{more}); give the run another name=<name> or start "
-            "over with training.resume=never"
+            f"{path}: saved with other settings ({'; '.join(changed[:3])}{more}); give the run another name=<name> or "
+            "start over with training.resume=never"
         )
 
 

@@ -137,7 +137,14 @@ class MultiSyncCollection:
     """
 
     def __init__(
-        self, make_env: MakeEnv, actor: Actor, worlds: int, steps: int, processes: int, timeout: float, start_method: str
+        self,
+        make_env: MakeEnv,
+        actor: Actor,
+        worlds: int,
+        steps: int,
+        processes: int,
+        timeout: float,
+        start_method: str,
     ):
         self._timeout = timeout
         self._behaviour = Behaviour(copy.deepcopy(actor))
@@ -261,4 +268,3 @@ def _process_cpu_seconds(pid: int) -> float:
     except OSError:
         return 0.0
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-

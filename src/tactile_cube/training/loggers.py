@@ -55,7 +55,7 @@ class TensorBoardLogger:
     def __init__(self, folder: Path, resumed_at: int):
         from torch.utils.tensorboard import SummaryWriter  # imports slowly
 
-        self._writer: Any = SummaryWriter(str(folder / "tensorboard"), purge_step=resumed_at + 1)  # type: ignore[no-untyped-call]
+        self._writer: Any = SummaryWriter(str(folder / "tensorboard"), purge_step=resumed_at + 1)
 
     def log(self, steps: int, metrics: Mapping[str, float]) -> None:
         """Write one point a curve."""
@@ -72,7 +72,7 @@ class WandbLogger:
 
     def __init__(self, folder: Path, resumed_at: int, project: str = "tactile_cube"):
         try:
-            import wandb
+            import wandb  # type: ignore[import-not-found, unused-ignore]
         except ImportError:
             raise InputError("logger=wandb needs Weights & Biases: pip install 'tactile-cube[wandb]'") from None
         name = folder.name

@@ -1,9 +1,9 @@
 """The algorithm: soft actor-critic that collects one iteration ahead of learning.
 
-In each iteration the workers collect a block with the actor as it is while the learner makes its updates on the replay as it
-was one iteration before; so both overlap completely, and nothing depends on which of them is faster (paper, section III).
-At barriers all worlds are reset from a seed that follows from the run's seed and the iteration. That is the only place at
-which a run can be saved and resumed bit for bit, because the state of a simulator cannot be saved.
+In each iteration the workers collect a block with the actor as it is while the learner makes its updates on the replay
+as it was one iteration before; so both overlap completely, and nothing depends on which of them is faster (paper,
+section III). At barriers all worlds are reset from a seed that follows from the run's seed and the iteration. That is
+the only place at which a run can be saved and resumed bit for bit, because the state of a simulator cannot be saved.
 """
 
 from collections.abc import Callable
@@ -53,6 +53,7 @@ class Learner:
     metrics: dict[str, Tensor] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Nothing waits for its future yet."""
         agent = self.agent.settings
         self.assembler = TransitionAssembler(agent.n_step, agent.gamma)
 

@@ -43,12 +43,14 @@ class ProgressLine:
         self._printed, self._at_print = now, (steps, updates)
         left = (self._total - steps) / max(step_rate, 1e-9)
         values = " ".join(f"{key} {value:.3g}" for key, value in conditions.items())
-        line = (
-            f"{steps / 1e3:8.1f} k of {self._total / 1e3:.0f} k steps | {step_rate:4.0f} steps/s {update_rate:4.0f} updates/s"
-            f" | final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps"
-            f" | {values} | {_clock(left)} left"
-        )
-        self.say(line, in_place=self._stream.isatty())
+        parts = [
+            f"{steps / 1e3:8.1f} k of {self._total / 1e3:.0f} k steps",
+            f"{step_rate:4.0f} steps/s {update_rate:4.0f} updates/s",
+            f"final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps",
+            values,
+            f"{_clock(left)} left",
+        ]
+        self.say(" | ".join(parts), in_place=self._stream.isatty())
 
     def say(self, text: str, in_place: bool = False) -> None:
         """Print a line of its own, or over the last one."""

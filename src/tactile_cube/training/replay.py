@@ -13,7 +13,8 @@ from tactile_cube.errors import InputError
 class Replay:
     """Uniform experience replay.
 
-    Rewards are kept as unweighted terms and weighed at sampling, so that a schedule of the weights leaves no stale rewards.
+    Rewards are kept as unweighted terms and weighed at sampling, so that a schedule of the weights leaves no stale
+    rewards.
 
     Args:
         capacity: transitions kept; the oldest are overwritten.
@@ -40,6 +41,7 @@ class Replay:
         self.generator = torch.Generator().manual_seed(seed)
 
     def __len__(self) -> int:
+        """Transitions held now."""
         return min(self.written, self.capacity)
 
     def extend(self, transitions: Mapping[str, Tensor]) -> None:
@@ -55,7 +57,7 @@ class Replay:
     def sample(self, size: int, weights: Tensor) -> Batch:
         """Draw `size` transitions with replacement; reward = reward_terms @ weights."""
         index = torch.randint(len(self), (size,), generator=self.generator)
-        parts = dict(zip(self.widths, self.rows[index].split(list(self.widths.values()), -1), strict=True))
+        parts = dict(zip(self.widths, torch.split(self.rows[index], list(self.widths.values()), -1), strict=True))
         reward = (parts.pop("reward_terms") @ weights).unsqueeze(-1)
         return Batch(reward=reward, **parts)
 
@@ -68,7 +70,7 @@ class Replay:
         rows = state["rows"]
         if rows.shape[1] != self.rows.shape[1] or len(rows) != min(state["written"], self.capacity):
             raise InputError(
-                f"replay in the checkpoint holds {len(rows)} rows of width {rows.shape[1]}, this run's holds up to "
+                f"replay in the checkpoint holds {len(rows)} rows of width {rows.shape[1]}, this run's up to "
                 f"{self.capacity} of width {self.rows.shape[1]}; keep training.replay_size and the observation as they were"
             )
         self.rows[: len(rows)] = rows

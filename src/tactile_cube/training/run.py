@@ -17,6 +17,8 @@ from tactile_cube.training.loggers import Loggers
 from tactile_cube.training.loop import Learner
 from tactile_cube.training.progress import ProgressLine
 
+POLICY, BEST_POLICY = "policy.safetensors", "policy_best.safetensors"
+
 
 @dataclass
 class Run:
@@ -37,6 +39,7 @@ class Run:
     ledger: Ledger
 
     def __post_init__(self) -> None:
+        """A session begins."""
         self.line = ProgressLine(self.learner.settings.steps, self.learner.steps, self.learner.updates)
         self.best_angle = 0.0
         self.commit = current_commit()
@@ -68,10 +71,13 @@ class Run:
         """Say how it ended and where the result lies."""
         costs = self.ledger.costs()
         cpu_hours = (costs.simulating + costs.learning) / 3600
+        angle = self.learner.episodes.mean_angle
         self.line.say(
-            f"{reason}: {self.learner.steps} steps, mean final angle {self.learner.episodes.mean_angle:.2f} rad, "
-            f"{cpu_hours:.2f} CPU-hours; policy {self.folder / 'policy.safetensors'}; the same command goes on from here"
+            f"{reason}: {self.learner.steps} steps, mean final angle {angle:.2f} rad, {cpu_hours:.2f} CPU-hours"
         )
+        if self._interrupted:
+            self.line.say("the same command goes on from here")
+        self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}")
 
     def close(self) -> None:
         """End the workers and write what is still in memory."""
@@ -117,10 +123,10 @@ class Run:
         full_window = len(self.learner.episodes.angles) == self.learner.episodes.angles.maxlen
         if full_window and angle > self.best_angle:
             self.best_angle = angle
-            self._save_policy("policy_best.safetensors")
+            self._save_policy(BEST_POLICY)
         if not everything:
             return
-        self._save_policy("policy.safetensors")
+        self._save_policy(POLICY)
         self._keep_policy()
         state = {"learner": self.learner.state_dict(), "best_angle": self.best_angle, "config": self.config}
         save_checkpoint(self.folder, state)
@@ -131,7 +137,7 @@ class Run:
         every = self.learner.settings.policy_every
         if every and self.learner.steps // every > self._kept_at // every:
             self._kept_at = self.learner.steps
-            shutil.copy(self.folder / "policy.safetensors", self.folder / f"policy_{self._kept_at}.safetensors")
+            shutil.copy(self.folder / POLICY, self.folder / f"policy_{self._kept_at}.safetensors")
 
     def _save_policy(self, name: str) -> None:
         learner = self.learner

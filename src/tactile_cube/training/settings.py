@@ -65,8 +65,8 @@ class TrainingSettings(BaseModel):
         learning_starts: no update before.
         random_steps: uniform random actions before.
         replay_size: transitions kept.
-        barrier_iterations: iterations between two resets of all worlds. A run can be saved and resumed bit for bit there
-            and nowhere else, since the state of a simulator cannot be saved.
+        barrier_iterations: iterations between two resets of all worlds. A run can be saved and resumed bit for bit
+            there and nowhere else, since the state of a simulator cannot be saved.
         checkpoint_barriers: barriers from one checkpoint to the next.
         policy_every: keep a separate policy file each so many steps; 0 keeps only latest and best.
         log_iterations: iterations from one row of metrics to the next.

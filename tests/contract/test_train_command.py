@@ -1,0 +1,87 @@
+"""The command line of train, as a user types it."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tactile_cube import cli
+
+ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
+
+
+def train(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tactile_cube.train", *arguments]
+    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=280)
+
+
+def loaded_modules(argument: str, folder: Path) -> tuple[set[str], str]:
+    """Modules that a call of train leaves loaded, and what it printed."""
+    code = (
+        f"import sys; sys.argv = ['train', {argument!r}, 'job'][:{2 if argument == '--help' else 3}]\n"
+        "from tactile_cube.train import main\nmain()\n"
+        "print('MODULES', *sys.modules, file=sys.stderr)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=60
+    )
+    assert run.returncode == 0, run.stderr
+    return set(run.stderr.split("MODULES")[1].split()), run.stdout
+
+
+def test_help_lists_verbs_and_groups_without_importing_anything_slow(tmp_path: Path) -> None:
+    modules, text = loaded_modules("--help", tmp_path)
+    assert not modules & {"torch", "torchrl", "pybullet", "hydra", "numpy"}
+    for word in ("python -m tactile_cube.train", "task=", "table", "experiment=", "curriculum", "agent=", "sac_fast"):
+        assert word in text
+    began = time.process_time()
+    cli.help_text("train")
+    assert time.process_time() - began < 0.5
+
+
+def test_cfg_job_shows_the_configuration_without_importing_torch(tmp_path: Path) -> None:
+    modules, text = loaded_modules("--cfg", tmp_path)
+    assert not modules & {"torch", "torchrl", "pybullet"}
+    assert "target_entropy: -6" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["task=unknown"], "task/unknown"),
+        (["agent.gama=0.9"], "agent.gama"),
+        (["+experiment=nope"], "experiment/nope"),
+        (["task"], "missing EQUAL"),
+    ],
+)
+def test_wrong_choices_end_with_one_line_and_exit_code_2(tmp_path: Path, arguments: list[str], message: str) -> None:
+    run = train(*arguments, folder=tmp_path)
+    assert run.returncode == 2
+    assert run.stderr.count("\n") == 1
+    assert run.stderr.startswith("error: ")
+    assert message in run.stderr
+
+
+def test_wrong_value_ends_with_one_line_and_exit_code_2(tmp_path: Path) -> None:
+    run = train("+experiment=smoke", "collector.worlds=0", folder=tmp_path)
+    assert run.returncode == 2
+    assert "Traceback" not in run.stderr
+    assert run.stderr.splitlines()[-1] == "error: collector.worlds=0: Input should be greater than 0"
+
+
+def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
+    short = ["+experiment=smoke", "collector=single", "collector.worlds=4", "training.learning_starts=100"]
+    first = train(*short, "training.steps=200", folder=tmp_path)
+    assert first.returncode == 0, first.stderr
+    folder = tmp_path / "outputs/train/smoke-seed0"
+    present = {path.name for path in folder.iterdir()}
+    assert {"checkpoint.pt", "metrics.csv", "policy.safetensors", "ledger.json", ".hydra"} <= present
+    assert "bf16" in first.stdout
+    second = train(*short, "training.steps=400", folder=tmp_path)
+    assert second.returncode == 0, second.stderr
+    assert "goes on at 200 steps" in second.stdout
+    steps = [int(line.split(",")[0]) for line in (folder / "metrics.csv").read_text().splitlines()[1:]]
+    assert steps == list(range(40, 401, 40))

@@ -1,0 +1,64 @@
+"""Errors of the user in one line, errors of the program as they are."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hydra.utils import instantiate
+
+from tactile_cube import cli
+from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.sac import Sac
+from tactile_cube.errors import InputError
+from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
+
+
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        (lambda: CollectorSettings(worlds=0), "collector.worlds=0: Input should be greater than 0"),
+        (lambda: CollectorSettings(processes=5), "collector: processes=5 does not divide worlds=12; choose a divisor"),
+        (lambda: TrainingSettings(stepz=3), "training.stepz: no such setting"),
+        (lambda: RunSettings(name="a", seed=-1), "seed=-1: Input should be greater than or equal to 0"),
+        (lambda: Sac(Sizes(3, 2, 1), gamma=2.0), "agent.gamma=2.0: Input should be less than 1"),
+        (
+            lambda: Sac(Sizes(3, 2, 1), precision="bf16"),
+            "agent.precision=bf16: agent=sac knows fp32 only; use agent=sac_fast",
+        ),
+        (
+            lambda: instantiate({"_target_": "tactile_cube.env.Task", "name": "full", "filter_time": -1.0}),
+            "task.filter_time is -1",
+        ),
+    ],
+)
+def test_wrong_values_are_told_by_key_value_and_remedy(make: Callable[[], Any], expected: str) -> None:
+    with pytest.raises(Exception) as info:  # noqa: PT011 - the kinds differ, what is told is the claim
+        make()
+    message = cli.usage_error(info.value)
+    assert message is not None
+    assert message.startswith(expected)
+    assert "\n" not in message
+
+
+def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:
+    wrapped = RuntimeError("Error in call to target")
+    wrapped.__cause__ = InputError("row 3: NaN")
+    assert cli.usage_error(wrapped) == "row 3: NaN"
+
+
+def test_errors_of_the_program_are_not_the_users() -> None:
+    assert cli.usage_error(KeyError("x")) is None
+
+
+def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as info:
+        cli.fail("no such thing")
+    assert info.value.code == 2
+    assert capsys.readouterr().err == "error: no such thing\n"
+
+
+def test_help_marks_the_default_of_each_group() -> None:
+    text = cli.help_text("train")
+    assert "*full" in text
+    assert "*multi_sync" in text
+    assert " seed: 0" in text
