@@ -9,7 +9,7 @@ from tactile_cube.evaluation.results_file import FORMAT
 from tactile_cube.evaluation.training_curve import Curve
 
 
-def results(protocol: str, label: str = "cube", angle: float = 12.0) -> dict[str, Any]:
+def results(protocol: str, label: str = "cube", angle: float = 12.0, table: bool = False) -> dict[str, Any]:
     summary = {
         "mean_angle": angle - 1,
         "std_angle": 0.5,
@@ -28,6 +28,7 @@ def results(protocol: str, label: str = "cube", angle: float = 12.0) -> dict[str
         "created": "2026-11-21T10:00:00+00:00",
         "protocol": protocol,
         "policy": {"label": label},
+        "task": {"table": table, "gravity_scale": 1.0},
         "seed": 0,
         "cpu_hours": 0.25,
         "command": f"python -m tactile_cube.evaluate protocol={protocol}",
@@ -56,6 +57,10 @@ def test_baselines_do_not_pass_for_a_trained_policy() -> None:
     page = paper_page([results("paper", "scripted", angle=2.0), results("paper", "hold", angle=0.0)], [])
     assert "not run" in line(page, "10 runs of 40 s")
     assert "best 2.0, mean 1.0 rad; 8/10 kept" in line(page, "hand-crafted")
+
+
+def test_a_cube_on_a_table_does_not_pass_for_one_in_the_air() -> None:
+    assert "not run" in line(paper_page([results("paper", table=True)], []), "10 runs of 40 s")
 
 
 def test_the_newest_run_counts() -> None:

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.policies import HoldPolicy
@@ -17,7 +18,9 @@ from tests.evaluation.synthetic import episode
 def test_results_come_back_with_every_episode(tmp_path: Path) -> None:
     results = [judge(episode(angle=angle), number) for number, angle in enumerate((5.0, 2.0))]
     variant = VariantResult(Variant(), results, summarise(results, 0.8), 0.8)
-    run = Run(Protocol("paper", success_share=0.8), PolicySource(HoldPolicy(), "hold"), 4, "python -m x", 0.1)
+    run = Run(
+        Protocol("paper", success_share=0.8), PolicySource(HoldPolicy(), "hold"), Task("full"), 4, "python -m x", 0.1
+    )
     write_results(tmp_path / "results.json", run, [variant])
     data = read_results(tmp_path / "results.json")
     assert (data["protocol"], data["policy"]["label"], data["seed"]) == ("paper", "hold", 4)

@@ -41,7 +41,10 @@ class Row:
         return f"{EVALUATE} {policy}protocol={self.protocol}"
 
     def fits(self, results: Results) -> bool:
-        """Whether results fill this row."""
+        """Whether results fill this row: the cube at full weight in the air, as in the paper."""
+        task = results["task"]
+        if task["table"] or task["gravity_scale"] < 1.0:
+            return False
         label = results["policy"]["label"]
         fits_policy = label == SCRIPTED if self.policy else label not in ("hold", "random", SCRIPTED)
         return bool(results["protocol"] == self.protocol) and fits_policy

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from tactile_cube.agent.policy_file import current_commit
+from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.policy_source import PolicySource
 from tactile_cube.evaluation.protocol import Protocol
 
 FORMAT = "tactile_cube results 1"
-KEYS = ("created", "protocol", "policy", "seed", "command", "cpu_hours", "variants")
+KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours", "variants")
 """What everybody who reads a results file relies on."""
 
 
@@ -27,6 +28,7 @@ class Run:
     Attributes:
         protocol: how.
         source: which policy.
+        task: what it had to do.
         seed: of the evaluation.
         command: the words of the command line.
         cpu_hours: processor time it took [h].
@@ -34,6 +36,7 @@ class Run:
 
     protocol: Protocol
     source: PolicySource
+    task: Task
     seed: int
     command: str
     cpu_hours: float
@@ -48,6 +51,7 @@ def write_results(path: Path, run: Run, variants: list[VariantResult]) -> None:
         "seconds": run.protocol.seconds,
         "success_share": run.protocol.success_share,
         "policy": {"label": run.source.label, **run.source.provenance},
+        "task": asdict(run.task),
         "seed": run.seed,
         "command": run.command,
         "cpu_hours": run.cpu_hours,
