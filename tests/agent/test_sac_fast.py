@@ -106,6 +106,7 @@ def test_flat_perceptron_equals_torch_perceptron() -> None:
     from tactile_cube.agent.flat_perceptron import parameter_count
     from tactile_cube.agent.networks import perceptron
 
+    torch.manual_seed(0)
     sizes = (5, 8, 6, 3)
     module = perceptron(sizes, layer_norm=True)
     flat = torch.zeros(parameter_count(sizes))

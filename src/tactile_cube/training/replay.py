@@ -71,7 +71,7 @@ class Replay:
         if rows.shape[1] != self.rows.shape[1] or len(rows) != min(state["written"], self.capacity):
             raise InputError(
                 f"replay in the checkpoint holds {len(rows)} rows of width {rows.shape[1]}, this run's up to "
-                f"{self.capacity} of width {self.rows.shape[1]}; keep training.replay_size and the observation as they were"
+                f"{self.capacity} of width {self.rows.shape[1]}; keep training.replay_size and the observation"
             )
         self.rows[: len(rows)] = rows
         self.written = state["written"]
