@@ -43,7 +43,7 @@ def main(config: DictConfig) -> None:
     print(*(sentence(variant.variant.name, variant.summary) for variant in variants), sep="\n")
     print(f"results: {folder / 'results.json'}")
     if config.film:
-        showcase(evaluation, variants, protocol.film, folder)
+        showcase(evaluation, variants, folder)
 
 
 if __name__ == "__main__":

@@ -54,26 +54,26 @@ class Evaluation:
 
     def __init__(self, config: EnvConfig, policy: Policy, protocol: Protocol, seed: int) -> None:
         self._config = _with_time_limit(config, protocol.seconds)
-        self._policy, self._protocol, self._seed = policy, protocol, seed
+        self.protocol, self._policy, self._seed = protocol, policy, seed
 
     def run(self, report: Report) -> list[VariantResult]:
         """Run all episodes."""
-        results = [self._run_variant(variant, report) for variant in self._protocol.conditions]
-        if self._protocol.replay:
+        results = [self._run_variant(variant, report) for variant in self.protocol.conditions]
+        if self.protocol.replay:
             results.append(self._run_replay(results[0].results, report))
         return results
 
     def record(self, variant: Variant, result: EpisodeResult) -> EpisodeRecord:
         """Run one episode of `run` again, bit for bit, and keep its trace at the physics rate."""
         config = variant.apply(self._config)
-        traced = dataclasses.replace(config.simulation, trace=self._protocol.trace)
+        traced = dataclasses.replace(config.simulation, trace=self.protocol.trace)
         env = make_env(dataclasses.replace(config, simulation=traced), 1, self._seed, evaluation=True)
         return self._closing(env, self._policy, result.seed, variant.pull)
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
         env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
         results = []
-        for episode in range(self._protocol.episodes):
+        for episode in range(self.protocol.episodes):
             seed = episode_seed(self._seed, episode)
             results.append(judge(run_episode(env, self._policy, seed, variant.pull), episode, seed))
             report(variant.name, results[-1])
@@ -83,14 +83,14 @@ class Evaluation:
     def _run_replay(self, results: list[EpisodeResult], report: Report) -> VariantResult:
         """Replay the best episode's targets open loop, from starts that differ a little."""
         best = max(results, key=lambda result: result.final_angle)
-        replay = ReplayPolicy(self.record(self._protocol.variants[0], best).target)
+        replay = ReplayPolicy(self.record(self.protocol.variants[0], best).target)
         # The recorded targets hold the repeated actions already.
         undisturbed = dataclasses.replace(self._config.randomization, sticky_probability=0.0)
-        config = self._protocol.variants[0].apply(dataclasses.replace(self._config, randomization=undisturbed))
+        config = self.protocol.variants[0].apply(dataclasses.replace(self._config, randomization=undisturbed))
         env = make_env(config, 1, self._seed, evaluation=True)
         variant = Variant(name="replay of the best episode, start displaced a little")
         replays = []
-        for episode in range(self._protocol.episodes):
+        for episode in range(self.protocol.episodes):
             displaced = NearlyEqualStart(episode_seed(self._seed, episode))
             replays.append(judge(run_episode(env, replay, best.seed, displaced), episode, best.seed))
             report(variant.name, replays[-1])
@@ -98,7 +98,7 @@ class Evaluation:
         return self._variant_result(variant, replays)
 
     def _variant_result(self, variant: Variant, results: list[EpisodeResult]) -> VariantResult:
-        share = self._protocol.success_share
+        share = self.protocol.success_share
         return VariantResult(variant, results, summarise(results, share), share)
 
     def _closing(

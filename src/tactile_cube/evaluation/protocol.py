@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tactile_cube.drivetrain.effects import catalogue
@@ -21,6 +21,7 @@ class Protocol:
         success_share: an episode succeeds when it reaches this share of the best episode's angle. Source: paper,
             section IV: 80 %. None: when its verdict is regrasping.
         variants: conditions, each tried with the same seeds.
+        nominal_values: where the nominal condition lies on the axes of the variants.
         catalogue: add a variant for each effect of the drivetrain's catalogue at its typical size.
         replay: replay the targets of the best episode of the policy from these episodes' starts.
         film: number of episodes, the best first, that are filmed and recorded for Rerun.
@@ -32,6 +33,7 @@ class Protocol:
     seconds: float | None = None
     success_share: float | None = None
     variants: Sequence[Variant] = field(default_factory=lambda: (Variant(),))
+    nominal_values: Mapping[str, float] = field(default_factory=dict)
     catalogue: bool = False
     replay: bool = False
     film: int = 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -13,10 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tactile_cube.evaluation.evaluation import VariantResult
+from tactile_cube.evaluation.summary import Summary
 from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, curriculum_ends
 from tactile_cube.evaluation.verdict import REGRASP_ANGLE
 
 CURRICULUM = ("T_s", "gravity")
+MAP_COLUMNS = 3
 
 
 def write_learning_curves(curves: Sequence[Curve], path: Path, title: str) -> None:
@@ -59,31 +61,38 @@ def _draw_curriculum(axes: Sequence[Axes], curve: Curve) -> None:
     axes[-1].grid(alpha=0.3)
 
 
-def write_robustness_map(variants: Sequence[VariantResult], path: Path) -> None:
-    """Draw mean final angle and success over each varied axis, the nominal condition as a grey line.
+def write_robustness_map(variants: Sequence[VariantResult], nominal_values: Mapping[str, float], path: Path) -> None:
+    """Draw the mean final angle over each varied axis, and beside each point how many episodes kept the cube.
 
     Args:
         variants: results, the nominal one first; those with an `axis` are drawn.
+        nominal_values: where the nominal condition lies on each axis.
         path: file to write.
     """
-    nominal = variants[0].summary
     names = list(dict.fromkeys(variant.variant.axis for variant in variants if variant.variant.axis))
-    columns = 3
-    rows = -(-len(names) // columns)
+    rows = -(-len(names) // MAP_COLUMNS)
     figure = Figure(figsize=(10, 2.6 * rows), layout="constrained")
-    axes = figure.subplots(rows, columns, sharey=True, squeeze=False).flat
-    for axis, name in zip(axes, names, strict=False):
-        points = sorted((v.variant.value, v.summary) for v in variants if v.variant.axis == name)
-        values = [value for value, _ in points]
-        axis.axhline(nominal.mean_angle, color="grey", linewidth=0.8)
-        axis.errorbar(
-            values, [s.mean_angle for _, s in points], [s.std_angle for _, s in points], marker="o", capsize=3
-        )
-        for value, summary in points:
-            axis.annotate(f"{summary.kept}/{summary.episodes} kept", (value, 0), size=7, ha="center")
-        axis.set(xlabel=name, ylim=(min(0.0, nominal.mean_angle), None))
-        axis.grid(alpha=0.3)
-    for axis in list(axes):
-        axis.set_visible(False)
-    figure.supylabel("mean final angle [rad]")
+    panels = list(figure.subplots(rows, MAP_COLUMNS, sharey=True, squeeze=False).flat)
+    for panel, name in zip(panels, names, strict=False):
+        points = [(variant.variant.value, variant.summary) for variant in variants if variant.variant.axis == name]
+        if name in nominal_values:
+            points.append((nominal_values[name], variants[0].summary))
+            panel.axvline(nominal_values[name], color="grey", linewidth=0.8, linestyle="--")
+        _draw_panel(panel, sorted(points, key=lambda point: point[0]))
+        panel.set_xlabel(name)
+    for panel in panels[len(names) :]:
+        panel.set_visible(False)
+    figure.supylabel("mean final angle [rad]; label: episodes that kept the cube")
     figure.savefig(path, dpi=110)
+
+
+def _draw_panel(panel: Axes, points: Sequence[tuple[float, Summary]]) -> None:
+    values = [value for value, _ in points]
+    means, spreads = [s.mean_angle for _, s in points], [s.std_angle for _, s in points]
+    panel.errorbar(values, means, spreads, marker="o", capsize=3, linewidth=1.2)
+    panel.axhline(0.0, color="black", linewidth=0.6)
+    panel.margins(x=0.15, y=0.2)
+    panel.grid(alpha=0.3)
+    for value, summary in points:
+        label = f"{summary.kept}/{summary.episodes}"
+        panel.annotate(label, (value, summary.mean_angle), (4, 5), textcoords="offset points", size=7)

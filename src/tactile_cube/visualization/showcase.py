@@ -11,17 +11,16 @@ from tactile_cube.visualization.episode_recording import write_recording
 from tactile_cube.visualization.film import write_film, write_stills
 
 
-def showcase(evaluation: Evaluation, variants: list[VariantResult], count: int, folder: Path) -> None:
-    """Run the `count` best episodes of the first variant again and show them; say where and how to look.
+def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path) -> None:
+    """Run the best episodes of the first variant again and show them; say where and how to look.
 
     Args:
         evaluation: what ran the episodes.
         variants: what came of it.
-        count: number of episodes.
         folder: where the files go.
     """
-    first = variants[0]
-    best = sorted(first.results, key=lambda result: result.final_angle, reverse=True)[:count]
+    first, protocol = variants[0], evaluation.protocol
+    best = sorted(first.results, key=lambda result: result.final_angle, reverse=True)[: protocol.film]
     for result in best:
         record = evaluation.record(first.variant, result)
         file = folder / f"episode{result.episode}"
@@ -31,7 +30,7 @@ def showcase(evaluation: Evaluation, variants: list[VariantResult], count: int, 
         write_recording(record, file.with_suffix(".rrd"), summary=description(result))
         print(f"episode {result.episode}: {file}.gif, stills {file}.png; look inside: rerun {file}.rrd")
     if any(variant.variant.axis for variant in variants):
-        write_robustness_map(variants, folder / "robustness.png")
+        write_robustness_map(variants, protocol.nominal_values, folder / "robustness.png")
         print(f"robustness map: {folder / 'robustness.png'}")
 
 
