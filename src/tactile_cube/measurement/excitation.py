@@ -59,7 +59,7 @@ def multisine(time: Array, rng: np.random.Generator) -> Array:
     """A sum of sines from 0.2 to 6 Hz with falling amplitude, in 0..1: inertia, delay, lag."""
     frequencies = np.geomspace(0.2, 6.0, 8) * rng.uniform(0.9, 1.1, 8)
     waves = np.sin(2 * np.pi * np.outer(time, frequencies) + rng.uniform(0, 2 * np.pi, 8)) @ (1 / frequencies**0.7)
-    return 0.5 + 0.5 * waves / np.max(np.abs(waves))
+    return np.asarray(0.5 + 0.5 * waves / np.max(np.abs(waves)))
 
 
 def policy(time: Array, rng: np.random.Generator) -> Array:
@@ -72,7 +72,7 @@ def policy(time: Array, rng: np.random.Generator) -> Array:
     for index, target in enumerate(targets):
         state += (target - state) * step / POLICY_SMOOTHING
         smooth[index] = state
-    return smooth
+    return np.asarray(smooth)
 
 
 KINDS: dict[str, Callable[[Array, np.random.Generator], Array]] = {

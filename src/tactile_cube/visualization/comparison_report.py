@@ -95,8 +95,7 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
     warnings = [Callout(line, "warn") for line in recording.warnings]
     text = [
         "The same commands that the rig received were given to the simulation. It started where the rig started and "
-        "then "
-        "ran freely to the end of each trial: nothing pulls it back to the measurement."
+        "then ran freely to the end of each trial: nothing pulls it back to the measurement."
     ]
     return Section("What was compared", text, [Table(("", ""), rows), *warnings])
 
@@ -117,8 +116,8 @@ def error_section(comparison: Comparison) -> Section:
     )
     text = [
         f"{source}, together with the error of the simulator's own time step. A perfect model would score 1 in the "
-        "column "
-        "'error / floor'; a model that scores 3 leaves something out that is three times as large as the noise."
+        "column 'error / floor'; a model that scores 3 leaves something out that is three times as large as the "
+        "noise."
     ]
     header = ("joint", "error (RMS)", "noise floor", "error / floor", "of it time step")
     guess = [Callout("The noise floor is a guess: repeat each kind of trial to measure it.", "warn")]
@@ -128,11 +127,9 @@ def error_section(comparison: Comparison) -> Section:
 def where_section(comparison: Comparison) -> Section:
     """In words, and as a map of joints and regimes."""
     caption = (
-        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A bright cell "
-        "in a "
-        "pale row is a hint at what is missing: friction shows just after reversals and at low speed, delay and "
-        "inertia "
-        "at high speed, gravity and springs by posture."
+        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A cell that "
+        "stands out in its row is a hint at what is missing: friction shows just after reversals and at low speed, "
+        "delay and inertia at high speed, gravity and springs by posture."
     )
     blocks: list[Block] = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
     return Section("Where it fails", (), blocks)
@@ -167,9 +164,8 @@ def band_section(comparison: Comparison) -> list[Section]:
     if comparison.band is None:
         return []
     text = [
-        f"{comparison.band.simulations} simulations with constants drawn from their ranges. A policy that is "
-        "trained on these "
-        "ranges has met the real rig if the measured line lies in the band: 95 % of the samples should, and "
+        f"{comparison.band.simulations} simulations with constants drawn from their ranges. A policy that is trained "
+        "on these ranges has met the real rig if the measured line lies in the band: 95 % of the samples should, and "
         f"{100 * comparison.band.inside:.0f} % do."
     ]
     rows = [(joint, f"{100 * share:.0f} %") for joint, share in comparison.band.joints.items()]
@@ -191,8 +187,8 @@ def test_section(comparison: Comparison) -> Section:
     """Whiteness and cross-correlation tests."""
     text = [
         "If nothing is missing, what is left is noise: it neither remembers itself (whiteness) nor goes with any "
-        "other signal "
-        "(cross-correlation). A free-running simulation integrates every small error, so a short memory is normal."
+        "other signal (cross-correlation). A free-running simulation integrates every small error, so a short memory "
+        "is normal."
     ]
     memory = [(w.joint, f"{1e3 * w.correlation_time:.0f} ms", p_value(w.p_value)) for w in comparison.whiteness]
     strongest = [
@@ -225,16 +221,14 @@ def method_section() -> Section:
     """How the numbers were made."""
     lines = [
         "Error: root mean square of measured minus simulated angle over all samples of all trials; the mean "
-        "difference of each joint "
-        "in each robot initialisation is removed first, because a joint's zero is calibrated anew each time.",
+        "difference of each joint in each robot initialisation is removed first, because a joint's zero is "
+        "calibrated anew each time.",
         "Noise floor: standard deviation of repeats of one command about their mean, and, added in quadrature, the "
-        "difference "
-        "between the simulation at its own time step and at an eighth of it.",
+        "difference between the simulation at its own time step and at an eighth of it.",
         "Just after a reversal: within 0.2 s after a joint's velocity changed its sign. Standstill, low, medium and "
-        "high speed: "
-        "below 0.02, 0.3, 1.5 rad/s and above. Low and high load: below and above half of the largest torque.",
+        "high speed: below 0.02, 0.3, 1.5 rad/s and above. Low and high load: below and above half of the largest "
+        "torque.",
         "Whiteness: Ljung-Box test over 20 lags. Cross-correlation: the strongest within 0.1 s; its p-value allows "
-        "for the memory "
-        "of both signals.",
+        "for the memory of both signals.",
     ]
     return Section("How this was computed", (), [Listing(lines)], folded=True)

@@ -169,8 +169,8 @@ def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
             intervals.append(Interval(label, one["value"], one["low"], one["high"], one["unit"]))
         if "heldout_gain" in effect:
             lines.append(
-                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the error on held-out trials "
-                f"(p {p_value(effect['p_value'])})"
+                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the error on held-out "
+                f"trials (p {p_value(effect['p_value'])})"
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
     blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
@@ -183,9 +183,8 @@ def shape_section(shapes: Sequence[ResidualShape]) -> list[Section]:
     if not shapes:
         return []
     text = [
-        "The torque that the model lacks, averaged over bins of one signal at a time. A clear curve is a law of "
-        "that signal "
-        "alone; write it as an effect of your own, fit it, and see whether the error falls."
+        "The torque that the model lacks, averaged over bins of one signal at a time. A clear curve is a law of that "
+        "signal alone; write it as an effect of your own, fit it, and see whether the error falls."
     ]
     blocks = []
     for one in sorted(shapes, key=lambda shape: -shape.explained):
@@ -224,8 +223,8 @@ def next_section(diagnosis: Mapping[str, Any], model_path: str | None, before: C
     """What to record or to type next."""
     if diagnosis["next_experiment"]:
         text = [
-            "This recording cannot decide. Play these commands on the rig, add the trials to the recording, "
-            "diagnose again:"
+            "This recording cannot decide. Play these commands on the rig, add the trials to the recording, diagnose "
+            "again:"
         ]
         lines = [str(diagnosis["next_experiment"])]
         blocks: list[Listing | Callout] = [Listing(lines, code=True)]
