@@ -103,10 +103,3 @@ def test_processes_that_start_at_once_share_one_cache(tmp_path) -> None:
     files = list((tmp_path / "tactile_cube").glob("*.py"))
     assert len(files) == 1
     assert not list((tmp_path / "tactile_cube").glob("tmp*"))
-
-
-def test_an_array_with_gaps_is_refused() -> None:
-    plant = Plant([wheel()], dt=0.002)
-    memory = np.zeros(2 * plant.size)
-    with pytest.raises(ValueError, match="contiguous"):
-        plant.kernel.step(np.ones(1), memory[::2])

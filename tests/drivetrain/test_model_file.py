@@ -1,0 +1,56 @@
+from pathlib import Path
+
+import pytest
+
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
+from tactile_cube.errors import InputError
+
+
+def example() -> ModelFile:
+    return ModelFile(
+        rig="rig.urdf",
+        joints=["q1", "q2"],
+        values={"kd": {"q1": Estimate(value=0.24, low=0.23, high=0.25, unit="N m s/rad")}},
+        effects=[EffectEstimate(effect="backlash@q2", parameters={"play": Estimate(value=1e-3, low=5e-4, high=2e-3)})],
+    )
+
+
+def test_what_is_written_is_read_back(tmp_path: Path) -> None:
+    write_model(example(), tmp_path / "model.yaml")
+    assert read_model(tmp_path / "model.yaml") == example()
+
+
+def test_a_bare_number_is_a_value_without_interval(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text("joints: [q1]\nvalues: {kp: {q1: 3.5}}\n")
+    assert read_model(tmp_path / "m.yaml").values["kp"]["q1"] == Estimate(value=3.5, low=3.5, high=3.5)
+
+
+def test_name_and_joint_of_an_effect() -> None:
+    assert (example().effects[0].name, example().effects[0].joint) == ("backlash", "q2")
+    assert EffectEstimate(effect="object_mass").joint is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("joints: [q1]\nvalues: {kp: {q9: 3.0}}", "names joint 'q9'"),
+        ("joints: [q1]\nvalues: {kp: {q1: {value: 3, low: 4, high: 5}}}", "does not hold the value"),
+        ("joints: [q1]\neffcts: []", "key 'effcts'"),
+        ("joints: [q1]\nformat: 7", "key 'format'"),
+        ("[1, 2]", "expected a mapping"),
+        ("joints: !!python/object/apply:os.system [ls]", "only plain data is read"),
+        ("joints: [q1", "not valid YAML"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "m.yaml").write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_model(tmp_path / "m.yaml")
+    assert said in str(caught.value)
+    assert "m.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_model(tmp_path / "none.yaml")
