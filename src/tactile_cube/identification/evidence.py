@@ -26,12 +26,14 @@ class Judgement:
         costs: (G,) marginal squared error of each segment, in units of the sensor's variance.
         samples: (G,) measured numbers in each.
         residual: (G, R) weighted.
+        joint_errors: (n,) RMS error of each joint in units of the sensor noise.
     """
 
     model: Model
     costs: Array
     samples: Array
     residual: Array = field(repr=False)
+    joint_errors: Array
 
     @property
     def error(self) -> float:
@@ -43,7 +45,16 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
     """Error of a model on held-out segments; only the joint offsets of unseen initialisations are fitted there."""
     fitted = fit(problem, model, offset_unknowns(held_out), iterations=3)
     samples = np.count_nonzero(problem.weight, axis=1)
-    return Judgement(fitted.model, problem.cost(fitted.residual), samples, fitted.residual)
+    costs = problem.cost(fitted.residual)
+    return Judgement(fitted.model, costs, samples, fitted.residual, _joint_errors(problem, fitted.residual))
+
+
+def _joint_errors(problem: Problem, residual: Array) -> Array:
+    """RMS (n,) of each joint's residual with the starts of segments taken out."""
+    joints = problem.stretches.measured.shape[2]
+    products = (residual * problem.free(residual)).reshape(-1, joints)
+    present = np.count_nonzero(problem.weight.reshape(-1, joints), axis=0)
+    return np.asarray(np.sqrt(np.maximum(products.sum(axis=0), 0.0) / np.maximum(present, 1)))
 
 
 def gain(before: Judgement, after: Judgement) -> float:

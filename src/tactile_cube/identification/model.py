@@ -9,11 +9,18 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect
 
 Array = NDArray[np.float64]
 EffectClass = type[Effect]
 Key = TypeVar("Key", str, int)
+
+
+def effect_path(effect: EffectClass) -> str:
+    """The name by which `find_effect` finds an effect: that of the catalogue, or the dotted path of a user's class."""
+    known = catalogue().get(effect.name) is effect
+    return effect.name if known else f"{effect.__module__}.{effect.__qualname__}"
 
 
 @dataclass(frozen=True)
@@ -27,8 +34,8 @@ class Term:
 
     @property
     def label(self) -> str:
-        """As a user writes it: `backlash@q2`."""
-        return f"{self.effect.name}@{self.joint}"
+        """As a user writes it: `backlash@q2`, `my_rig.CableDrag@q2`."""
+        return f"{effect_path(self.effect)}@{self.joint}"
 
 
 @dataclass(frozen=True)

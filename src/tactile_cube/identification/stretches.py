@@ -66,17 +66,20 @@ class Stretches:
         return values.reshape(len(self) * self.segments, -1)
 
 
-def cut(recording: Recording, noise: Array, trials: Sequence[Trial] | None = None) -> Stretches:
+def cut(
+    recording: Recording, noise: Array, trials: Sequence[Trial] | None = None, segment: int | None = None
+) -> Stretches:
     """The trials of a recording as stretches.
 
     Args:
         recording: gives the joints and the sampling step.
         noise: (n,) standard deviation of the position sensor of each joint [rad].
         trials: all of the recording's by default.
+        segment: rows of a segment; as short as identification likes it by default.
     """
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
-    segment = min(max(8, round(SEGMENT / recording.step)), longest)
+    segment = min(segment or max(8, round(SEGMENT / recording.step)), longest)
     count = min(STRETCH, -(-longest // segment))
     ratio = recording.gains.kp / recording.nominal.get("stiffness", np.full(len(recording.joints), np.inf))
     elastic = ratio / (1.0 + ratio)

@@ -1,0 +1,50 @@
+"""Verb: find out which physical effect a model lacks, from a recording of the real mechanism."""
+
+from __future__ import annotations
+
+from omegaconf import DictConfig
+
+from tactile_cube.cli import verb
+
+
+@verb("diagnose")
+def main(config: DictConfig) -> None:
+    """Write diagnosis.json, model.yaml and report.html; print the answer in plain words."""
+    import json
+    import shlex
+    import sys
+    import time
+    from pathlib import Path
+
+    from hydra.core.hydra_config import HydraConfig
+
+    from tactile_cube.drivetrain.effects import catalogue, find_effect
+    from tactile_cube.drivetrain.model_file import write_model
+    from tactile_cube.identification.diagnosis import diagnose, write_experiment
+    from tactile_cube.identification.diagnosis_json import as_json
+    from tactile_cube.identification.in_words import answer
+    from tactile_cube.identification.recommended import model_file
+    from tactile_cube.measurement.recording import read_recording
+
+    begin = time.perf_counter()
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    recording = read_recording(config.recording)
+    for line in recording.warnings:
+        print(f"warning: {line}", file=sys.stderr)
+    effects = dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)])
+
+    def say(line: str) -> None:
+        print(f"[{time.perf_counter() - begin:5.1f} s] {line}", file=sys.stderr, flush=True)
+
+    diagnosis = diagnose(recording, tuple(effects), config.engine, config.step, config.seed, say)
+    command = shlex.join(["python", "-m", "tactile_cube.diagnose", *sys.argv[1:]])
+    model = model_file(recording, diagnosis.fitted, diagnosis.errors(), diagnosis.held_out, command, config.seed)
+    write_model(model, folder / "model.yaml")
+    result = as_json(diagnosis, write_experiment(diagnosis, folder), time.perf_counter() - begin)
+    (folder / "diagnosis.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
+    print(answer(result, diagnosis.experiment))
+    print(f"model: {folder / 'model.yaml'}\ndiagnosis: {folder / 'diagnosis.json'}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""A diagnosis from beginning to end: split, search, decide, refit, state errors, propose the next experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.model_file import ModelErrors
+from tactile_cube.identification.free_run import free_run, free_run_error
+from tactile_cube.identification.intervals import Fitted, final_fit
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.next_experiment import Experiment, next_experiment
+from tactile_cube.identification.noise import sensor_noise
+from tactile_cube.identification.problem import Problem
+from tactile_cube.identification.residual_shape import Shape, black_box, missing_torques, shapes
+from tactile_cube.identification.search import Explanation, Findings, Search
+from tactile_cube.identification.verdict import Verdict, decide, unexplained_joints
+from tactile_cube.measurement.error import ErrorSummary
+from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.replay import Engine
+from tactile_cube.measurement.split import held_out_split
+
+SHOWN_SHAPES = 6
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left at a joint: shapes over signals, and the share that a black box could still explain."""
+
+    joint: str
+    shapes: list[Shape] = field(repr=False)
+    black_box: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer and everything that supports it.
+
+    Attributes:
+        verdict: the answer.
+        findings: what was tried.
+        fitted: the recommended model, refitted on all fitted trials, with intervals.
+        rivals: the same for each rival.
+        stages: nominal, refitted, with_effects: free-running held-out errors.
+        floor: noise floor of the recording.
+        unexplained: what is left, joint by joint; empty unless something is.
+        experiment: what would tell the rivals apart; None without rivals.
+        held_out: names of the held-out trials.
+    """
+
+    verdict: Verdict
+    findings: Findings
+    fitted: Fitted
+    rivals: tuple[tuple[Explanation, Fitted], ...]
+    stages: dict[str, ErrorSummary]
+    floor: NoiseFloor
+    unexplained: list[Unexplained]
+    experiment: Experiment | None
+    held_out: list[str]
+
+    def errors(self) -> ModelErrors:
+        """The staircase as the model file and diagnosis.json state it [rad]."""
+        overall = {stage: summary.overall for stage, summary in self.stages.items()}
+        joints = {stage: summary.joints for stage, summary in self.stages.items()}
+        return ModelErrors(**overall, noise_floor=self.floor.overall, joints=joints)
+
+
+def diagnose(
+    recording: Recording,
+    effects: Sequence[type[Effect]],
+    engine: Engine = "pybullet",
+    step: float = 0.002,
+    seed: int = 0,
+    say: Callable[[str], None] = print,
+) -> Diagnosis:
+    """Find out which effect a recording's nominal model lacks.
+
+    Args:
+        recording: two or more trials.
+        effects: the catalogue to search, a user's own effects included.
+        engine: of the free-running errors that are stated.
+        step: its simulation step [s].
+        seed: which trials are held out.
+        say: takes progress lines.
+    """
+    fitted_part, held_out = held_out_split(recording, seed=seed)
+    noise = sensor_noise(recording)
+    search = Search(fitted_part, held_out, noise, effects, say)
+    findings = search.run()
+    verdict = decide(findings)
+    say(f"verdict {verdict.kind}: {verdict.chosen.label}")
+    problem = Problem(search.shooting, search.all_stretches)
+    fitted = final_fit(problem, fitted_part, verdict.chosen.fit.model)
+    rivals = tuple((one, final_fit(problem, fitted_part, one.fit.model)) for one in verdict.rivals)
+    experiment = None
+    if rivals:
+        models = {verdict.chosen.label: fitted.model} | {one.label: fit.model for one, fit in rivals}
+        experiment = next_experiment(search.shooting, recording, models, noise, seed)
+    stages = {
+        "nominal": search.start_held_out,
+        "refitted": findings.base.judgement.model,
+        "with_effects": _with_offsets(fitted.model, verdict.chosen.judgement.model),
+    }
+    summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
+    return Diagnosis(
+        verdict=verdict,
+        findings=findings,
+        fitted=fitted,
+        rivals=rivals,
+        stages=summaries,
+        floor=noise_floor(recording),
+        unexplained=_unexplained(search, verdict),
+        experiment=experiment,
+        held_out=[trial.name for trial in held_out.trials],
+    )
+
+
+def _with_offsets(model: Model, judged: Model) -> Model:
+    """The final model with the joint offsets that were found for the held-out initialisations."""
+    return Model(model.constants, model.terms, {**judged.posture, **model.posture})
+
+
+def _unexplained(search: Search, verdict: Verdict) -> list[Unexplained]:
+    chosen = verdict.chosen
+    joints = unexplained_joints(chosen, search.fitted.joints)
+    if not joints:
+        return []
+    judged = chosen.judgement
+    missing = missing_torques(search.judges, search.held_out, judged.model, judged.residual)
+    return [Unexplained(m.joint, shapes(m)[:SHOWN_SHAPES], black_box(m)) for m in missing if m.joint in joints]
+
+
+def write_experiment(diagnosis: Diagnosis, folder: Path) -> Path | None:
+    """The command file of the next experiment, if one is needed."""
+    return diagnosis.experiment.write(folder) if diagnosis.experiment else None

@@ -1,0 +1,114 @@
+"""diagnosis.json: the diagnosis as plain numbers, for scripts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tactile_cube.drivetrain.model_file import EffectEstimate
+from tactile_cube.identification.candidates import Candidate
+from tactile_cube.identification.diagnosis import Diagnosis
+from tactile_cube.identification.intervals import Fitted, bounds
+from tactile_cube.identification.recommended import effect_estimate
+from tactile_cube.identification.search import Explanation
+from tactile_cube.identification.verdict import unexplained_joints
+
+RANKED = 20
+
+
+def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> dict[str, Any]:
+    """The content of diagnosis.json; errors in rad."""
+    verdict = diagnosis.verdict
+    explanations = [(verdict.chosen, diagnosis.fitted), *diagnosis.rivals]
+    names = [_names(one) for one, _ in explanations]
+    effects = [
+        entry
+        for k, (one, fitted) in enumerate(explanations)
+        for entry in _effects(one, fitted, [n for m, other in enumerate(names) if m != k for n in other])
+    ]
+    errors = diagnosis.errors().model_dump()
+    joints = list(diagnosis.stages["nominal"].joints)
+    return {
+        "verdict": verdict.kind,
+        "effects": effects if verdict.kind in ("missing_effect", "ambiguous") else [],
+        "unexplained_joints": unexplained_joints(verdict.chosen, tuple(joints)),
+        "ranking": ranking(diagnosis),
+        "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
+        "error_joints": errors["joints"],
+        "noise_floor_source": diagnosis.floor.source,
+        "error_over_noise": {
+            "refitted": diagnosis.findings.base.error,
+            "with_effects": verdict.chosen.error,
+        },
+        "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
+        "partial_effects": effects if verdict.kind == "unknown_effect" else [],
+        "next_experiment": str(experiment) if experiment else None,
+        "held_out": diagnosis.held_out,
+        "seconds": round(seconds, 2),
+    }
+
+
+def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """What was weighed: refitted explanations with held-out errors, then first-order scores."""
+    rows: list[dict[str, Any]] = [
+        {
+            "effects": " & ".join(_names(one)),
+            "held_out_error_over_noise": round(one.error, 4),
+            "gain": round(one.gain, 5),
+            "p_value": one.p_value,
+        }
+        for level in diagnosis.findings.levels
+        for one in level
+    ]
+    judged = {row["effects"] for row in rows}
+    for score in diagnosis.findings.scores[:RANKED]:
+        name = " & ".join(_label(score.candidate))
+        if name not in judged:
+            judged.add(name)
+            rows.append({"effects": name, "held_out_error_over_noise": None, "gain": None, "p_value": None})
+    return rows
+
+
+def _label(candidate: Candidate) -> list[str]:
+    return [f"{candidate.effect.name}@{joint}" for joint in candidate.joints]
+
+
+def _names(explanation: Explanation) -> list[str]:
+    return [name for candidate in explanation.effects for name in _label(candidate)]
+
+
+def _effects(explanation: Explanation, fitted: Fitted, rivals: list[str]) -> list[dict[str, Any]]:
+    known = bounds(fitted)
+    entries = []
+    for place, term in enumerate(fitted.model.terms):
+        estimate: EffectEstimate = effect_estimate(term, place, known)
+        own = f"{term.effect.name}@{term.joint}"
+        entries.append(
+            {
+                "name": term.effect.name,
+                "joints": [term.joint],
+                "parameters": {key: estimate.parameters[key].model_dump() for key in term.fitted},
+                "heldout_gain": round(explanation.gain, 6),
+                "p_value": explanation.p_value,
+                "rivals": [name for name in rivals if name != own],
+            }
+        )
+    return entries
+
+
+def _unexplained(one: Any) -> dict[str, Any]:
+    best = one.shapes[0] if one.shapes else None
+    return {
+        "joint": one.joint,
+        "black_box": round(one.black_box, 4),
+        "depends_most_on": best.against if best else None,
+        "shapes": [
+            {
+                "against": shape.against,
+                "explained": round(shape.explained, 4),
+                "centres": [round(float(x), 6) for x in shape.centres],
+                "torque": [round(float(x), 7) for x in shape.mean],
+            }
+            for shape in one.shapes
+        ],
+    }

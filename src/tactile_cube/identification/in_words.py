@@ -1,0 +1,51 @@
+"""The diagnosis in plain words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tactile_cube.identification.next_experiment import Experiment
+
+OPENING = {
+    "adequate": "Nothing is missing at this noise: with its constants refitted the model explains the recording.",
+    "missing_effect": "An effect is missing, and it is this one:",
+    "ambiguous": "An effect is missing, but this recording cannot tell these apart:",
+    "unknown_effect": "Something is missing that no effect of the catalogue explains.",
+}
+
+
+def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
+    """A few lines for the terminal, from the content of diagnosis.json."""
+    lines = [OPENING[result["verdict"]]]
+    lines += [_effect(entry) for entry in result["effects"]]
+    lines += [_unexplained(entry) for entry in result["unexplained"]]
+    error = result["error"]
+    lines.append(
+        f"Held-out error: {_mrad(error['nominal'])} as stated by the owner, {_mrad(error['refitted'])} with constants "
+        f"refitted, {_mrad(error['with_effects'])} with the recommended model; noise floor {_mrad(error['noise_floor'])}."
+    )
+    if experiment is not None:
+        lines.append(
+            f"To decide, play {result['next_experiment']} ({experiment.name}): at {experiment.joint} the candidates will "
+            f"differ by at least {_mrad(experiment.difference)}."
+        )
+    return "\n".join(lines)
+
+
+def _effect(entry: dict[str, Any]) -> str:
+    values = ", ".join(
+        f"{name} {one['value']:.4g} [{one['low']:.4g}, {one['high']:.4g}] {one['unit']}"
+        for name, one in entry["parameters"].items()
+    )
+    return f"  {entry['name']} at {', '.join(entry['joints'])}: {values}"
+
+
+def _unexplained(entry: dict[str, Any]) -> str:
+    return (
+        f"  {entry['joint']}: the missing torque goes most with {entry['depends_most_on']}; "
+        f"a black box could explain {100 * entry['black_box']:.0f} % of it"
+    )
+
+
+def _mrad(value: float) -> str:
+    return f"{1e3 * value:.3g} mrad"

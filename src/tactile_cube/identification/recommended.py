@@ -1,0 +1,78 @@
+"""The recommended model as a model file: values, intervals, effects, provenance, errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+import numpy as np
+
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
+from tactile_cube.identification.intervals import Fitted, bounds
+from tactile_cube.identification.model import Model, Term
+from tactile_cube.measurement.recording import Recording
+
+UNITS = {
+    "kp": "N m/rad",
+    "kd": "N m s/rad",
+    "torque_limit": "N m",
+    "stiffness": "N m/rad",
+    "static_friction": "N m",
+    "reflected_inertia": "kg m^2",
+    "friction_creep": "rad/s per N m",
+}
+Known = Mapping[tuple[str, str, int, int], tuple[float, float, float]]
+
+
+def model_file(
+    recording: Recording, fitted: Fitted, errors: ModelErrors, held_out: list[str], command: str, seed: int
+) -> ModelFile:
+    """Everything that was identified on a recording."""
+    known = bounds(fitted)
+    joints = list(recording.joints)
+    return ModelFile(
+        rig=recording.name,
+        joints=joints,
+        values={key: _constants(fitted.model, key, joints, known) for key in UNITS},
+        effects=[effect_estimate(term, place, known) for place, term in enumerate(fitted.model.terms)],
+        offsets={joint: _offset(fitted.model, j) for j, joint in enumerate(joints)},
+        provenance=Provenance(
+            recording=str(recording.folder),
+            command=command,
+            created=datetime.now(UTC).isoformat(timespec="seconds"),
+            version=version("tactile-cube"),
+            seed=seed,
+            trials=[trial.name for trial in recording.trials if trial.name not in held_out],
+            held_out=held_out,
+        ),
+        errors=errors,
+    )
+
+
+def effect_estimate(term: Term, place: int, known: Known) -> EffectEstimate:
+    """An effect with every parameter; those that were not fitted have no width."""
+    units = {p.name: p.unit for p in term.effect.parameters}
+    parameters = {
+        key: _estimate(value, known.get(("effect", key, place, 0)), units[key]) for key, value in term.values.items()
+    }
+    return EffectEstimate(effect=term.label, parameters=parameters)
+
+
+def _constants(model: Model, key: str, joints: list[str], known: Known) -> dict[str, Estimate]:
+    values = model.constants[key]
+    return {
+        joint: _estimate(float(values[j]), known.get(("constant", key, j, 0)), UNITS[key])
+        for j, joint in enumerate(joints)
+    }
+
+
+def _estimate(value: float, interval: tuple[float, float, float] | None, unit: str) -> Estimate:
+    low, high = interval[1:] if interval else (value, value)
+    return Estimate(value=value, low=low, high=high, unit=unit)
+
+
+def _offset(model: Model, joint: int) -> Estimate:
+    """Joint offset (measured minus true angle), its interval spanning the initialisations."""
+    offsets = [-float(posture[joint]) for posture in model.posture.values()]
+    return Estimate(value=float(np.mean(offsets)), low=min(offsets), high=max(offsets), unit="rad")
