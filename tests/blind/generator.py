@@ -166,6 +166,8 @@ def visibility(plain: World, changed: World, joint: int, noise: float, seed: int
     near.plant.offset[joint] += 0.01
     columns.append(probe(near, seed)[0] - reference)
     moved = probe(changed, seed)[0] - reference
+    if not np.isfinite(moved).all():
+        return {"signal": 0.0, "distinct": 0.0}
     basis = np.stack([c.ravel() for c in columns], axis=1)
     basis /= np.linalg.norm(basis, axis=0) + 1e-12
     left = moved.ravel() - basis @ np.linalg.lstsq(basis, moved.ravel(), rcond=None)[0]
@@ -183,7 +185,8 @@ def hide(
     if name in hidden.WHOLE_RIG:
         joint = n - 1
     _, torque, command = probe(world, seed)
-    speed = np.abs(np.diff(command, axis=0)).max(axis=0) * 400.0
+    trials = command.reshape(len(KINDS), -1, n)
+    speed = np.abs(np.diff(trials, axis=1)).max(axis=(0, 1)) * 400.0
     scene = hidden.Scene(
         changed.rig, changed.plant, world.low, world.high, np.abs(torque).max(axis=0), speed, rng, strength
     )

@@ -332,7 +332,7 @@ def _stick_or_slip(v, inverse, low, high, impulse):
 @njit(cache=True)
 def _joint_torques(p, m, i, t, q, v, relay):
     """Torques that depend on the motion alone, friction excepted."""
-    torque = -p[VISCOUS, i] * v[i] - p[DRAG, i] * v[i] * abs(v[i]) - p[EVEN_DRAG, i] * v[i] * v[i]
+    torque = -p[VISCOUS, i] * v[i] - p[DRAG, i] * v[i] * abs(v[i]) - p[EVEN_DRAG, i] * min(v[i] * v[i], 4.0)
     torque += p[COGGING, i] * np.sin(p[COGGING_ORDER, i] * q[i] + p[COGGING_PHASE, i])
     torque -= p[SPRING, i] * (q[i] - p[SPRING_CENTRE, i])
     x = (q[i] - p[DETENT_CENTRE, i]) / p[DETENT_WIDTH, i]
@@ -383,7 +383,7 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, m, co
     q = start.copy()
     v, acceleration, impulse = np.zeros(n), np.zeros(n), np.zeros(n)
     held, state, filtered, bristle, relay = command[0].copy(), np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n)
-    torque, load, low, high = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    torque, load, low, high, felt = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     lead = round(settle / step)
     for k in range(-lead, samples * per):
         t = k * step
@@ -412,7 +412,7 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, m, co
             for j in range(n):
                 load[i] += m[CROSSTALK, i, j] * state[j]
             torque[i] = load[i] + _joint_torques(p, m, i, t, qm, vm, relay)
-            level = _friction_level(p, m, i, t, qm, vm, load[i], acceleration[i])
+            level = _friction_level(p, m, i, t, qm, vm, load[i], felt[i])
             if p[PRESLIDING, i] > 0.0:
                 way = 1.0 if vm[i] >= 0 else -1.0
                 bristle[i] = way + (bristle[i] - way) * np.exp(-abs(vm[i]) * step / p[PRESLIDING, i])
@@ -424,8 +424,12 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, m, co
         free = v + step * (inverse @ (torque - reduced_bias))
         after = _stick_or_slip(free, inverse, low, high, impulse)
         acceleration = (after - v) / step
+        felt += (acceleration - felt) * step / 0.005  # friction follows a smoothed acceleration, or it would chatter
         q = q + 0.5 * step * (v + after)
         v = after
+        if not np.abs(q).max() < 100.0:
+            position[:] = np.nan
+            break
         if k >= 0 and (k + 1) % per == 0:
             _log(p, q, held, filtered, state, position[k // per], torque_out[k // per], joint_out[k // per])
     return position, torque_out, joint_out
