@@ -1,4 +1,4 @@
-"""What a log shows of a simulation: the state after the control period, with that period's command still acting."""
+"""What a log shows of a simulation: the state at an instant, under the command of the period that ends or begins there."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,26 +6,43 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def read_out(
-    position: Array, torque: Array, command: Array, kp: Array, stiffness: Array, torque_limit: Array
-) -> tuple[Array, Array]:
-    """Position [rad] and torque [N m] at the end of each control period, from the signals at its beginnings.
+def impulses(command: Array, substeps: int) -> Array:
+    """Commands (T, n) held from row to row, as the simulation's steps take them, (T * substeps, n).
 
-    At the end of period k the links are where period k + 1 finds them, but the drive still feels command k: the jump
-    from command k to k + 1 is taken out of torque and elastic deflection, except where the torque is at its limit.
+    A step acts on the speeds like an impulse at its beginning; a held command acts from there on, half a step later. The
+    mean of the commands before and after the instant makes the simulation second order in its step.
+    """
+    fine = np.repeat(command, substeps, axis=0)
+    fine[substeps::substeps] = 0.5 * (command[:-1] + command[1:])
+    return fine
+
+
+def half_jumps(acting: Array, substeps: int) -> Array:
+    """Half of the change of the command (T, n) at the beginning of each row, from what acted in each step (T * substeps, n).
+
+    With one step a row only the mean of two neighbouring changes is known.
+    """
+    jumps = np.zeros_like(acting)
+    jumps[1:] = np.diff(acting, axis=0) * (1.0 if substeps > 1 else 0.5)
+    return np.asarray(jumps[::substeps])
+
+
+def read_out(
+    position: Array, torque: Array, jump: Array, kp: Array, stiffness: Array, torque_limit: Array
+) -> tuple[Array, Array]:
+    """Position [rad] and torque [N m] under the command that a log's instant feels.
 
     Args:
-        position: (..., T + 1, joints) motor positions at the beginning of each period [rad].
-        torque: (..., T + 1, joints) [N m].
-        command: (..., T + 1, joints) the command that acts [rad].
+        position: (T, joints) simulated motor positions at the instants of reading [rad].
+        torque: (T, joints) [N m].
+        jump: (T, joints) the simulated command less the one that the log feels [rad].
         kp: (joints,) [N m/rad].
         stiffness: (joints,) of the drive [N m/rad], may be infinite.
-        torque_limit: (joints,) [N m].
+        torque_limit: (joints,) [N m]; a torque at its limit does not jump.
 
     Returns:
-        position and torque, (..., T, joints).
+        position and torque, (T, joints): without the jump in torque and in the drive's deflection.
     """
-    jump = np.diff(command, axis=-2)
-    free = np.abs(torque[..., 1:, :]) < 0.999 * torque_limit
+    free = np.abs(torque) < 0.999 * torque_limit
     torque_jump = np.where(free, kp / (1 + kp / stiffness) * jump, 0.0)
-    return position[..., 1:, :] - torque_jump / stiffness, torque[..., 1:, :] - torque_jump
+    return position - torque_jump / stiffness, torque - torque_jump

@@ -14,7 +14,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN, Parameters
-from tactile_cube.measurement.read_out import read_out
+from tactile_cube.measurement.read_out import half_jumps, impulses, read_out
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.trial import Trial
 
@@ -99,28 +99,30 @@ class Replay:
     def simulate(self, trials: Sequence[Trial], parameters: Parameters) -> list[Simulated]:
         """Each trial simulated from its measured start."""
         memory = np.stack([self._memory(trial, parameters) for trial in trials])
-        history = round(HISTORY / self.recording.step)
-        rows = np.array([len(trial.time) + 1 for trial in trials], dtype=np.int64)
-        commands = np.stack([self._commands(trial, history, rows.max()) for trial in trials])
+        history = round(HISTORY / self.recording.step) * self.substeps
+        rows = np.array([len(trial.time) * self.substeps + self.substeps for trial in trials], dtype=np.int64)
+        commands = np.stack([self._commands(trial, history, int(rows.max())) for trial in trials])
         out = np.zeros((len(trials), rows.max(), len(SIGNALS), commands.shape[2]))
-        blocks = np.arange(len(trials))
         rollout_batch = (self._world or self.plant.kernel).rollout_batch
-        rollout_batch(commands, blocks, rows, history, self.substeps, memory, SIGNALS, out)
+        rollout_batch(commands, np.arange(len(trials)), rows, history, 1, memory, SIGNALS, out)
         return [self._read(trial, out[b, : rows[b]], parameters) for b, trial in enumerate(trials)]
 
     def _commands(self, trial: Trial, history: int, rows: int) -> Array:
-        """Commands as positions [rad], the first one held before the trial and the last one after it."""
+        """Commands of every step as positions [rad], the first one held before the trial and the last one after it."""
         scale = TORQUE_MODE_GAIN if self.recording.torque_controlled else 1.0
-        return np.pad(trial.command / scale, ((history, rows - len(trial.command)), (0, 0)), mode="edge")
+        fine = impulses(trial.command / scale, self.substeps)
+        return np.pad(fine, ((history, rows - len(fine)), (0, 0)), mode="edge")
 
     def _read(self, trial: Trial, signals: Array, parameters: Parameters) -> Simulated:
-        """What the log would show of the signals (n + 1, signals, joints)."""
-        position, torque, command = np.moveaxis(signals, 1, 0)
+        """What the log would show of the signals of all steps ((n + 1) substeps, signals, joints)."""
+        position, torque = np.moveaxis(signals[:: self.substeps, :2], 1, 0)
+        jump = half_jumps(signals[:, 2], self.substeps)
+        shown = slice(1, None)
         if self.recording.read == "before":
-            return Simulated(position[:-1], torque[:-1])
+            shown, jump = slice(None, -1), -jump
         constants = self._constants(trial, parameters)
         limits = (constants["kp"], constants["stiffness"], constants["torque_limit"])
-        return Simulated(*read_out(position, torque, command, *limits))
+        return Simulated(*read_out(position[shown], torque[shown], jump[shown], *limits))
 
     def _memory(self, trial: Trial, parameters: Parameters) -> Array:
         own = self._constants(trial, parameters)
