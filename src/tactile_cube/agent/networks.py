@@ -17,7 +17,7 @@ LOG_SCALE_LOW, LOG_SCALE_HIGH = -5.0, 2.0
 def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:
     """Linear layers with ReLU between them, e.g. sizes (120, 512, 512, 24)."""
     layers: list[nn.Module] = []
-    for fan_in, fan_out in itertools.pairwise(sizes):
+    for fan_in, fan_out in itertools.pairwise(sizes[:-1]):
         layers.append(nn.Linear(fan_in, fan_out))
         if layer_norm:
             # No scale and shift: the next layer has both.
