@@ -93,7 +93,7 @@ def test_the_same_seed_writes_the_same_recording(folder: Path, tmp_path: Path) -
 def _truth(*effects: tuple[str, str], catalogue: bool = True) -> dict[str, Any]:
     keys = {"any_joint": False, "in_catalogue": catalogue, "distinct": 5.0, "signal": 5.0}
     made = [{"name": n, "joints": [j], "absorbed": n in hidden.ABSORBED, **keys} for n, j in effects]
-    return {"effects": made, "rig": "finger", "repeat_scatter": 3e-4}
+    return {"effects": made, "rig": "finger", "repeat_scatter": 3e-4, "sensor_floor": 3e-4}
 
 
 def _answer(verdict: str, *effects: tuple[str, str], rivals: tuple[str, ...] = ()) -> dict[str, Any]:
