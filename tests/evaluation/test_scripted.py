@@ -1,0 +1,25 @@
+import numpy as np
+
+from tactile_cube.evaluation.scripted import Gait, joint_angles
+from tactile_cube.hand import DLR_HAND2, tip_positions
+
+
+def test_opposing_fingers_hold_while_the_others_are_in_the_air() -> None:
+    gait = Gait()
+    for step in range(gait.closing, gait.closing + 2 * gait.period):
+        in_air = np.linalg.norm(gait.tips(step)[:, :2], axis=1) > 0.06
+        assert in_air[0] == in_air[2]
+        assert in_air[1] == in_air[3]
+        assert not (in_air[0] and in_air[1])
+
+
+def test_holding_tips_walk_in_minus_z() -> None:
+    gait = Gait()
+    before, after = gait.tips(gait.closing + 3), gait.tips(gait.closing + 4)
+    turn = before[0, 0] * after[0, 1] - before[0, 1] * after[0, 0]
+    assert turn < 0
+
+
+def test_joint_angles_reach_the_targets() -> None:
+    tips = Gait().tips(0)
+    np.testing.assert_allclose(tip_positions(DLR_HAND2, joint_angles(DLR_HAND2, tips)), tips, atol=1e-4)
