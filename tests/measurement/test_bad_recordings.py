@@ -190,7 +190,9 @@ def test_jitter_is_a_warning_and_is_resampled(tmp_path: Path) -> None:
 
 
 def test_dropped_samples_are_a_warning_and_count_in_no_error(tmp_path: Path) -> None:
-    recording = read_recording(write(tmp_path, spoil=lambda c: keep_rows(c, np.delete(np.arange(300), [100, 101, 200]))))
+    recording = read_recording(
+        write(tmp_path, spoil=lambda c: keep_rows(c, np.delete(np.arange(300), [100, 101, 200])))
+    )
     trial = recording.trials[0]
     assert any("3 samples dropped" in line and "row 100" in line for line in recording.warnings)
     assert len(trial.time) == 300

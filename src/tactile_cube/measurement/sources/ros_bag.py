@@ -15,6 +15,7 @@ from tactile_cube.measurement.sources.source import described
 from tactile_cube.measurement.writing import RecordingTables, TrialTable
 
 Array = NDArray[np.float64]
+SAME_STAMP = 1e-6  # [s]
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,10 @@ class RosBag:
         time, position = np.array([t for t, _ in states]), np.stack([values for _, values in states])
         when, command = np.array([t for t, _ in orders]), np.stack([values for _, values in orders])
         first = max(time[0], when[0])
-        keep = time >= first
-        held = np.searchsorted(when, time[keep], side="right") - 1
-        torque = np.stack([e for e in efforts if e is not None])[keep] if None not in efforts else None
+        keep = time + SAME_STAMP >= first
+        held = np.searchsorted(when, time[keep] + SAME_STAMP, side="right") - 1
+        measured = [effort for effort in efforts if effort is not None]
+        torque = np.stack(measured)[keep] if len(measured) == len(time) else None
         return TrialTable(entry, time[keep] - time[keep][0], command[held], position[keep], torque)
 
 

@@ -1,0 +1,45 @@
+"""The command lines record and compare as a user types them."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.measurement.small_rig import URDF, write
+
+
+def run(verb: str, *arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", f"tactile_cube.{verb}", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240, check=False)
+
+
+def test_record_then_compare(tmp_path: Path) -> None:
+    (tmp_path / "two.urdf").write_text(URDF)
+    settings = [
+        "source=rig",
+        "source.urdf=two.urdf",
+        "source.duration=2",
+        "source.step=0.002",
+        "source.initialisations=2",
+    ]
+    made = run("record", "out=made", *settings, folder=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert "8 trials" in made.stdout
+    again = run("record", "out=made", *settings, folder=tmp_path)
+    assert again.returncode == 2
+    assert "holds a recording already" in again.stderr
+
+    compared = run("compare", "recording=made", "band.simulations=3", "hydra.run.dir=run", folder=tmp_path)
+    assert compared.returncode == 0, compared.stderr
+    result = json.loads((tmp_path / "run" / "comparison.json").read_text())
+    assert result["error"]["overall"] > 0
+    for file in ("report.html", "comparison.rrd"):
+        assert (tmp_path / "run" / file).is_file()
+
+
+def test_a_bad_recording_is_one_line_and_status_2(tmp_path: Path) -> None:
+    write(tmp_path / "r", spoil=lambda columns: columns.pop("a.command"))
+    result = run("compare", "recording=r", folder=tmp_path)
+    assert result.returncode == 2
+    assert result.stderr.strip().splitlines()[-1].startswith("error: r/first.parquet: column 'a.command' is missing")
+    assert "Traceback" not in result.stderr

@@ -1,0 +1,59 @@
+"""The published data sets become recordings that are read without errors; skipped where they are not at hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.noise_floor import noise_floor
+from tactile_cube.measurement.recording import Recording, read_recording
+from tactile_cube.measurement.sources.bam_xl330 import BamXl330, stiffness
+from tactile_cube.measurement.sources.shadow_lfj3 import ShadowLfj3
+from tactile_cube.measurement.sources.so101_sage import So101Sage
+from tactile_cube.measurement.sources.source import Source
+from tactile_cube.measurement.writing import write_recording
+
+DATA = Path(__file__).parents[4] / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data")
+
+
+def imported(source: Source, folder: Path) -> dict[str, Recording]:
+    recordings = {}
+    for name, tables in source.recordings(0).items():
+        write_recording(folder / name, tables)
+        recordings[name] = read_recording(folder / name)
+    return recordings
+
+
+@needs_data
+def test_bam_holds_one_gain_out_and_drops_what_came_after_switching_off(tmp_path: Path) -> None:
+    parts = imported(BamXl330(str(DATA / "bam_xl330" / "xl330.npz")), tmp_path)
+    assert len(parts[""].trials) == 12
+    assert len(parts["validation"].trials) == 4
+    assert {round(t.gains.kp[0] / stiffness(1)) for t in parts[""].trials} == {100, 400, 800}
+    dropped = next(t for t in parts[""].trials if t.name.startswith("lift_and_drop"))
+    assert dropped.duration < 5.0
+
+
+@needs_data
+def test_shadow_sweeps_are_cut_into_segments_of_commanded_torque(tmp_path: Path) -> None:
+    parts = imported(ShadowLfj3(str(DATA / "shadow_lfj3" / "lfj3_openloop.npz")), tmp_path)
+    recording = parts[""]
+    assert recording.torque_controlled
+    assert all(trial.duration == pytest.approx(0.399, abs=0.003) for trial in recording.trials)
+    assert np.abs(recording.trials[20].command).max() < 0.2
+
+
+@needs_data
+def test_so101_repeats_give_a_noise_floor(tmp_path: Path) -> None:
+    source = So101Sage(str(DATA / "so101_sage"), joint="Rotation", motions=("repetitive_motion",))
+    floor = noise_floor(imported(source, tmp_path)[""])
+    assert floor.source == "repeats"
+    assert floor.repeats >= 8
+    assert 0.0005 < floor.overall < 0.006
+
+
+def test_a_missing_archive_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"source\.file=.*none\.npz: no such file"):
+        BamXl330(str(tmp_path / "none.npz")).recordings(0)

@@ -1,0 +1,147 @@
+"""The pages and recordings that compare, diagnose and identify write."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
+from tactile_cube.measurement.comparison import Comparison, compare
+from tactile_cube.measurement.recording import read_recording
+from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
+from tactile_cube.visualization.comparison_report import comparison_report
+from tactile_cube.visualization.comparison_summary import markdown, summary
+from tactile_cube.visualization.diagnosis_report import ResidualShape, diagnosis_report, identification_report
+from tactile_cube.visualization.report import Report, Section, Table, write_report
+from tests.measurement.small_rig import write
+
+VOID = {"meta", "br", "line", "rect", "circle", "path", "input", "link"}
+
+
+class Balanced(HTMLParser):
+    """Collects the text and checks that every element is closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
+    recording = read_recording(write(tmp_path_factory.mktemp("recording")))
+    delay = EffectEstimate(
+        effect="command_delay@a", parameters={"delay": Estimate(value=0.02, low=0.015, high=0.025, unit="s")}
+    )
+    kd = {"a": Estimate(value=0.22, low=0.2, high=0.24, unit="N m s/rad")}
+    model = ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[delay])
+    return compare(recording, model, simulations=4, spread={"kd": 0.2})
+
+
+def page(report: Report, path: Path) -> str:
+    write_report(report, path)
+    text = path.read_text()
+    assert len(text) < 5_000_000
+    assert not re.search(r'(?:src|href)="(?!#)', text), "needs another file"
+    reader = Balanced()
+    reader.feed(text)
+    assert reader.open == []
+    return re.sub(r"\s+", " ", reader.text)
+
+
+def test_the_comparison_page_says_what_how_well_where_and_what_next(comparison: Comparison, tmp_path: Path) -> None:
+    text = page(comparison_report(comparison, "python -m tactile_cube.compare", "model.yaml"), tmp_path / "report.html")
+    for heading in ("What was compared", "How well", "Where it fails", "Measured and simulated", "What to do next"):
+        assert heading in text
+    assert "command_delay@a" in text
+    assert "tactile_cube.diagnose recording=" in text
+    assert all(sentence in text for sentence in comparison.sentences)
+
+
+DIAGNOSIS = {
+    "verdict": "missing_effect",
+    "effects": [
+        {
+            "name": "command_delay",
+            "joints": ["a"],
+            "parameters": {"delay": {"value": 0.02, "low": 0.015, "high": 0.025, "unit": "s"}},
+            "heldout_gain": 0.8,
+            "p_value": 1e-5,
+            "rivals": ["actuator_lag"],
+        }
+    ],
+    "unexplained_joints": [],
+    "ranking": [{"effect": "command_delay@a", "gain": 0.8}, {"effect": "backlash@a", "gain": 0.1}],
+    "error": {"nominal": 0.007, "refitted": 0.005, "with_effects": 0.0006, "noise_floor": 0.0005},
+    "next_experiment": None,
+    "seconds": 12.0,
+}
+
+
+def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals(
+    comparison: Comparison, tmp_path: Path
+) -> None:
+    text = page(diagnosis_report(DIAGNOSIS, comparison, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
+    assert "The missing effect was found: command_delay at a." in text
+    assert "0.02 s [0.015, 0.025]" in text
+    assert "cannot be told from actuator_lag" in text
+    assert "7 mrad" in text
+    assert "effects=[command_delay@a]" in text
+
+
+def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison, tmp_path: Path) -> None:
+    unsure = DIAGNOSIS | {"verdict": "ambiguous", "next_experiment": "next_experiment.csv"}
+    report = diagnosis_report(unsure, comparison, None, "cmd", expectation="the delay shows as 4 mrad")
+    text = page(report, tmp_path / "d.html")
+    assert "What to record next" in text
+    assert "next_experiment.csv" in text
+    assert "the delay shows as 4 mrad" in text
+
+
+def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Comparison, tmp_path: Path) -> None:
+    unknown = DIAGNOSIS | {"verdict": "unknown_effect", "effects": [], "unexplained_joints": ["b"]}
+    x = np.linspace(-1, 1, 12)
+    shape = ResidualShape("b", "position of b [rad]", x, 0.01 * x, np.full(12, 0.002), 0.83)
+    text = page(diagnosis_report(unknown, comparison, None, "cmd", shapes=[shape]), tmp_path / "d.html")
+    assert "explains 83 % of it" in text
+    assert "not explained: b" in text
+    assert "my_rig.MyEffect@b" in text
+
+
+def test_the_identification_page_shows_the_staircase(comparison: Comparison, tmp_path: Path) -> None:
+    joints = {"nominal": {"a": 0.007, "b": 0.006}, "with_effects": {"a": 0.0006, "b": 0.0005}}
+    text = page(identification_report(comparison, DIAGNOSIS["error"], joints, "cmd", "model.yaml"), tmp_path / "i.html")
+    assert "fell from 7 mrad to 0.6 mrad" in text
+    assert "kd a" in text
+    assert "0.2 .. 0.24" in text
+
+
+def test_texts_are_escaped(tmp_path: Path) -> None:
+    section = Section("a", ["<script>alert(1)</script>"], [Table(("x",), [("<b>",)])])
+    write_report(Report("t", "a", "good", sections=[section]), tmp_path / "r.html")
+    assert "<script>" not in (tmp_path / "r.html").read_text()
+    assert "<b>" not in (tmp_path / "r.html").read_text().split("</nav>")[1]
+
+
+def test_the_summary_has_a_line_for_each_joint(comparison: Comparison) -> None:
+    assert {"a", "b", "all"} <= {line.split()[0] for line in summary(comparison).splitlines() if line}
+    assert "| a |" in markdown(comparison)
+
+
+def test_the_rerun_recording_is_written_with_all_trials(comparison: Comparison, tmp_path: Path) -> None:
+    write_comparison(comparison, tmp_path / "c.rrd", markdown(comparison))
+    assert (tmp_path / "c.rrd").stat().st_size > 10_000
+    assert trial_starts(comparison) == [0.0, comparison.recording.trials[0].duration + 1.0]
