@@ -1,5 +1,7 @@
 """The deployed controller against the training environment."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -65,3 +67,11 @@ def test_a_policy_of_another_shape_is_refused() -> None:
     weight, bias = np.zeros((24, 100), dtype=np.float32), np.zeros(24, dtype=np.float32)
     with pytest.raises(InputError, match="maps 100 numbers to 12"):
         Controller(Network((weight,), (bias,), {}))
+
+
+def test_the_robots_computer_needs_no_torch() -> None:
+    program = (
+        "import sys, tactile_cube.deployment.controller, tactile_cube.deployment.export; print('torch' in sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert run.stdout.strip() == "False"
