@@ -20,11 +20,12 @@ def test_a_calm_state_has_no_fault() -> None:
 @pytest.mark.parametrize(
     ("state", "word"),
     [
-        ((changed(CALM, (0, 0), np.nan), CALM, CUBE, []), "not a number"),
+        ((changed(CALM, (0, 0), np.nan), CALM, CUBE, []), "joint speed is not a number"),
         ((CALM, changed(CALM, (1, 2), -80.0), CUBE, []), "joint speed"),
         ((CALM, CALM, changed(CUBE, 8, 6.0), []), "cube speed"),
         ((CALM, CALM, changed(CUBE, 11, -200.0), []), "cube spin"),
         ((CALM, CALM, CUBE, [0.0, -0.01]), "overlap"),
+        ((CALM, CALM, changed(CUBE, 5, np.inf), []), "cube speed is not a number"),
         ((changed(CALM, (3, 3), 0.5), CALM, CUBE, []), "tendon stretch"),
     ],
 )

@@ -6,22 +6,22 @@ In ordinary episodes joints stay below 3 rad/s, contact forces below 12 N and ov
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.compiled import compiled_once
+
 Array = NDArray[np.float64]
 
-MAX_JOINT_SPEED = 60.0
-"""[rad/s]; the drives reach about 6."""
-MAX_CUBE_SPEED = 5.0
-"""[m/s]; half a second of free fall."""
-MAX_CUBE_SPIN = 100.0
-"""[rad/s]."""
-MAX_OVERLAP = 6e-3
-"""Deepest overlap of two bodies [m]; a fingertip's radius is 14 mm."""
-MAX_TENDON_STRETCH = 0.3
-"""Largest difference between q4 and q3 [rad]."""
+BOUNDS = (
+    ("joint speed", 60.0, "rad/s"),  # the drives reach about 6
+    ("cube speed", 5.0, "m/s"),  # half a second of free fall
+    ("cube spin", 100.0, "rad/s"),
+    ("tendon stretch", 0.3, "rad"),  # largest difference between q4 and q3
+    ("overlap", 6e-3, "m"),  # of two bodies; a fingertip's radius is 14 mm
+)
 
 
 def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float]) -> str:
@@ -33,16 +33,26 @@ def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float]) -> s
         cube: Position, quaternion, linear and angular velocity (13,).
         distances: Gaps of the contact points [m], negative where bodies overlap.
     """
-    if not (np.isfinite(q).all() and np.isfinite(v).all() and np.isfinite(cube).all()):
-        return "not a number"
-    readings = (
-        ("joint speed", float(np.abs(v).max()), MAX_JOINT_SPEED, "rad/s"),
-        ("cube speed", float(np.abs(cube[7:10]).max()), MAX_CUBE_SPEED, "m/s"),
-        ("cube spin", float(np.abs(cube[10:13]).max()), MAX_CUBE_SPIN, "rad/s"),
-        ("overlap", -min(distances, default=0.0), MAX_OVERLAP, "m"),
-        ("tendon stretch", float(np.abs(q[:, 3] - q[:, 2]).max()), MAX_TENDON_STRETCH, "rad"),
-    )
-    for name, value, bound, unit in readings:
+    for (name, bound, unit), value in zip(BOUNDS, (*_extremes(q, v, cube), -min(distances, default=0.0)), strict=True):
+        if not isfinite(value):
+            return f"{name} is not a number"
         if value > bound:
             return f"{name} {value:.3g} {unit} above {bound:g}"
     return ""
+
+
+@compiled_once
+def _extremes(q: Array, v: Array, cube: Array) -> tuple[float, float, float, float]:
+    """Largest joint speed, cube speed, cube spin and tendon stretch; infinite where a number is none."""
+    speed = stretch = linear = angular = 0.0
+    for finger in range(q.shape[0]):
+        stretch = max(stretch, abs(q[finger, 3] - q[finger, 2]))
+        for joint in range(q.shape[1]):
+            speed = max(speed, abs(v[finger, joint]))
+            if not np.isfinite(q[finger, joint] + v[finger, joint]):
+                speed = inf
+    for axis in range(3):
+        linear, angular = max(linear, abs(cube[7 + axis])), max(angular, abs(cube[10 + axis]))
+    if not np.all(np.isfinite(cube)):
+        linear = inf
+    return speed, linear, angular, stretch

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
 from typing import Literal, Protocol
 
@@ -22,20 +21,26 @@ OBJECT_STATE = 13
 
 
 class PhysicsLoop(Protocol):
-    """Runs physics steps; both implementations give the same bits."""
+    """Runs physics steps of bound arrays; both implementations give the same bits."""
 
     kind: Literal["c", "python"]
 
-    def run(
-        self, steps: int, q: Array, v: Array, memory: Array, cube: int, wrench: Array | None, states: Array | None
-    ) -> None:
-        """Runs `steps` physics steps.
+    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
+        """Says what the steps work on, in place.
+
+        Args:
+            chains: Body ids of the chains.
+            q: Positions of all joints of all chains, current before and after each run [rad].
+            v: Velocities, likewise [rad/s].
+            memory: The drivetrain's memory.
+        """
+        ...
+
+    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
+        """Runs physics steps.
 
         Args:
             steps: How many.
-            q: Positions of all joints of all chains, updated in place [rad].
-            v: Velocities, likewise [rad/s].
-            memory: The drivetrain's memory.
             cube: Body id of the object; needed where `wrench` or `states` is given.
             wrench: Force and torque on the object's centre (6,) [N, N m], or None.
             states: (steps + 1, 13), filled with the object's state before each step and after the last, or None.
@@ -43,18 +48,18 @@ class PhysicsLoop(Protocol):
         ...
 
 
-def make_loop(kind: Loop, client: int, chains: Sequence[int], plant: Plant) -> PhysicsLoop:
+def make_loop(kind: Loop, client: int, plant: Plant) -> PhysicsLoop:
     """The loop of that kind; `auto` takes the compiled one where it can be built."""
     if kind == "python":
-        return PythonLoop(client, chains, plant)
+        return PythonLoop(client, plant)
     if kind == "c":
-        return NativeLoop(client, chains, plant)
+        return NativeLoop(client, plant)
     if find_compiler() is None:
-        return PythonLoop(client, chains, plant)
+        return PythonLoop(client, plant)
     try:
-        return NativeLoop(client, chains, plant)
+        return NativeLoop(client, plant)
     except (InputError, OSError):
-        return PythonLoop(client, chains, plant)
+        return PythonLoop(client, plant)
 
 
 class NativeLoop:
@@ -62,38 +67,27 @@ class NativeLoop:
 
     kind: Literal["c", "python"] = "c"
 
-    def __init__(self, client: int, chains: Sequence[int], plant: Plant) -> None:
-        """Attaches the compiled loop to a client as a PyBullet plugin."""
+    def __init__(self, client: int, plant: Plant) -> None:
+        """Attaches the compiled loop to a client as a PyBullet plugin; once for each client."""
         self._library = load_native()
         if pybullet.loadPlugin(str(native_library()), "_steps", physicsClientId=client) < 0:
             raise InputError("PyBullet refused the compiled loop; choose simulation.loop=python")
-        self._handle = ctypes.c_void_p(self._library.physics_client())
-        self._chains = np.array(chains, dtype=np.int32)
-        self._control = ctypes.c_void_p(plant.kernel.control_address)
+        self._handle = self._library.physics_client()
+        self._control = plant.kernel.control_address
 
-    def run(
-        self, steps: int, q: Array, v: Array, memory: Array, cube: int, wrench: Array | None, states: Array | None
-    ) -> None:
+    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
+        """See `PhysicsLoop.bind`."""
+        self._chains = np.array(chains, dtype=np.int32)
+        self._bound = (q, v, np.zeros_like(q), memory)  # kept alive: C sees their addresses
+        self._who = (self._handle, self._chains.ctypes.data, len(chains), q.size // len(chains))
+        self._what = (self._control, *(array.ctypes.data for array in self._bound))
+
+    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
         """See `PhysicsLoop.run`."""
         if wrench is not None and states is None:
             states = np.empty((steps + 1, OBJECT_STATE))
-        torque = np.zeros_like(q)
-        n_chains = len(self._chains)
-        self._library.run_physics_steps(
-            self._handle,
-            _pointer(self._chains),
-            ctypes.c_int(n_chains),
-            ctypes.c_int(q.size // n_chains),
-            ctypes.c_int64(steps),
-            self._control,
-            _pointer(q),
-            _pointer(v),
-            _pointer(torque),
-            _pointer(memory),
-            ctypes.c_int(cube),
-            _pointer(wrench),
-            _pointer(states),
-        )
+        push, record = (None if array is None else array.ctypes.data for array in (wrench, states))
+        self._library.run_physics_steps(*self._who, steps, *self._what, cube, push, record)
 
 
 class PythonLoop:
@@ -101,26 +95,28 @@ class PythonLoop:
 
     kind: Literal["c", "python"] = "python"
 
-    def __init__(self, client: int, chains: Sequence[int], plant: Plant) -> None:
-        """Remembers whom to drive."""
+    def __init__(self, client: int, plant: Plant) -> None:
+        """Takes the control step from the plant."""
         self._client = client
-        self._chains = list(chains)
         self._control = plant.kernel.control_step
 
-    def run(
-        self, steps: int, q: Array, v: Array, memory: Array, cube: int, wrench: Array | None, states: Array | None
-    ) -> None:
+    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
+        """See `PhysicsLoop.bind`."""
+        self._chains = list(chains)
+        self._q, self._v, self._memory = q, v, memory
+
+    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
         """See `PhysicsLoop.run`."""
-        torque = np.zeros_like(q)
+        torque = np.zeros_like(self._q)
         for i in range(steps):
-            self._control(i, q, v, torque, memory)
+            self._control(i, self._q, self._v, torque, self._memory)
             self._apply(torque)
             if states is not None:
                 states[i] = self._object_state(cube)
             if wrench is not None:
                 self._push(cube, wrench)
             pybullet.stepSimulation(physicsClientId=self._client)
-            self._read(q, v)
+            self._read(self._q, self._v)
         if states is not None:
             states[steps] = self._object_state(cube)
 
@@ -148,7 +144,3 @@ class PythonLoop:
         frame = pybullet.WORLD_FRAME
         pybullet.applyExternalForce(cube, -1, wrench[:3].tolist(), centre, frame, physicsClientId=self._client)
         pybullet.applyExternalTorque(cube, -1, wrench[3:].tolist(), frame, physicsClientId=self._client)
-
-
-def _pointer(array: NDArray[np.generic] | None) -> ctypes.c_void_p:
-    return ctypes.c_void_p(None if array is None else array.ctypes.data)

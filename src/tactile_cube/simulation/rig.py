@@ -44,8 +44,8 @@ class RigWorld:
         if plant.topology.chains != 1:
             raise InputError(f"a rig world moves one chain, this plant has {plant.topology.chains}; give each its own")
         self.plant = plant
-        self._kind = (options or SimulationOptions()).loop
         self._client = connect(SimulationOptions(dt=plant.dt))
+        self._loop = make_loop((options or SimulationOptions()).loop, self._client, plant)
         self._body = -1
         self._loaded = b""
 
@@ -103,15 +103,15 @@ class RigWorld:
         if history:
             self.plant.kernel.rollout(commands[:history], history, substeps, memory, rows, out[:0])
         q, v = self._place(memory)
-        loop = make_loop(self._kind, self._client, [self._body], self.plant)
+        self._loop.bind([self._body], q, v, memory)
         reading = min(int(self.plant.view(memory, "reading")[0]), substeps - 1) + 1
         goal = self.plant.view(memory, "goal")
         for k, command in enumerate(commands[history : history + len(out)]):
             goal[:] = command
-            loop.run(reading, q, v, memory, -1, None, None)
+            self._loop.run(reading, -1, None, None)
             for r, row in enumerate(rows):
                 out[k, r] = self.plant.signal(memory, int(row))
-            loop.run(substeps - reading, q, v, memory, -1, None, None)
+            self._loop.run(substeps - reading, -1, None, None)
 
     def rollout_batch(
         self,

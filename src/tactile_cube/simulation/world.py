@@ -73,9 +73,11 @@ class World:
             joint_names=hand.joint_names,
             trace_rows=self.options.substeps if self.options.trace else 0,
         )
-        self._loop = make_loop(self.options.loop, self._scene.client, self._scene.fingers, self._plant)
+        self._loop = make_loop(self.options.loop, self._scene.client, self._plant)
         self._memory = np.zeros(self._plant.size)
         self._joints = np.zeros((2, len(hand.fingers), LINKS_PER_FINGER))
+        q, v = self._joints.reshape(2, -1)
+        self._loop.bind(self._scene.fingers, q, v, self._memory)
         self._cube = np.zeros(OBJECT_STATE)
         self._push = np.zeros(6)
         self._down = np.array([0.0, 0.0, -1.0])
@@ -133,17 +135,17 @@ class World:
     @property
     def q(self) -> Array:
         """True joint angles (12,) [rad]."""
-        return self._joints[0, :, :JOINTS_PER_FINGER].ravel()
+        return np.asarray(self._joints[0, :, :JOINTS_PER_FINGER].ravel())
 
     @property
     def dq(self) -> Array:
         """True joint velocities (12,) [rad/s]."""
-        return self._joints[1, :, :JOINTS_PER_FINGER].ravel()
+        return np.asarray(self._joints[1, :, :JOINTS_PER_FINGER].ravel())
 
     @property
     def all_joint_angles(self) -> Array:
         """Angles of all joints (16,) [rad], q1..q4 of each finger: the joints of `hand_urdf`."""
-        return self._joints[0].ravel()
+        return np.array(self._joints[0].ravel())
 
     @property
     def q_m(self) -> Array:
@@ -275,8 +277,7 @@ class World:
         substeps = self.options.substeps
         states = np.empty((substeps + 1, OBJECT_STATE)) if self.options.trace else None
         filtered = self._plant.view(self._memory, "filtered").copy()
-        q, v = self._joints.reshape(2, -1)
-        self._loop.run(substeps, q, v, self._memory, self._scene.cube, self._wrench(), states)
+        self._loop.run(substeps, self._scene.cube, self._wrench(), states)
         if states is not None:
             offset = np.asarray(self.constants.joint_offset)
             self.trace = read_trace(self._plant, self._memory, filtered, offset, states, self.time)
