@@ -81,8 +81,8 @@ class Run:
 
     def close(self) -> None:
         """End the workers and write what is still in memory."""
+        self.ledger.write(self.learner.steps)  # first: the workers take their CPU time with them
         self.learner.collection.close()
-        self.ledger.write(self.learner.steps)
         self.loggers.close()
 
     def _after_iteration(self) -> None:
