@@ -24,7 +24,7 @@ PHASES = np.array([0.0, 0.5, 0.0, 0.5])
 
 @dataclass(frozen=True)
 class Gait:
-    """Shape of the walk. Found by trying 80 gaits at random; turning about -z is what this hand pose does best.
+    """Shape of the walk. Found by trying 120 gaits at random at full weight and T_s 0.5 s; turning about -z is what this hand pose does best.
 
     Attributes:
         swing: a finger walks from +swing to -swing about its place, and back in the air, to turn the cube in -z [rad].
@@ -37,13 +37,13 @@ class Gait:
         closing: policy steps in which all fingers close around the cube before they begin to walk.
     """
 
-    swing: float = 0.615
-    shift: float = -0.13
-    period: int = 51
-    air_share: float = 0.266
-    pressed: float = 0.049
-    lifted: float = 0.085
-    height: float = 0.0024
+    swing: float = 0.628
+    shift: float = -0.079
+    period: int = 57
+    air_share: float = 0.305
+    pressed: float = 0.0465
+    lifted: float = 0.092
+    height: float = 0.0073
     closing: int = 10
 
     def tips(self, step: int, direction: int = -1) -> Array:
