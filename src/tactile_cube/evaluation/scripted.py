@@ -24,7 +24,9 @@ PHASES = np.array([0.0, 0.5, 0.0, 0.5])
 
 @dataclass(frozen=True)
 class Gait:
-    """Shape of the walk. Found by trying 120 gaits at random at full weight and T_s 0.5 s; turning about -z is what this hand pose does best.
+    """Shape of the walk.
+
+    Found by trying 120 gaits at random at full weight and T_s 0.5 s; turning about -z is what this hand pose does best.
 
     Attributes:
         swing: a finger walks from +swing to -swing about its place, and back in the air, to turn the cube in -z [rad].
