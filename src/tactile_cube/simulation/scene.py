@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 
 _TIP = LINKS_PER_FINGER - 1
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
-_TABLE_AWAY = 10.0
 _ALL_GROUPS = 0xFF
 _URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
@@ -67,16 +66,20 @@ class Scene:
         client: PyBullet's client id.
         fingers: Body ids of the fingers.
         cube: Body id of the cube, -1 before the first `place`.
+        table: Body id of the table, -1 without one.
     """
 
     def __init__(self, hand: HandModel, options: SimulationOptions) -> None:
-        """Builds fingers and table; the cube comes with the first episode."""
+        """Builds the fingers; cube and table come with each episode."""
         self.hand = hand
         self.client = connect(options)
         self.fingers = self._load_fingers()
         self.inertias = [self._inertia(link) for link in range(LINKS_PER_FINGER)]
-        self.table = self._load_table()
-        self.cube = -1
+        self.table = self.cube = -1
+        half = (0.5 * _TABLE_SIZE).tolist()
+        self._table_shape = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
+        )
         self._cube_shape = -1
         self._cube_size = np.zeros(3)
 
@@ -89,8 +92,8 @@ class Scene:
             angles: All joints of all fingers (fingers, 4) [rad].
             velocities: Likewise [rad/s].
         """
-        self._set_cube(constants, start)
         self._set_table(constants)
+        self._set_cube(constants, start)
         for body, q, v in zip(self.fingers, angles, velocities, strict=True):
             for joint in range(LINKS_PER_FINGER):
                 pybullet.resetJointState(body, joint, q[joint], v[joint], physicsClientId=self.client)
@@ -133,15 +136,19 @@ class Scene:
         diagonal = pybullet.getDynamicsInfo(self.fingers[0], link, physicsClientId=self.client)[2]
         return (float(diagonal[0]), float(diagonal[1]), float(diagonal[2]))
 
-    def _load_table(self) -> int:
-        half = (0.5 * _TABLE_SIZE).tolist()
-        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-        return int(pybullet.createMultiBody(0.0, shape, physicsClientId=self.client))
-
     def _set_table(self, constants: EpisodeConstants) -> None:
-        top = -_TABLE_AWAY if constants.table_height is None else constants.table_height
-        centre = [0.0, 0.0, top - 0.5 * float(_TABLE_SIZE[2])]
-        pybullet.resetBasePositionAndOrientation(self.table, centre, [0, 0, 0, 1], physicsClientId=self.client)
+        """A table where the episode has one; else none, for even a distant body takes 6 % of the time."""
+        if self.table >= 0:
+            pybullet.removeBody(self.table, physicsClientId=self.client)
+        self.table = -1
+        if constants.table_height is None:
+            return
+        centre = [0.0, 0.0, constants.table_height - 0.5 * float(_TABLE_SIZE[2])]
+        self.table = int(
+            pybullet.createMultiBody(
+                0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, physicsClientId=self.client
+            )
+        )
         pybullet.changeDynamics(self.table, -1, lateralFriction=constants.table_friction, physicsClientId=self.client)
 
     def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
@@ -196,12 +203,10 @@ class Scene:
                 )
 
     def _forget_contacts(self) -> None:
-        """Registers every body anew with the broadphase, in a fixed order.
+        """Registers every finger anew with the broadphase, in a fixed order; cube and table are new themselves.
 
         That drops cached contacts and their impulses, so an episode depends on nothing that happened before it.
         """
-        bodies = [(body, link) for body in self.fingers for link in range(LINKS_PER_FINGER)]
-        for body, link in [*bodies, (self.table, -1), (self.cube, -1)]:
-            group = 2 if body == self.table else 1
-            mask = 1 if body == self.table else _ALL_GROUPS
-            pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=self.client)
+        for body in self.fingers:
+            for link in range(LINKS_PER_FINGER):
+                pybullet.setCollisionFilterGroupMask(body, link, 1, _ALL_GROUPS, physicsClientId=self.client)
