@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import yaml
 
+from tactile_cube.completion import install_script, prepare_query
 from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,6 +47,11 @@ def verb(name: str) -> Callable[[Callable[["DictConfig"], None]], Callable[[], N
             if {"--help", "-h"} & set(sys.argv[1:]):
                 print(help_text(name))
                 return
+            script = install_script(sys.argv[1:])
+            if script is not None:
+                print(script)
+                return
+            prepare_query()
             _run(name, function)
 
         return command

@@ -19,12 +19,14 @@ def main(config: "DictConfig") -> None:
     from pathlib import Path
 
     from hydra.core.hydra_config import HydraConfig
+    from hydra.types import RunMode
     from hydra.utils import instantiate
     from omegaconf import OmegaConf
 
     from tactile_cube.training.build import build_run
     from tactile_cube.training.collection import CollectionError
     from tactile_cube.training.environment import as_environment
+    from tactile_cube.training.run import INTERRUPTED
     from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
@@ -49,6 +51,8 @@ def main(config: "DictConfig") -> None:
         if "run" in locals():
             run.close()
     run.conclude(reason)
+    if reason == INTERRUPTED and HydraConfig.get().mode == RunMode.MULTIRUN:
+        sys.exit(130)  # else Ctrl-C would end one run of a sweep and start the next
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from tactile_cube.training.loggers import Loggers
 from tactile_cube.training.loop import Learner
 from tactile_cube.training.progress import ProgressLine
 
+INTERRUPTED = "interrupted"
 POLICY, BEST_POLICY = "policy.safetensors", "policy_best.safetensors"
 
 
@@ -102,7 +103,7 @@ class Run:
         settings, steps = self.learner.settings, self.learner.steps
         angle = self.learner.episodes.mean_angle
         if self._interrupted:
-            return "interrupted"
+            return INTERRUPTED
         if steps >= settings.steps:
             return f"all {settings.steps} steps done"
         if settings.stop_when_angle_above is not None and angle > settings.stop_when_angle_above:

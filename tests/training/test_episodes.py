@@ -1,0 +1,57 @@
+"""Statistics of finished episodes."""
+
+import torch
+from tensordict import TensorDict
+
+from tactile_cube.training.episodes import WINDOW, EpisodeStatistics
+
+
+def block(theta: list[list[float]], done: list[list[bool]], **flags: list[list[bool]]) -> TensorDict:
+    """Blocks (worlds, steps)."""
+    ends = torch.tensor(done).unsqueeze(-1)
+    following = {
+        "theta": torch.tensor(theta).unsqueeze(-1),
+        "done": ends,
+        "faulty": torch.zeros_like(ends),
+        "episode_step": torch.full_like(ends, 7, dtype=torch.int64),
+        "outcome": torch.ones_like(ends, dtype=torch.int64),
+    }
+    following |= {key: torch.tensor(value).unsqueeze(-1) for key, value in flags.items()}
+    return TensorDict({"next": following}, batch_size=ends.shape[:2])
+
+
+def test_only_final_angles_count() -> None:
+    statistics = EpisodeStatistics()
+    statistics.add(block([[1.0, 2.0, 3.0]], [[False, True, False]]))
+    assert statistics.mean_angle == 2.0
+    assert statistics.summary()["episode_length"] == 7.0
+
+
+def test_exploring_and_faulty_episodes_are_left_out() -> None:
+    statistics = EpisodeStatistics()
+    both = [[True, True, True]]
+    statistics.add(block([[1.0, 5.0, 9.0]], both, exploring=[[False, True, False]], faulty=[[False, False, True]]))
+    assert list(statistics.angles) == [1.0]
+    assert (statistics.episodes, statistics.faulty) == (3, 1)
+
+
+def test_window_holds_the_last_episodes_in_order_of_time() -> None:
+    statistics = EpisodeStatistics()
+    statistics.add(block([[1.0, 3.0], [2.0, 4.0]], [[True, True], [True, True]]))
+    assert list(statistics.angles) == [1.0, 2.0, 3.0, 4.0]
+    statistics.add(block([[8.0] * WINDOW], [[True] * WINDOW]))
+    assert statistics.mean_angle == 8.0
+
+
+def test_endings_are_named() -> None:
+    statistics = EpisodeStatistics(("running", "time_limit", "dropped"))
+    statistics.add(block([[1.0, 1.0]], [[True, True]], outcome=[[1, 2]]))
+    assert statistics.summary()["ended_dropped"] == 0.5
+
+
+def test_statistics_come_back_from_a_checkpoint() -> None:
+    first, second = EpisodeStatistics(), EpisodeStatistics()
+    first.add(block([[1.0, 2.0]], [[True, True]]))
+    second.load_state_dict(first.state_dict())
+    assert first.summary() == second.summary()
+    assert second.angles.maxlen == WINDOW

@@ -1,0 +1,30 @@
+"""The line that says how training goes."""
+
+import io
+
+import pytest
+
+from tactile_cube.training import progress
+from tactile_cube.training.progress import ProgressLine
+
+
+def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([100.0, 101.0, 110.0])
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: next(clock))
+    stream = io.StringIO()
+    line = ProgressLine(total=10_000, steps=1000, updates=50, stream=stream)
+    summary = {"final_angle": 1.234, "episode_length": 88.0}
+    line.show(1010, 51, summary, {"T_s": 0.25})
+    assert stream.getvalue() == ""  # too soon
+    line.show(4000, 1050, summary, {"T_s": 0.25})
+    text = stream.getvalue()
+    for part in (
+        "4.0 k of 10 k steps",
+        "300 steps/s",
+        "100 updates/s",
+        "1.23 rad",
+        "88 steps",
+        "T_s 0.25",
+        "0 min 20 s left",
+    ):
+        assert part in text
