@@ -102,7 +102,7 @@ def diagnose(
     stages = {
         "nominal": search.start_held_out,
         "refitted": findings.base.judgement.model,
-        "with_effects": _with_offsets(fitted.model, verdict.chosen.judgement.model),
+        "with_effects": with_offsets(fitted.model, verdict.chosen.judgement.model),
     }
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
     return Diagnosis(
@@ -118,7 +118,7 @@ def diagnose(
     )
 
 
-def _with_offsets(model: Model, judged: Model) -> Model:
+def with_offsets(model: Model, judged: Model) -> Model:
     """The final model with the joint offsets that were found for the held-out initialisations."""
     return Model(model.constants, model.terms, {**judged.posture, **model.posture})
 

@@ -75,6 +75,12 @@ def fit(
     return _finish(problem, best, model)
 
 
+def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) -> Fit:
+    """A fit with residual, columns and information of a problem whose starts were linearised anew."""
+    information = _information(problem, columns, fitted.unknowns)
+    return Fit(fitted.model, fitted.unknowns, fitted.cost, problem.residual(prediction), columns, information)
+
+
 def _finish(problem: Problem, best: Fit, last: Model) -> Fit:
     """The last step is taken too if it helps."""
     residual = problem.residual(problem.predictions([last])[0])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import Experiment
 
 OPENING = {
@@ -49,3 +51,14 @@ def _unexplained(entry: dict[str, Any]) -> str:
 
 def _mrad(value: float) -> str:
     return f"{1e3 * value:.3g} mrad"
+
+
+def staircase(stages: Mapping[str, float], model: ModelFile) -> str:
+    """How the held-out error fell, and the values of the effects that were fitted."""
+    lines = ["Held-out error, free-running simulation:"]
+    lines += [f"  {stage.replace('_', ' '):<40} {_mrad(value)}" for stage, value in stages.items()]
+    for effect in model.effects:
+        fitted = {name: one for name, one in effect.parameters.items() if one.high > one.low}
+        values = ", ".join(f"{n} {e.value:.4g} [{e.low:.4g}, {e.high:.4g}] {e.unit}" for n, e in fitted.items())
+        lines.append(f"{effect.effect}: {values}")
+    return "\n".join(lines)

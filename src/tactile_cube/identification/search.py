@@ -12,7 +12,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.base import base_unknowns, nominal_model
 from tactile_cube.identification.candidates import Candidate, candidates, model_unknowns, placed
 from tactile_cube.identification.evidence import Judgement, gain, judge, p_value
-from tactile_cube.identification.gauss_newton import Fit, fit
+from tactile_cube.identification.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.problem import Problem
 from tactile_cube.identification.screening import Score, screen
@@ -148,10 +148,7 @@ class Search:
 
     def extend(self, parent: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
-        self.problem.linearise_starts(parent.fit.model)
-        prediction, columns = self.problem.columns(parent.fit.model, parent.fit.unknowns)
-        residual = self.problem.residual(prediction)
-        frozen = Fit(parent.fit.model, parent.fit.unknowns, parent.fit.cost, residual, columns, parent.fit.information)
+        frozen = self.frozen(parent.fit)
         self.last_scores = screen(
             self.problem, frozen, self.candidates, [placed(c, self.fitted) for c in self.candidates]
         )
@@ -159,6 +156,12 @@ class Search:
         self.say(f"screened {len(self.candidates)} candidates, refitting {len(chosen)}")
         refitted = sorted((self.refit(frozen, candidate) for candidate in chosen), key=lambda pair: pair[1].cost)
         return [self.finish(parent, candidate, fitted) for candidate, fitted in refitted[:FINALISTS]]
+
+    def frozen(self, fitted: Fit) -> Fit:
+        """A fit with its residual and columns taken anew on this problem, to build on."""
+        self.problem.linearise_starts(fitted.model)
+        prediction, columns = self.problem.columns(fitted.model, fitted.unknowns)
+        return renewed(self.problem, fitted, prediction, columns)
 
     def refit(self, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
         """Fit a candidate's numbers beside the frozen columns of its parent."""

@@ -1,7 +1,7 @@
 """A command that is ignored while it asks for little."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION
+from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, VELOCITY
 
 
 class CommandDeadZone(Effect):
@@ -45,9 +45,12 @@ class CommandDeadZone(Effect):
             command = s[0]
         command = min(max(s[0], command - p[3]), command + p[3]) if p[3] > 0.0 else command
         s[0] = command
-        difference = command - x[MOTOR_POSITION, j]
+        if p[0] <= 0.0 and p[1] <= 0.0:
+            return command
+        reading = x[MOTOR_POSITION, j] + dt * x[VELOCITY, j]  # that of the last step, carried on to this one
+        difference = command - reading
         if abs(difference) <= p[1]:
-            return x[MOTOR_POSITION, j]
+            return reading
         if p[0] > 0.0:
             return command - min(max(difference, -p[0]), p[0])
         return command

@@ -1,0 +1,57 @@
+"""Verb: fit a rig's constants and the effects that you name, and see the error fall."""
+
+from __future__ import annotations
+
+from omegaconf import DictConfig
+
+from tactile_cube.cli import verb
+
+
+@verb("identify")
+def main(config: DictConfig) -> None:
+    """Write model.yaml, identification.json and report.html; print the staircase of errors."""
+    import json
+    import shlex
+    import sys
+    import time
+    from pathlib import Path
+
+    from hydra.core.hydra_config import HydraConfig
+
+    from tactile_cube.drivetrain.model_file import write_model
+    from tactile_cube.identification.identification import identify
+    from tactile_cube.identification.in_words import staircase
+    from tactile_cube.identification.recommended import model_file
+    from tactile_cube.measurement.comparison import compare
+    from tactile_cube.measurement.recording import read_recording
+    from tactile_cube.visualization.diagnosis_report import identification_report
+    from tactile_cube.visualization.report import write_report
+
+    begin = time.perf_counter()
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    recording = read_recording(config.recording)
+    for line in recording.warnings:
+        print(f"warning: {line}", file=sys.stderr)
+
+    def say(line: str) -> None:
+        print(f"[{time.perf_counter() - begin:5.1f} s] {line}", file=sys.stderr, flush=True)
+
+    found = identify(recording, list(config.effects), config.engine, config.step, config.seed, say)
+    command = shlex.join(["python", "-m", "tactile_cube.identify", *sys.argv[1:]])
+    model = model_file(recording, found.fitted, found.errors(), found.held_out, command, config.seed)
+    write_model(model, folder / "model.yaml")
+    stages = {name: summary.overall for name, summary in found.stages.items()} | {"noise_floor": found.floor.overall}
+    joints = {name: summary.joints for name, summary in found.stages.items()}
+    result = {"error": stages, "joints": joints, "held_out": found.held_out, "model": model.model_dump()}
+    result["seconds"] = round(time.perf_counter() - begin, 2)
+    (folder / "identification.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
+    after = compare(recording, model, config.engine, config.step)
+    write_report(
+        identification_report(after, stages, joints, command, str(folder / "model.yaml")), folder / "report.html"
+    )
+    print(staircase(stages, model))
+    print(f"model: {folder / 'model.yaml'}\nreport: {folder / 'report.html'}")
+
+
+if __name__ == "__main__":
+    main()
