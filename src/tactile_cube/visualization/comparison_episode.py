@@ -12,6 +12,7 @@ from rerun.urdf import UrdfTree
 
 from tactile_cube.measurement.comparison import Comparison
 from tactile_cube.visualization.comparison_figures import marked
+from tactile_cube.visualization.solid_links import fill_shapes
 
 Array = NDArray[np.float64]
 TIMELINE = "time"
@@ -22,7 +23,9 @@ COLORS = {
     "command": (140, 140, 140),
     "measured": (240, 240, 240),
     "simulated": (80, 150, 255),
-    "failing": (230, 60, 60),
+    "measured - simulated": (80, 150, 255),
+    "measured, failing": (230, 60, 60),
+    "measured - simulated, failing": (230, 60, 60),
 }
 
 
@@ -89,6 +92,7 @@ def _log_robot(stream: rr.RecordingStream, comparison: Comparison, starts: list[
         file.write_text(recording.urdf, encoding="utf-8")
         tree = UrdfTree.from_file_path(file, entity_path_prefix="robot", static_transform_entity_path="robot/static")
         tree.log_urdf_to_recording(stream)
+    fill_shapes(stream, tree, recording.urdf)
     stride = max(1, round(recording.rate / POSE_RATE))
     time = np.concatenate([start + t.time[::stride] for start, t in zip(starts, recording.trials, strict=True)])
     angles = np.concatenate([trial.position[::stride] for trial in recording.trials])
@@ -110,41 +114,29 @@ def _joint_angle(comparison: Comparison, name: str, angles: Array) -> Array | No
 
 
 def _log_joint(stream: rr.RecordingStream, comparison: Comparison, index: int, joint: str, starts: list[float]) -> None:
-    trials = comparison.recording.trials
-    stride = max(1, round(comparison.recording.rate / SIGNAL_RATE))
+    recording, trials = comparison.recording, comparison.recording.trials
+    stride = max(1, round(recording.rate / SIGNAL_RATE))
 
-    def joined(parts: Sequence[Array]) -> Array:
-        return np.concatenate([part[::stride] for part in parts])
+    def joined(parts: Sequence[Array], pause: float = np.nan) -> Array:
+        """All trials on one time line; a missing sample after each interrupts the curve."""
+        return np.concatenate([np.append(part[::stride], pause) for part in parts])
 
     time = joined([start + trial.time for start, trial in zip(starts, trials, strict=True)])
-    residual = joined([error[:, index] for error in comparison.residuals])
-    signals = {"measured": joined([trial.position[:, index] for trial in trials])}
-    signals["simulated"] = joined([one.position[:, index] for one in comparison.simulated])
-    if not comparison.recording.torque_controlled:
-        signals = {"command": joined([trial.command[:, index] for trial in trials])} | signals
+    time = np.where(np.isnan(time), np.roll(time, 1) + 1e-3, time)
     failing = np.zeros(len(time), dtype=bool)
     for number, start in enumerate(starts):
         for begin, end in marked(comparison, number, index):
             failing |= (time >= start + begin) & (time <= start + end)
-    for name, values in signals.items():
-        _send(stream, f"joints/{joint}/angle/{name}", time, values, name, COLORS[name])
-    _send(
-        stream,
-        f"joints/{joint}/angle/failing",
-        time,
-        np.where(failing, signals["measured"], np.nan),
-        "failing",
-        COLORS["failing"],
-    )
-    _send(stream, f"joints/{joint}/error/residual", time, 1e3 * residual, "measured - simulated", COLORS["simulated"])
-    _send(
-        stream,
-        f"joints/{joint}/error/failing",
-        time,
-        np.where(failing, 1e3 * residual, np.nan),
-        "failing",
-        COLORS["failing"],
-    )
+    measured = joined([trial.position[:, index] for trial in trials])
+    residual = 1e3 * joined([error[:, index] for error in comparison.residuals])
+    angle, error = f"joints/{joint}/angle", f"joints/{joint}/error"
+    if not recording.torque_controlled:
+        _send(stream, f"{angle}/command", time, joined([trial.command[:, index] for trial in trials]), "command")
+    simulated = joined([one.position[:, index] for one in comparison.simulated])
+    _send(stream, f"{angle}/simulated", time, simulated, "simulated")
+    for entity, name, values in ((angle, "measured", measured), (error, "measured - simulated", residual)):
+        _send(stream, f"{entity}/good", time, np.where(failing, np.nan, values), name)
+        _send(stream, f"{entity}/failing", time, np.where(failing, values, np.nan), f"{name}, failing")
 
 
 def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list[float]) -> None:
@@ -159,12 +151,9 @@ def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list
     stream.reset_time()
 
 
-def _send(
-    stream: rr.RecordingStream, entity: str, time: Array, values: Array, name: str, color: tuple[int, ...]
-) -> None:
-    stream.log(
-        entity, rr.SeriesLines(names=[name], colors=[color], widths=[2.5 if name == "failing" else 1.2]), static=True
-    )
+def _send(stream: rr.RecordingStream, entity: str, time: Array, values: Array, name: str) -> None:
+    style = rr.SeriesLines(names=[name], colors=[COLORS[name]], widths=[2.0 if "failing" in name else 1.2])
+    stream.log(entity, style, static=True)
     stream.send_columns(entity, _at(time), rr.Scalars.columns(scalars=values))
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import rerun as rr
@@ -18,13 +16,13 @@ from tactile_cube.evaluation.touch import FINGERS, TOUCH_FORCE
 from tactile_cube.hand import DLR_HAND2, HandModel, hand_urdf
 from tactile_cube.visualization.blueprint import TIMELINE, episode_blueprint
 from tactile_cube.visualization.scene import FACE_COLOURS, FACE_NORMALS, STICKER, STICKER_HEIGHT
+from tactile_cube.visualization.solid_links import fill_shapes
 
 ARROW_LENGTH = 0.03
 """Length of a contact arrow [m/N]."""
 POSE_RATE = 50.0
 """Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
 FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215))
-SHAPES: dict[str, Any] = {"box": rr.Boxes3D, "cylinder": rr.Cylinders3D, "sphere": rr.Ellipsoids3D}
 SIGNALS = {"q": 1.0, "q_m": 0.75, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
 JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255))
@@ -76,7 +74,7 @@ def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: HandModel
         file.write_text(urdf, encoding="utf-8")
         tree = UrdfTree.from_file_path(file, entity_path_prefix="hand", static_transform_entity_path="hand/static")
         tree.log_urdf_to_recording(stream)
-    _fill_shapes(stream, tree, urdf)
+    fill_shapes(stream, tree, urdf)
     orientation = Rotation.from_matrix(hand.rotation).as_quat()
     root = rr.Transform3D(
         translation=hand.position,
@@ -92,15 +90,6 @@ def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: HandModel
         if actuated in columns:
             transform = joint.compute_transform_columns(q[:, columns[actuated]].tolist(), clamp=False)
             stream.send_columns(f"hand/joint_transforms/{joint.name}", _at(time), transform)
-
-
-def _fill_shapes(stream: rr.RecordingStream, tree: UrdfTree, urdf: str) -> None:
-    """Draw the links solid; the importer draws cylinders, spheres and boxes as translucent wire frames."""
-    for link in ElementTree.fromstring(urdf).iter("link"):
-        paths = tree.get_visual_geometry_paths(str(link.get("name")))
-        for path, visual in zip(paths, link.findall("visual"), strict=True):
-            shape = next(archetype for tag, archetype in SHAPES.items() if visual.find(f"geometry/{tag}") is not None)
-            stream.log(path, shape.from_fields(fill_mode="solid"), static=True)
 
 
 def _log_cube(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
