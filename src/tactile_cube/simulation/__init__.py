@@ -1,5 +1,7 @@
 """The PyBullet world: bodies, 500 Hz physics steps, contacts, and every constant of an episode in one dataclass."""
 
+import tactile_cube.simulation.quiet_engine  # noqa: F401  # isort: skip (before whatever imports pybullet)
+
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.options import SimulationOptions
