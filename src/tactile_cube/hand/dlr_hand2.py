@@ -31,11 +31,12 @@ _FOUR = 4
 # Masses are estimates from the volumes of the public meshes; the finger with its drive base weighs 375 g (data sheet).
 # The middle link's capsule and the proximal one's are convex stand-ins; the tip is the published shape (scene), a
 # capsule from 16.5 mm to 33 mm, continued towards q4. All begin where their middle is the centre of mass: Bullet then
-# needs no compound shape around them, which is faster.
+# needs no compound shape around them, which is faster. The middle link is slimmer than the tip: with 15 mm an upright
+# finger would press on the cube's upper edge with its smooth middle link instead of its tip.
 _LINKS = (
     Link("knuckle", 0.0, 0.040, 0.0, None),
     Link("proximal", 0.075, 0.110, 0.0366, Capsule(0.0175, 0.0082, 0.065)),
-    Link("middle", 0.040, 0.055, 0.0177, Capsule(0.0150, -0.0026, 0.038)),
+    Link("middle", 0.040, 0.055, 0.0177, Capsule(0.0130, -0.0026, 0.038)),
     Link("distal", 0.045, 0.035, 0.0202, Capsule(0.01425, 0.0074, 0.033)),
 )
 

@@ -13,6 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand.model import JOINTS_PER_FINGER, Array, HandModel
 
+_ROOM = 2e-3
+"""A point of a face counts as reachable only with this gap [m], so that a grasp and its approach take the same one."""
 _REACHED = 1e-5
 """A fingertip this near to its target has reached it [m]."""
 
@@ -84,8 +86,10 @@ def grasp_angles(
     centre = np.asarray(position, dtype=np.float64)
     angles = []
     for k, finger in enumerate(hand.fingers):
-        points = finger.face * (half + hand.tip_radius + clearance) + _offsets_on_face(finger.face, half)
-        angles.append(_nearest_within_limits(hand, k, centre + points @ rotation.T))
+        offsets = _offsets_on_face(finger.face, half)
+        off, on = (finger.face * (half + hand.tip_radius + gap) for gap in (max(clearance, _ROOM), clearance))
+        chosen = offsets[_first_reachable(hand, k, centre + (off + offsets) @ rotation.T)]
+        angles.append(_within_limits(hand, k, centre + (on + chosen)[None] @ rotation.T)[0])
     return np.concatenate(angles)
 
 
@@ -98,10 +102,14 @@ def _offsets_on_face(face: Array, half: Array) -> Array:
     return grid[np.argsort(np.linalg.norm(grid, axis=1), kind="stable")]
 
 
-def _nearest_within_limits(hand: HandModel, finger: int, targets: Array) -> Array:
-    """Angles for the first target that limits and finger length allow, else the nearest miss (3,) [rad]."""
+def _first_reachable(hand: HandModel, finger: int, targets: Array) -> int:
+    """Index of the first target that limits and finger length allow, else of the nearest miss."""
+    tips = _finger_tips(hand, finger, _within_limits(hand, finger, targets))
+    miss = np.linalg.norm(tips - targets, axis=1)
+    return int(np.argmax(miss < _REACHED) if np.any(miss < _REACHED) else np.argmin(miss))
+
+
+def _within_limits(hand: HandModel, finger: int, targets: Array) -> Array:
+    """Angles (n, 3) [rad] towards targets (n, 3) [m], clipped to the action limits."""
     joints = slice(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1))
-    angles = np.clip(finger_angles(hand, finger, targets), hand.action_lower[joints], hand.action_upper[joints])
-    miss = np.linalg.norm(_finger_tips(hand, finger, angles) - targets, axis=1)
-    best = np.argmax(miss < _REACHED) if np.any(miss < _REACHED) else np.argmin(miss)
-    return np.asarray(angles[best])
+    return np.clip(finger_angles(hand, finger, targets), hand.action_lower[joints], hand.action_upper[joints])
