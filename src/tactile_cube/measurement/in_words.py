@@ -45,7 +45,6 @@ def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime
     return list(chosen.values())
 
 
-
 def _verb(rows: list[Regime], error: float) -> str:
     samples = sum(row.samples for row in rows)
     lag = sum(row.lag * row.samples for row in rows) / samples

@@ -45,7 +45,7 @@ def _check_reach(name: str, values: Array, joint: RigJoint, path: Path) -> list[
             f"{path}: column '{name}', row {row}: {values[row]:.4g} is far outside the limits {limits}; {hint}"
         )
     if outside[row] > SLACK and name.endswith("position"):
-        return [f"{path}: column '{name}', row {row}: {values[row]:.4g} is outside the limits {limits}"]
+        return [f"{path}: column '{name}', row {row}: {values[row]:.4g} is outside the limits {limits}; unit? joint?"]
     return []
 
 

@@ -1,4 +1,4 @@
-"""What a log shows of a simulation: the state at an instant, under the command of the period that ends or begins there."""
+"""What a log shows of a simulation: the state at an instant, under the command of the period that ends or begins."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,8 @@ Array = NDArray[np.float64]
 def impulses(command: Array, substeps: int) -> Array:
     """Commands (T, n) held from row to row, as the simulation's steps take them, (T * substeps, n).
 
-    A step acts on the speeds like an impulse at its beginning; a held command acts from there on, half a step later. The
-    mean of the commands before and after the instant makes the simulation second order in its step.
+    A step acts on the speeds like an impulse at its beginning; a held command acts from there on, half a step later.
+    The mean of the commands before and after the instant makes the simulation second order in its step.
     """
     fine = np.repeat(command, substeps, axis=0)
     fine[substeps::substeps] = 0.5 * (command[:-1] + command[1:])
@@ -18,7 +18,7 @@ def impulses(command: Array, substeps: int) -> Array:
 
 
 def half_jumps(acting: Array, substeps: int) -> Array:
-    """Half of the change of the command (T, n) at the beginning of each row, from what acted in each step (T * substeps, n).
+    """Half of the command's change (T, n) at the beginning of each row, from what acted in each step (T * substeps, n).
 
     With one step a row only the mean of two neighbouring changes is known.
     """

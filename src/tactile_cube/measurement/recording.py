@@ -13,6 +13,7 @@ from tactile_cube.measurement.columns import pick_columns
 from tactile_cube.measurement.description import Coupling, Description, TrialEntry, per_joint
 from tactile_cube.measurement.plausibility import check_assignment, check_units
 from tactile_cube.measurement.rig import Rig, read_rig
+from tactile_cube.measurement.statics import swap_warning
 from tactile_cube.measurement.tables import read_table
 from tactile_cube.measurement.timing import check_time, on_grid
 from tactile_cube.measurement.trial import Gains, Trial
@@ -117,7 +118,8 @@ def read_recording(folder: str | Path) -> Recording:
         raise
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
-    return recording
+    swapped = swap_warning(recording)
+    return recording if swapped is None else replace(recording, warnings=(*recording.warnings, swapped))
 
 
 def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:

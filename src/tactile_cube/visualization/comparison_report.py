@@ -212,7 +212,7 @@ def next_section(comparison: Comparison, model_path: str | None) -> Section:
         )
         command = f"python -m tactile_cube.train +experiment=finetune{model or ' model=MODEL.yaml'}"
     else:
-        said = "Something is missing. Ask which physical effect it is:"
+        said = "Constants may be off, or an effect missing: diagnose refits the first, then searches for the second."
         command = f"python -m tactile_cube.diagnose recording={folder}{model}"
     return Section("What to do next", [said], [Listing([command], code=True)])
 
