@@ -12,6 +12,9 @@ from torch import Tensor, nn
 
 LAYER_NORM_EPS = 1e-5
 
+FUSES = hasattr(torch.ops.mkldnn, "_linear_pointwise")
+"""Whether oneDNN's product with bias and ReLU in one is there; torch's compiler calls it, no public function does."""
+
 Activation = tuple[Tensor, Tensor, Tensor | None, Tensor | None]
 """A layer's input, its product before normalisation, and the normalisation's mean and 1/sigma."""
 
@@ -19,6 +22,15 @@ Activation = tuple[Tensor, Tensor, Tensor | None, Tensor | None]
 def parameter_count(sizes: Sequence[int]) -> int:
     """Weights and biases of a perceptron with these widths."""
     return sum((fan_in + 1) * fan_out for fan_in, fan_out in itertools.pairwise(sizes))
+
+
+def affine(x: Tensor, weight: Tensor, bias: Tensor, rectify: bool) -> Tensor:
+    """Product of input and weight plus bias, then ReLU if asked; bfloat16 on a CPU in one pass with the same bits."""
+    if x.dtype == torch.bfloat16 and FUSES and not x.is_cuda:
+        result: Tensor = torch.ops.mkldnn._linear_pointwise(x, weight.t(), bias, "relu" if rectify else "none", [], "")
+        return result
+    product = torch.addmm(bias, x, weight)
+    return product.relu_() if rectify else product
 
 
 class FlatPerceptron:
@@ -41,10 +53,10 @@ class FlatPerceptron:
         """Output (batch, sizes[-1]) and what `backward` needs."""
         kept: list[Activation] = []
         for weight, bias in self.layers[:-1]:
-            product = torch.addmm(bias, x, weight)
+            product = affine(x, weight, bias, rectify=not self.layer_norm)
             normalised, mean, inverse = self._normalise(product)
             kept.append((x, product, mean, inverse))
-            x = normalised.relu() if self.layer_norm else normalised.relu_()
+            x = normalised.relu() if self.layer_norm else product
         weight, bias = self.layers[-1]
         kept.append((x, x, None, None))
         return torch.addmm(bias, x, weight), kept

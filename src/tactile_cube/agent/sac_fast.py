@@ -21,6 +21,7 @@ from tactile_cube.agent.networks import (
 )
 from tactile_cube.agent.optimizer import build_optimizer
 from tactile_cube.agent.settings import AgentSettings
+from tactile_cube.agent.single_pass import SinglePass
 
 
 class FlatNetworks:
@@ -73,6 +74,7 @@ class FastSac:
         self.log_alpha = torch.tensor(self.settings.alpha_init, device=self.device).log()
         self._give_gradients()
         self.optimizer = build_optimizer([self.networks.master], self.log_alpha, self.settings)
+        self._single_pass = self._build_single_pass()
 
     def _give_gradients(self) -> None:
         networks = self.networks
@@ -81,17 +83,31 @@ class FastSac:
         networks.master.grad = networks.gradient if same else torch.zeros_like(networks.master)
         self.log_alpha.grad = torch.zeros_like(self.log_alpha)
 
+    def _build_single_pass(self) -> SinglePass | None:
+        networks = self.networks
+        if self.settings.precision != "bf16" or self.device.type != "cpu":
+            return None
+        vectors = (networks.master, networks.working, networks.gradient, networks.target_master)
+        return SinglePass(self.optimizer, *vectors, networks.target_working, self.settings.tau)
+
     @torch.no_grad()
     def update(self, batch: Batch) -> dict[str, Tensor]:
         """One step of critics, actor and temperature, then of the target critics."""
         metrics = self.compute_gradients(batch.to(self.device))
+        if self._single_pass is not None:
+            self.optimizer.step()  # the temperature alone
+            self._single_pass.step()
+        else:
+            self._step()
+        return metrics
+
+    def _step(self) -> None:
         networks = self.networks
         if networks.gradient.dtype != networks.master.dtype:
             networks.master.grad.copy_(networks.gradient)  # type: ignore[union-attr]
         self.optimizer.step()
         networks.target_master.lerp_(networks.critic_part, self.settings.tau)
         networks.refresh()
-        return metrics
 
     @torch.no_grad()
     def compute_gradients(self, batch: Batch) -> dict[str, Tensor]:
