@@ -16,6 +16,7 @@ from tactile_cube.training.checkpoint import FILE, load_checkpoint, require_same
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
+from tactile_cube.training.heap import keep_freed_memory
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import Loggers, MetricLogger
 from tactile_cube.training.loop import Learner
@@ -52,6 +53,7 @@ def build_run(
         InputError: a checkpoint that is damaged or made with other settings, an unusable `init_from`.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    keep_freed_memory()
     torch.set_num_threads(training.threads)
     torch.manual_seed(seed)
     saved = _saved_state(folder, training, config)
