@@ -41,14 +41,19 @@ def drive(x, c, dt, memory):
     """Command to motor torque, q_m and the further torques on the joint."""
     for j in range(n):
         x[MEASURED_VELOCITY, j] = x[VELOCITY, j]
+        x[DAMPING, j] = 1.0
     effects_velocity_sensor(x, c, dt, memory)
     for j in range(n):
         a = c * n + j
         x[CONTROLLER_TORQUE, j] = impedance_torque(
             x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j],
-            memory[KP + a], memory[KD + a], memory[COMPLIANCE + a], memory[EXTRA + a], memory[TORQUE_LIMIT + a],
+            memory[KP + a], memory[KD + a], memory[COMPLIANCE + a] + memory[EXTRA_COMPLIANCE + a],
+            memory[EXTRA + a], memory[TORQUE_LIMIT + a],
         )
         x[TORQUE, j] = x[CONTROLLER_TORQUE, j]
+        soft = memory[KP + a] * (memory[COMPLIANCE + a] + memory[EXTRA_COMPLIANCE + a])
+        limited = abs(x[CONTROLLER_TORQUE, j]) >= memory[TORQUE_LIMIT + a]
+        x[DAMPING, j] = 0.0 if limited else x[DAMPING, j] * memory[KD + a] / (1.0 + soft)
     effects_motor_torque(x, c, dt, memory)
     for j in range(n):
         x[DEFLECTION, j] = memory[COMPLIANCE + c * n + j] * x[TORQUE, j]
@@ -58,11 +63,15 @@ def drive(x, c, dt, memory):
     effects_position_sensor(x, c, dt, memory)
     for j in range(n):
         compliance = memory[COMPLIANCE + c * n + j]
-        # what the closed form does not know, exactly zero without such effects
+        # what the closed form does not know, exactly zero without such effects: the slope of a further deflection,
+        # which would not converge if it was taken for a constant, and the rest
+        more = x[DEFLECTION, j] - compliance * x[TORQUE, j]
+        slope = max(more / x[TORQUE, j], 0.0) if abs(x[TORQUE, j]) > 1e-9 else 0.0
+        memory[EXTRA_COMPLIANCE + c * n + j] = slope
         memory[EXTRA + c * n + j] = (
             (x[MOTOR_POSITION, j] - (x[POSITION, j] + x[DEFLECTION, j]))
-            + (x[DEFLECTION, j] - compliance * x[TORQUE, j])
-            + compliance * (x[TORQUE, j] - x[CONTROLLER_TORQUE, j])
+            + (more - slope * x[TORQUE, j])
+            + (compliance + slope) * (x[TORQUE, j] - x[CONTROLLER_TORQUE, j])
         )
         x[JOINT_TORQUE, j] = 0.0
     effects_joint_torque(x, c, dt, memory)
@@ -70,15 +79,12 @@ def drive(x, c, dt, memory):
 
 @inner
 def add_midpoint_damping(x, c, dt, memory):
-    """The controller's damping acts on the mean of the speeds before and after the step: second order in dt.
+    """Damping acts on the mean of the speeds before and after the step: second order in dt.
 
     An explicit K_D dq would act half a step late, which fitting to a measurement takes for a delay.
     """
     for j in range(n):
-        a = c * n + j
-        if abs(x[CONTROLLER_TORQUE, j]) < memory[TORQUE_LIMIT + a]:
-            damping = memory[KD + a] / (1.0 + memory[KP + a] * memory[COMPLIANCE + a])
-            memory[JOINT_MASS_MATRIX + j * n + j] += 0.5 * dt * damping
+        memory[JOINT_MASS_MATRIX + j * n + j] += 0.5 * dt * x[DAMPING, j]
 
 
 @inner

@@ -33,4 +33,6 @@ DIRECTION = 13
 """Sign of the speed; at rest, the sign of the torque that pushes the joint."""
 FRICTION = 14
 """Largest dry-friction torque against DIRECTION, zero or more [N m]."""
-ROWS = 15
+DAMPING = 15
+"""Slope of the torque on the joint against its present speed: what acts at the middle of a step [N m s/rad]."""
+ROWS = 16

@@ -11,6 +11,9 @@ from tactile_cube.measurement.recording import Recording
 Array = NDArray[np.float64]
 TOLERANCE = {"kd": (0.75, 1.3), "static_friction": (0.5, 1.6), "reflected_inertia": (0.6, 1.6), "stiffness": (0.8, 1.25)}
 """Part of the nominal value at which a constant still counts as the nominal one; more is an effect that is missing."""
+SPREAD = 0.12  # relative standard deviation of a true constant about its nominal value
+CREEP_SPREAD = 0.1  # [rad/s per N m]
+OFFSET_SPREAD = 0.01  # [rad]
 LARGEST_CREEP = 1.0  # [rad/s per N m] joints that stick give way slowly where friction is regularised
 LARGEST_OFFSET = 0.06  # [rad]
 
@@ -36,13 +39,13 @@ def base_unknowns(recording: Recording) -> tuple[Unknown, ...]:
     nominal = nominal_model(recording).constants
     joints = range(len(recording.joints))
     constants = [
-        Unknown("constant", key, j, nominal[key][j] * low, nominal[key][j] * high, 0.2 * nominal[key][j])
+        _around_nominal(key, j, float(nominal[key][j]), low, high)
         for key, (low, high) in TOLERANCE.items()
         for j in joints
         if 0.0 < nominal[key][j] < np.inf
     ]
     creeps = [
-        Unknown("constant", "friction_creep", j, 0.0, LARGEST_CREEP, 0.05)
+        Unknown("constant", "friction_creep", j, 0.0, LARGEST_CREEP, 0.05, spread=CREEP_SPREAD)
         for j in joints
         if nominal["static_friction"][j] > 0.0
     ]
@@ -53,7 +56,13 @@ def offset_unknowns(recording: Recording) -> tuple[Unknown, ...]:
     """The joint offsets of each initialisation of a recording."""
     initialisations = sorted({trial.initialisation for trial in recording.trials})
     return tuple(
-        Unknown("posture", "offset", j, -LARGEST_OFFSET, LARGEST_OFFSET, 0.05, initialisation)
+        Unknown("posture", "offset", j, -LARGEST_OFFSET, LARGEST_OFFSET, 0.05, initialisation, spread=OFFSET_SPREAD)
         for initialisation in initialisations
         for j in range(len(recording.joints))
+    )
+
+
+def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float) -> Unknown:
+    return Unknown(
+        "constant", key, joint, nominal * low, nominal * high, 0.2 * nominal, centre=nominal, spread=SPREAD * nominal
     )

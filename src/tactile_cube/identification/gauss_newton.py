@@ -13,7 +13,7 @@ from tactile_cube.identification.problem import Problem
 
 Array = NDArray[np.float64]
 CONVERGED = 2e-3  # relative gain below which a fit ends
-POSTURE_SPREAD = 0.02  # [rad] joint offsets expected beforehand
+CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,16 @@ class Fit:
         model: with the fitted values.
         unknowns: what was fitted.
         cost: marginal squared error, in units of the sensor's variance.
+        surprise: squared distance of the unknowns from what was expected, in standard deviations.
         residual: (G, R) weighted.
         columns: (G, R, P) derivatives per scale at (or near) the fitted values.
-        information: (P, P) in units of the scales, prior included.
+        information: (P, P) of the data, in units of the scales.
     """
 
     model: Model
     unknowns: tuple[Unknown, ...]
     cost: float
+    surprise: float
     residual: Array = field(repr=False)
     columns: Array = field(repr=False)
     information: Array = field(repr=False)
@@ -60,64 +62,73 @@ def fit(
         prediction, fresh = problem.columns(model, unknowns)
         residual = problem.residual(prediction)
         columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
-        cost = float(problem.cost(residual).sum()) + _prior_cost(model, everything)
-        if best is not None and cost > best.cost:
+        cost = float(problem.cost(residual).sum())
+        temper = _temper(problem, cost if best is None else min(cost, best.cost))
+        if best is not None and cost + temper * surprise(model, everything) >= best.cost + temper * best.surprise:
             damping *= 10.0
         else:
             gain = np.inf if best is None else (best.cost - cost) / max(best.cost, 1e-9)
-            best = Fit(model, everything, cost, residual, columns, _information(problem, columns, everything))
-            gradient = _gradient(problem, best)
+            information = _information(problem, columns)
+            best = Fit(model, everything, cost, surprise(model, everything), residual, columns, information)
             damping *= 0.3
             if gain < CONVERGED:
                 break
-        model = _stepped(best, gradient, damping)
+        model = _stepped(problem, best, temper, damping)
     assert best is not None
     return _finish(problem, best, model)
 
 
+def _temper(problem: Problem, cost: float) -> float:
+    """Weight of what is expected beforehand.
+
+    While the model is wrong its error is far above the noise and remembers itself; taking it for white noise would let
+    the constants soak it up. So expectations weigh as much more as the error is larger and longer than noise.
+    """
+    return CORRELATED * max(1.0, cost / max(np.count_nonzero(problem.weight), 1))
+
+
 def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) -> Fit:
     """A fit with residual, columns and information of a problem whose starts were linearised anew."""
-    information = _information(problem, columns, fitted.unknowns)
-    return Fit(fitted.model, fitted.unknowns, fitted.cost, problem.residual(prediction), columns, information)
+    residual, information = problem.residual(prediction), _information(problem, columns)
+    cost = float(problem.cost(residual).sum())
+    return Fit(fitted.model, fitted.unknowns, cost, fitted.surprise, residual, columns, information)
 
 
 def _finish(problem: Problem, best: Fit, last: Model) -> Fit:
     """The last step is taken too if it helps."""
     residual = problem.residual(problem.predictions([last])[0])
-    cost = float(problem.cost(residual).sum()) + _prior_cost(last, best.unknowns)
-    if cost >= best.cost:
+    cost, odd = float(problem.cost(residual).sum()), surprise(last, best.unknowns)
+    temper = _temper(problem, min(cost, best.cost))
+    if cost + temper * odd >= best.cost + temper * best.surprise:
         return best
-    return Fit(last, best.unknowns, cost, residual, best.columns, best.information)
+    return Fit(last, best.unknowns, cost, odd, residual, best.columns, best.information)
 
 
-def _precision(unknowns: Sequence[Unknown]) -> Array:
-    return np.array([(u.scale / POSTURE_SPREAD) ** 2 if u.kind == "posture" else 1e-6 for u in unknowns])
+def surprise(model: Model, unknowns: Sequence[Unknown]) -> float:
+    """Squared distance from what is expected beforehand, in standard deviations."""
+    return float(sum(((u.of(model) - u.centre) / u.spread) ** 2 for u in unknowns))
 
 
-def _prior_cost(model: Model, unknowns: Sequence[Unknown]) -> float:
-    postures = [u.of(model) for u in unknowns if u.kind == "posture"]
-    return float(np.sum(np.square(postures)) / POSTURE_SPREAD**2)
+def precision(unknowns: Sequence[Unknown]) -> Array:
+    """Weights (P,) of the expectations, per squared scale; a trace for those without, so that no direction is flat."""
+    return np.array([(u.scale / u.spread) ** 2 + 1e-9 for u in unknowns])
 
 
-def _information(problem: Problem, columns: Array, unknowns: Sequence[Unknown]) -> Array:
-    gram = np.einsum("grp,grq->pq", columns, problem.free(columns), optimize=True)
-    return np.asarray(gram + np.diag(_precision(unknowns)))
+def _information(problem: Problem, columns: Array) -> Array:
+    return np.asarray(np.einsum("grp,grq->pq", columns, problem.free(columns), optimize=True))
 
 
-def _gradient(problem: Problem, fitted: Fit) -> Array:
-    pull = np.einsum("grp,gr->p", fitted.columns, problem.free(fitted.residual), optimize=True)
-    values = read_all(fitted.model, fitted.unknowns) / np.array([u.scale for u in fitted.unknowns])
-    postures = np.array([u.kind == "posture" for u in fitted.unknowns])
-    return np.asarray(pull - np.where(postures, _precision(fitted.unknowns) * values, 0.0))
-
-
-def _stepped(fitted: Fit, gradient: Array, damping: float) -> Model:
+def _stepped(problem: Problem, fitted: Fit, temper: float, damping: float) -> Model:
     """Damped Gauss-Newton step; an unknown that would leave its bounds stops there and the others are solved anew."""
     values = read_all(fitted.model, fitted.unknowns)
-    scale = np.array([u.scale for u in fitted.unknowns])
-    low = np.array([u.low for u in fitted.unknowns])
-    high = np.array([u.high for u in fitted.unknowns])
-    step = bounded_step(fitted.information, gradient, damping, (low - values) / scale, (high - values) / scale)
+    scale, centre, low, high = (
+        np.array([getattr(u, key) for u in fitted.unknowns]) for key in ("scale", "centre", "low", "high")
+    )
+    weight = temper * precision(fitted.unknowns)
+    pull = np.einsum("grp,gr->p", fitted.columns, problem.free(fitted.residual), optimize=True)
+    gradient = pull - weight * (values - centre) / scale
+    information = fitted.information + np.diag(weight)
+    step = bounded_step(information, gradient, damping, (low - values) / scale, (high - values) / scale)
     return put_all(fitted.model, fitted.unknowns, values + step * scale)
 
 

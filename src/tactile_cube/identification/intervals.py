@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.base import base_unknowns
 from tactile_cube.identification.candidates import model_unknowns
-from tactile_cube.identification.gauss_newton import Fit, fit
+from tactile_cube.identification.gauss_newton import Fit, fit, precision
 from tactile_cube.identification.model import Model, read_all
 from tactile_cube.identification.problem import Problem
 from tactile_cube.measurement.recording import Recording
@@ -42,7 +42,7 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)
-    inverse = np.linalg.pinv(fitted.information)
+    inverse = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)))
     segments, unknowns = scores.shape
     correction = segments / max(segments - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
@@ -65,6 +66,8 @@ class Unknown:
         high: largest value.
         scale: size of a noticeable change; finite differences take a part of it.
         initialisation: of a joint offset.
+        centre: what is expected beforehand.
+        spread: standard deviation of that expectation.
     """
 
     kind: Literal["constant", "posture", "effect"]
@@ -74,6 +77,8 @@ class Unknown:
     high: float
     scale: float
     initialisation: int = 0
+    centre: float = 0.0
+    spread: float = math.inf
 
     def of(self, model: Model) -> float:
         """Its value in a model."""

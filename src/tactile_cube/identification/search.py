@@ -24,7 +24,10 @@ Array = NDArray[np.float64]
 FLOOR = 1.1  # error / sensor noise at which nothing is left to explain
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
 SIGNIFICANT = 0.01  # after Holm's correction
-REFITTED, FINALISTS = 12, 4  # candidates that are refitted with the base's columns frozen, and with everything free
+REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
+BRIEF = 3  # iterations of a brief refit
+FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
+COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 STRETCHES = 12  # enough data to search on; the final fit takes all
 DEEPEST = 3  # effects in combination
@@ -123,7 +126,7 @@ class Search:
             found = [e for parent in beam for e in self.extend(parent)]
             if not scores:
                 scores = tuple(self.last_scores)
-            better = [e for e in found if e.gain > SMALLEST_GAIN and e.p_value < SIGNIFICANT]
+            better = [e for e in found if worthwhile(e, len(levels))]
             if not better:
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
@@ -154,8 +157,21 @@ class Search:
         )
         chosen = with_groups(self.last_scores)[:REFITTED]
         self.say(f"screened {len(self.candidates)} candidates, refitting {len(chosen)}")
-        refitted = sorted((self.refit(frozen, candidate) for candidate in chosen), key=lambda pair: pair[1].cost)
-        return [self.finish(parent, candidate, fitted) for candidate, fitted in refitted[:FINALISTS]]
+        raced = self.race(frozen, chosen)
+        return [self.finish(parent, candidate, fitted) for candidate, fitted in raced[:FINALISTS]]
+
+    def race(self, frozen: Fit, chosen: Sequence[Candidate]) -> list[tuple[Candidate, Fit]]:
+        """Refit briefly, then the leaders at length; those that stay far behind drop out. Best first."""
+        brief = sorted((self.refit(frozen, candidate, BRIEF) for candidate in chosen), key=lambda pair: pair[1].cost)
+        leaders = [(c, self.continued(frozen, f)) for c, f in brief[:RACED]]
+        leaders.sort(key=lambda pair: pair[1].cost)
+        for candidate, fitted in leaders:
+            self.say(f"  {np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)):8.3f}  {candidate.label}")
+        return [pair for pair in leaders if pair[1].cost <= FAR_BEHIND * leaders[0][1].cost]
+
+    def continued(self, frozen: Fit, fitted: Fit) -> Fit:
+        """The same fit for longer."""
+        return fit(self.problem, fitted.model, fitted.unknowns[len(frozen.unknowns) :], iterations=5, frozen=frozen)
 
     def frozen(self, fitted: Fit) -> Fit:
         """A fit with its residual and columns taken anew on this problem, to build on."""
@@ -163,12 +179,10 @@ class Search:
         prediction, columns = self.problem.columns(fitted.model, fitted.unknowns)
         return renewed(self.problem, fitted, prediction, columns)
 
-    def refit(self, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
+    def refit(self, frozen: Fit, candidate: Candidate, iterations: int = 6) -> tuple[Candidate, Fit]:
         """Fit a candidate's numbers beside the frozen columns of its parent."""
         model, unknowns = candidate.added_to(frozen.model, placed(candidate, self.fitted))
-        fitted = fit(self.problem, model, unknowns, iterations=6, frozen=frozen)
-        self.say(f"  {np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)):8.3f}  {candidate.label}")
-        return candidate, fitted
+        return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
 
     def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit) -> Explanation:
         """Fit everything and judge on the held-out trials."""
@@ -184,6 +198,17 @@ class Search:
         )
         self.say(f"  held-out error {explanation.error:.3f}  p {corrected:.1e}  {explanation.label}")
         return explanation
+
+
+def worthwhile(explanation: Explanation, depth: int) -> bool:
+    """Whether an effect earns its place: significantly, by more than a few per cent, and the further ones decisively."""
+    if explanation.gain < SMALLEST_GAIN or explanation.p_value > SIGNIFICANT:
+        return False
+    if depth == 0 or explanation.error <= FLOOR:
+        return True
+    before = explanation.judgement.costs.sum() / (1.0 - explanation.gain)
+    samples = explanation.judgement.samples.sum()
+    return bool(before - explanation.judgement.costs.sum() > COMPLETED * (before - samples))
 
 
 def some(stretches: Stretches, count: int) -> Stretches:

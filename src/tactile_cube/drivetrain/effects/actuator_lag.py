@@ -3,7 +3,7 @@
 from math import exp
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import TORQUE
+from tactile_cube.drivetrain.signals import DAMPING, TORQUE
 
 
 class ActuatorLag(Effect):
@@ -31,5 +31,7 @@ class ActuatorLag(Effect):
         if s[1] == 0.0:
             s[0] = x[TORQUE, j]
             s[1] = 1.0
-        s[0] += (x[TORQUE, j] - s[0]) * (1.0 - exp(-dt / p[0]))
+        share = 1.0 - exp(-dt / p[0])
+        x[DAMPING, j] *= share
+        s[0] += (x[TORQUE, j] - s[0]) * share
         return s[0]

@@ -1,7 +1,6 @@
 """A drive that is softer than stated."""
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import DEFLECTION, TORQUE
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Stage, View
 
 
 class Elasticity(Effect):
@@ -11,14 +10,9 @@ class Elasticity(Effect):
     """
 
     name = "elasticity"
-    stage = Stage.DEFLECTION
-    parameters = (
-        Parameter(
-            "compliance", unit="rad/(N m)", neutral=0.0, low=-0.03, high=1.0, typical=0.05, source="5-50 N m/rad"
-        ),
-    )
+    stage = Stage.MECHANISM
+    parameters = (Parameter("compliance", "rad/(N m)", 0.0, -0.03, 1.0, 0.05, "5-50 N m/rad"),)
 
     @staticmethod
-    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Deflection q_m - q [rad]."""
-        return x[DEFLECTION, j] + p[0] * x[TORQUE, j]
+    def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102
+        view("compliance")[..., place.joint] += p[..., 0]

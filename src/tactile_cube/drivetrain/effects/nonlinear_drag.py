@@ -1,7 +1,7 @@
 """Drag that grows with the square of the speed."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import JOINT_TORQUE, VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, JOINT_TORQUE, VELOCITY
 
 
 class NonlinearDrag(Effect):
@@ -27,4 +27,5 @@ class NonlinearDrag(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
+        x[DAMPING, j] += 2.0 * p[0] * abs(x[VELOCITY, j])
         return x[JOINT_TORQUE, j] - p[0] * x[VELOCITY, j] * abs(x[VELOCITY, j])

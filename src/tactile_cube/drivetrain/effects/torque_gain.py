@@ -1,7 +1,7 @@
 """A motor constant that is not the stated one."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import TORQUE
+from tactile_cube.drivetrain.signals import DAMPING, TORQUE
 
 
 class TorqueGain(Effect):
@@ -17,4 +17,5 @@ class TorqueGain(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Motor torque [N m]."""
+        x[DAMPING, j] *= 1.0 + p[0]
         return x[TORQUE, j] * (1.0 + p[0])

@@ -1,7 +1,7 @@
 """A torque limit below the stated one."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import TORQUE
+from tactile_cube.drivetrain.signals import DAMPING, TORQUE
 
 
 class TorqueSaturation(Effect):
@@ -27,4 +27,6 @@ class TorqueSaturation(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Motor torque [N m]."""
+        if abs(x[TORQUE, j]) > p[0]:
+            x[DAMPING, j] = 0.0
         return min(max(x[TORQUE, j], -p[0]), p[0])

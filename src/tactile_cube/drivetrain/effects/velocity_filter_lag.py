@@ -3,7 +3,7 @@
 from math import exp
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import MEASURED_VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, MEASURED_VELOCITY
 
 
 class VelocityFilterLag(Effect):
@@ -31,5 +31,7 @@ class VelocityFilterLag(Effect):
         if s[1] == 0.0:
             s[0] = x[MEASURED_VELOCITY, j]
             s[1] = 1.0
-        s[0] += (x[MEASURED_VELOCITY, j] - s[0]) * (1.0 - exp(-dt / p[0]))
+        share = 1.0 - exp(-dt / p[0])
+        x[DAMPING, j] *= share
+        s[0] += (x[MEASURED_VELOCITY, j] - s[0]) * share
         return s[0]

@@ -1,7 +1,7 @@
 """Friction proportional to the joint's speed."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import JOINT_TORQUE, VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, JOINT_TORQUE, VELOCITY
 
 
 class ViscousFriction(Effect):
@@ -28,4 +28,5 @@ class ViscousFriction(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
+        x[DAMPING, j] += p[0]
         return x[JOINT_TORQUE, j] - p[0] * x[VELOCITY, j]
