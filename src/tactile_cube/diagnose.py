@@ -6,6 +6,8 @@ from omegaconf import DictConfig
 
 from tactile_cube.cli import verb
 
+SHAPES = 3  # of the missing torque of one joint, most telling first
+
 
 @verb("diagnose")
 def main(config: DictConfig) -> None:
@@ -24,7 +26,12 @@ def main(config: DictConfig) -> None:
     from tactile_cube.identification.diagnosis_json import as_json
     from tactile_cube.identification.in_words import answer
     from tactile_cube.identification.recommended import model_file
+    from tactile_cube.measurement.comparison import compare
     from tactile_cube.measurement.recording import read_recording
+    from tactile_cube.visualization.comparison_episode import write_comparison
+    from tactile_cube.visualization.comparison_summary import markdown
+    from tactile_cube.visualization.diagnosis_report import diagnosis_report
+    from tactile_cube.visualization.report import write_report
 
     begin = time.perf_counter()
     folder = Path(HydraConfig.get().runtime.output_dir)
@@ -42,7 +49,15 @@ def main(config: DictConfig) -> None:
     write_model(model, folder / "model.yaml")
     result = as_json(diagnosis, write_experiment(diagnosis, folder), time.perf_counter() - begin)
     (folder / "diagnosis.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
+    before = compare(recording, None, "fast", config.step, floor=diagnosis.floor)
+    after = compare(recording, model, config.engine, config.step, floor=diagnosis.floor)
+    shapes = [shape for one in diagnosis.unexplained for shape in one.shapes[:SHAPES]]
+    path = str(folder / "model.yaml")
+    page = diagnosis_report(result, before, after, command, path, shapes, diagnosis.experiment)
+    write_report(page, folder / "report.html")
+    write_comparison(after, folder / "diagnosis.rrd", markdown(after))
     print(answer(result, diagnosis.experiment))
+    print(f"report: {folder / 'report.html'}")
     print(f"model: {folder / 'model.yaml'}\ndiagnosis: {folder / 'diagnosis.json'}")
 
 

@@ -24,6 +24,8 @@ def main(config: DictConfig) -> None:
     from tactile_cube.identification.recommended import model_file
     from tactile_cube.measurement.comparison import compare
     from tactile_cube.measurement.recording import read_recording
+    from tactile_cube.visualization.comparison_episode import write_comparison
+    from tactile_cube.visualization.comparison_summary import markdown
     from tactile_cube.visualization.diagnosis_report import identification_report
     from tactile_cube.visualization.report import write_report
 
@@ -45,10 +47,11 @@ def main(config: DictConfig) -> None:
     result = {"error": stages, "joints": joints, "held_out": found.held_out, "model": model.model_dump()}
     result["seconds"] = round(time.perf_counter() - begin, 2)
     (folder / "identification.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
-    after = compare(recording, model, config.engine, config.step)
+    after = compare(recording, model, config.engine, config.step, floor=found.floor)
     write_report(
         identification_report(after, stages, joints, command, str(folder / "model.yaml")), folder / "report.html"
     )
+    write_comparison(after, folder / "identification.rrd", markdown(after))
     print(staircase(stages, model))
     print(f"model: {folder / 'model.yaml'}\nreport: {folder / 'report.html'}")
 

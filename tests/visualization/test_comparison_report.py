@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
+from tactile_cube.identification.next_experiment import Experiment
+from tactile_cube.identification.residual_shape import Shape
 from tactile_cube.measurement.comparison import Comparison, compare
 from tactile_cube.measurement.recording import read_recording
 from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
 from tactile_cube.visualization.comparison_report import comparison_report
 from tactile_cube.visualization.comparison_summary import markdown, summary
-from tactile_cube.visualization.diagnosis_report import ResidualShape, diagnosis_report, identification_report
+from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
 from tactile_cube.visualization.report import Report, Section, Table, write_report
 from tests.measurement.small_rig import write
 
@@ -104,17 +106,22 @@ def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals(
 
 def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison, tmp_path: Path) -> None:
     unsure = DIAGNOSIS | {"verdict": "ambiguous", "next_experiment": "next_experiment.csv"}
-    report = diagnosis_report(unsure, comparison, None, "cmd", expectation="the delay shows as 4 mrad")
+    time = np.linspace(0, 1, 50)
+    wave = np.sin(time)[:, None] * [1.0, 1.0]
+    predictions = {"command_delay@a": wave, "actuator_lag@a": 1.01 * wave}
+    experiment = Experiment("multisine", ("a", "b"), time, wave, 0.004, "a", predictions)
+    report = diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment)
     text = page(report, tmp_path / "d.html")
     assert "What to record next" in text
     assert "next_experiment.csv" in text
-    assert "the delay shows as 4 mrad" in text
+    assert "at least 4 mrad" in text
+    assert "actuator_lag@a" in text
 
 
 def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Comparison, tmp_path: Path) -> None:
     unknown = DIAGNOSIS | {"verdict": "unknown_effect", "effects": [], "unexplained_joints": ["b"]}
     x = np.linspace(-1, 1, 12)
-    shape = ResidualShape("b", "position of b [rad]", x, 0.01 * x, np.full(12, 0.002), 0.83)
+    shape = Shape("b", "position of b [rad]", x, 0.01 * x, np.full(12, 0.002), 0.83)
     text = page(diagnosis_report(unknown, comparison, None, "cmd", shapes=[shape]), tmp_path / "d.html")
     assert "explains 83 % of it" in text
     assert "not explained: b" in text

@@ -12,7 +12,7 @@ from tactile_cube.measurement.band import Band, simulate_band
 from tactile_cube.measurement.error import ErrorSummary, residuals, summarise
 from tactile_cube.measurement.in_words import where_it_fails
 from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.parameters import nominal_parameters, require_same_joints
+from tactile_cube.measurement.parameters import Parameters, nominal_parameters, require_same_joints
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.regimes import Regime, regimes
 from tactile_cube.measurement.replay import Engine, Simulated, replay
@@ -71,6 +71,7 @@ def compare(
     simulations: int = 0,
     spread: Mapping[str, float] | None = None,
     seed: int = 0,
+    floor: NoiseFloor | None = None,
 ) -> Comparison:
     """Simulate every trial freely from its start and describe what is left.
 
@@ -82,16 +83,17 @@ def compare(
         simulations: how many randomised simulations make the band; 0 for none.
         spread: relative half widths of constants without an interval, `offset` in rad.
         seed: of the randomised simulations.
+        floor: noise floor, if it is known already; by default found here.
     """
     if model is not None:
         require_same_joints(recording, model)
     parameters = nominal_parameters(recording, model)
     simulated = replay(recording, parameters, engine, step)
-    fine = replay(recording, parameters, "fast", step / FINER)
     trials, joints = recording.trials, recording.joints
-    step_size = summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], joints)
     errors = residuals(trials, [one.position for one in simulated])
-    summary, floor = summarise(errors, joints), noise_floor(recording, step_size)
+    summary = summarise(errors, joints)
+    if floor is None:
+        floor = noise_floor(recording, step_size_error(recording, parameters, simulated, step))
     table = regimes(trials, errors, joints)
     return Comparison(
         recording=recording,
@@ -108,6 +110,14 @@ def compare(
         stretches=_stretches(recording, errors, floor),
         band=simulate_band(recording, model, simulations, spread or {}, step, seed) if simulations else None,
     )
+
+
+def step_size_error(
+    recording: Recording, parameters: Parameters, simulated: list[Simulated], step: float
+) -> ErrorSummary:
+    """Difference between a simulation and the same one in much smaller steps."""
+    fine = replay(recording, parameters, "fast", step / FINER)
+    return summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
 
 
 def _stretches(recording: Recording, errors: list[Array], floor: NoiseFloor) -> list[Stretch]:

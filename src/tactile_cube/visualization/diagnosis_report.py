@@ -1,12 +1,10 @@
 """The report of `diagnose` and `identify`: what is missing, how sure, how far the error falls, what to record next."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tactile_cube.identification.next_experiment import Experiment
+from tactile_cube.identification.residual_shape import Shape
 from tactile_cube.measurement.comparison import Comparison
 from tactile_cube.visualization.comparison_report import (
     band_section,
@@ -16,11 +14,10 @@ from tactile_cube.visualization.comparison_report import (
     where_section,
 )
 from tactile_cube.visualization.numbers import mrad, p_value, short
-from tactile_cube.visualization.report import Callout, Figure, Listing, Report, Section, Table, Tile, Tone
-from tactile_cube.visualization.svg import SIMULATED, Axes, Band, Line, line_chart
+from tactile_cube.visualization.report import Figure, Listing, Report, Section, Table, Tile, Tone
+from tactile_cube.visualization.svg import PALETTE, SIMULATED, Axes, Band, Line, line_chart
 from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_chart
 
-Array = NDArray[np.float64]
 STAGES = {
     "nominal": "as stated by the owner",
     "refitted": "known constants refitted",
@@ -30,30 +27,9 @@ VERDICTS: dict[str, tuple[Tone, str]] = {
     "adequate": ("good", "Nothing is missing: the model is as good as this recording can tell."),
     "missing_effect": ("good", "The missing effect was found"),
     "ambiguous": ("warn", "Several effects explain this recording equally well"),
-    "unknown_effect": ("warn", "Something is missing that no effect of the catalogue explains"),
+    "unknown_effect": ("warn", "Something is missing that no effect of the catalogue explains."),
 }
 MOST_RANKED = 15
-
-
-@dataclass(frozen=True)
-class ResidualShape:
-    """The torque that the model lacks at a joint, averaged over bins of another signal.
-
-    Attributes:
-        joint: where it is missing.
-        against: the signal, with its unit, e.g. `position of q3 [rad]`.
-        centres: (bins,) of the signal.
-        mean: (bins,) [N m].
-        spread: (bins,) standard deviation [N m].
-        explained: share of the missing torque that a smooth function of this signal explains.
-    """
-
-    joint: str
-    against: str
-    centres: Array
-    mean: Array
-    spread: Array
-    explained: float
 
 
 def diagnosis_report(
@@ -62,8 +38,8 @@ def diagnosis_report(
     after: Comparison | None,
     command: str,
     model_path: str | None = None,
-    shapes: Sequence[ResidualShape] = (),
-    expectation: str = "",
+    shapes: Sequence[Shape] = (),
+    experiment: Experiment | None = None,
 ) -> Report:
     """The page of a diagnosis.
 
@@ -74,16 +50,17 @@ def diagnosis_report(
         command: the command line that made it.
         model_path: the recommended model's file.
         shapes: shape of what stays unexplained.
-        expectation: what the next experiment is expected to show.
+        experiment: what would tell the rivals apart.
     """
     tone, said = VERDICTS[diagnosis["verdict"]]
+    names = _names(diagnosis["effects"], " or " if diagnosis["verdict"] == "ambiguous" else " and ")
     sections = [
         _verdict_section(diagnosis),
-        staircase_section(diagnosis["error"], {}),
+        staircase_section(diagnosis["error"], diagnosis.get("error_joints", {})),
         *effect_section(diagnosis["effects"]),
         *shape_section(shapes),
         *ranking_section(diagnosis["ranking"]),
-        next_section(diagnosis, model_path, before, expectation),
+        next_section(diagnosis, model_path, before, experiment),
         recording_section(before.recording, before.model),
         where_section(before),
         overlay_section(after or before),
@@ -91,7 +68,7 @@ def diagnosis_report(
     ]
     return Report(
         title=f"What is missing? {before.recording.name}",
-        answer=f"{said}: {_names(diagnosis['effects'])}." if _names(diagnosis["effects"]) else said,
+        answer=f"{said}: {names}." if names else said,
         tone=tone,
         tiles=_tiles(diagnosis),
         sections=sections,
@@ -178,7 +155,7 @@ def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
     return [Section("What was found, and how sure that is", (), blocks)]
 
 
-def shape_section(shapes: Sequence[ResidualShape]) -> list[Section]:
+def shape_section(shapes: Sequence[Shape]) -> list[Section]:
     """What the missing torque depends on, where no effect of the catalogue explains it."""
     if not shapes:
         return []
@@ -219,37 +196,49 @@ def value_section(comparison: Comparison) -> Section:
     return Section("The constants", (), [Table(("", "value", "95 % interval", "owner's value", "unit"), rows)])
 
 
-def next_section(diagnosis: Mapping[str, Any], model_path: str | None, before: Comparison, expectation: str) -> Section:
+def next_section(
+    diagnosis: Mapping[str, Any], model_path: str | None, before: Comparison, experiment: Experiment | None
+) -> Section:
     """What to record or to type next."""
-    if diagnosis["next_experiment"]:
-        text = [
-            "This recording cannot decide. Play these commands on the rig, add the trials to the recording, diagnose "
-            "again:"
-        ]
-        lines = [str(diagnosis["next_experiment"])]
-        blocks: list[Listing | Callout] = [Listing(lines, code=True)]
-        return Section("What to record next", text, [*blocks, *([Callout(expectation)] if expectation else [])])
-    folder = before.recording.folder
-    if diagnosis["effects"]:
-        names = [f"{e['name']}@{joint}" for e in diagnosis["effects"] for joint in e["joints"]]
-        text = ["Fit exactly these effects and train with the result:"]
-        lines = [f"python -m tactile_cube.identify recording={folder} effects=[{','.join(names)}]"]
-        lines.append(f"python -m tactile_cube.train +experiment=finetune model={model_path or 'MODEL.yaml'}")
-    elif diagnosis["verdict"] == "adequate":
-        text, lines = (
-            ["Train with the refitted constants:"],
-            [f"python -m tactile_cube.train +experiment=finetune model={model_path}"],
+    if experiment is not None:
+        return experiment_section(experiment, str(diagnosis["next_experiment"]))
+    folder, model = before.recording.folder, model_path or "MODEL.yaml"
+    identify = f"python -m tactile_cube.identify recording={folder} effects"
+    train = f"python -m tactile_cube.train +experiment=finetune model={model}"
+    if diagnosis["verdict"] == "adequate":
+        said, lines = "Train with the refitted constants:", [train]
+    elif diagnosis["verdict"] == "missing_effect":
+        names = [f"{effect['name']}@{joint}" for effect in diagnosis["effects"] for joint in effect["joints"]]
+        said, lines = (
+            "Fit exactly these effects, and train with the result:",
+            [f"{identify}=[{','.join(names)}]", train],
         )
     else:
-        text = ["Look at the shape above, write the law as an effect of your own, and fit it:"]
-        lines = [
-            f"python -m tactile_cube.identify recording={folder} effects=[my_rig.MyEffect@{_first_joint(diagnosis)}]"
-        ]
-    return Section("What to do next", text, [Listing(lines, code=True)])
+        joint = (diagnosis["unexplained_joints"] or ["JOINT"])[0]
+        said = "Look at the shapes above, write the law as an effect of your own, and fit it:"
+        lines = [f"{identify}=[my_rig.MyEffect@{joint}]"]
+    return Section("What to do next", [said], [Listing(lines, code=True)])
 
 
-def _first_joint(diagnosis: Mapping[str, Any]) -> str:
-    return str((diagnosis["unexplained_joints"] or ["JOINT"])[0])
+def experiment_section(experiment: Experiment, file: str) -> Section:
+    """The commands that would decide, and what each rival predicts."""
+    text = [
+        "This recording cannot decide between the candidates. Play these commands on the rig, add the trial to the "
+        "recording and diagnose again:"
+    ]
+    joint = experiment.joints.index(experiment.joint)
+    predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
+    mean = sum(predictions.values()) / len(predictions)
+    lines = [
+        Line(name, experiment.time, 1e3 * (values - mean), PALETTE[k % len(PALETTE)], 1.3)
+        for k, (name, values) in enumerate(predictions.items())
+    ]
+    chart = line_chart(Axes("time [s]", f"{experiment.joint} [mrad]", height=220), lines)
+    caption = (
+        f"What each candidate predicts for {experiment.joint}, relative to their mean: they differ by at least "
+        f"{mrad(experiment.difference)} (RMS)."
+    )
+    return Section("What to record next", text, [Listing([file], code=True), Figure(chart, caption)])
 
 
 def _verdict_section(diagnosis: Mapping[str, Any]) -> Section:
@@ -275,9 +264,11 @@ def _tiles(diagnosis: Mapping[str, Any]) -> list[Tile]:
     return tiles
 
 
-def _names(effects: Sequence[Mapping[str, Any]]) -> str:
-    return " and ".join(f"{effect['name']} at {', '.join(effect['joints'])}" for effect in effects)
+def _names(effects: Sequence[Mapping[str, Any]], between: str) -> str:
+    return between.join(f"{effect['name']} at {', '.join(effect['joints'])}" for effect in effects)
 
 
 def _cell(value: object) -> str:
+    if value is None:
+        return ""
     return short(value) if isinstance(value, float) else str(value)
