@@ -6,8 +6,12 @@ and its joint turns about y.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
 import numpy as np
 
+from tactile_cube.errors import InputError
 from tactile_cube.hand.model import Array, Capsule, HandModel, Link
 
 _AXIS_Y, _AXIS_Z = '<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>'
@@ -26,6 +30,34 @@ def finger_urdf(hand: HandModel, prefix: str = "") -> str:
     """
     root = f"{prefix}base"
     return _robot(f"{prefix}finger", [_root(root), *_finger_parts(hand, prefix, root, "")])
+
+
+def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, inertia: Array) -> str:
+    """The same robot with other masses of its links.
+
+    Args:
+        urdf: Its description.
+        links: Names of the links to change.
+        mass: (n,) [kg].
+        com: Centres of mass in the link's frame (n, 3) [m].
+        inertia: About the centre of mass in the link's axes (n, 3, 3) [kg m^2].
+    """
+    robot = ElementTree.fromstring(urdf)
+    for k, name in enumerate(links):
+        inertial = robot.find(f"link[@name='{name}']/inertial")
+        if inertial is None:
+            raise InputError(f"URDF: no link '{name}' with an inertial element")
+        upper = zip(["xx", "xy", "xz", "yy", "yz", "zz"], inertia[k][np.triu_indices(3)], strict=True)
+        numbers = {
+            "origin": {"xyz": _numbers(com[k])},
+            "mass": {"value": f"{mass[k]:.12g}"},
+            "inertia": {f"i{axes}": f"{value:.12g}" for axes, value in upper},
+        }
+        for child in list(inertial):
+            inertial.remove(child)
+        for tag, attributes in numbers.items():
+            ElementTree.SubElement(inertial, tag, attributes)
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 def hand_urdf(hand: HandModel) -> str:

@@ -115,6 +115,12 @@ class EpisodeConstants:
                 _refuse_below_zero(field.name, getattr(self, field.name), field.name in self._POSITIVE)
 
     @property
+    def down(self) -> Array:
+        """Unit vector of gravity in the world (3,)."""
+        direction = np.asarray(self.gravity_direction)
+        return np.asarray(direction / np.linalg.norm(direction))
+
+    @property
     def disturbed(self) -> bool:
         """Whether random forces act on the cube."""
         return bool(max(self.force_mean, self.force_std, self.torque_mean, self.torque_std) > 0.0)

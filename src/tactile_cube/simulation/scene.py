@@ -7,6 +7,7 @@ several times faster than one hand.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand.model import LINKS_PER_FINGER, HandModel
-from tactile_cube.hand.urdf import finger_urdf
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact, read_contact
 from tactile_cube.simulation.options import SimulationOptions
@@ -69,12 +69,13 @@ class Scene:
         table: Body id of the table, -1 without one.
     """
 
-    def __init__(self, hand: HandModel, options: SimulationOptions) -> None:
-        """Builds the fingers; cube and table come with each episode."""
+    def __init__(self, hand: HandModel, options: SimulationOptions, finger_urdfs: Sequence[str]) -> None:
+        """Builds the fingers from their descriptions; cube and table come with each episode."""
         self.hand = hand
         self.client = connect(options)
-        self.fingers = self._load_fingers()
-        self.inertias = [self._inertia(link) for link in range(LINKS_PER_FINGER)]
+        bases = [hand.base_in_world(k) for k in range(len(hand.fingers))]
+        self.fingers = [load_chain(self.client, urdf, *base) for urdf, base in zip(finger_urdfs, bases, strict=True)]
+        self._inertias = [[self._inertia(body, link) for link in range(LINKS_PER_FINGER)] for body in self.fingers]
         self.table = self.cube = -1
         half = (0.5 * _TABLE_SIZE).tolist()
         self._table_shape = pybullet.createCollisionShape(
@@ -106,9 +107,8 @@ class Scene:
 
     def set_spin_inertia(self, spin_inertia: Array) -> None:
         """Adds inertia about the joint axis to each link, for numerical stability (fingers, links) [kg m^2]."""
-        for body, spins in zip(self.fingers, spin_inertia, strict=True):
-            for link, spin in enumerate(spins):
-                ixx, iyy, izz = self.inertias[link]
+        for body, inertias, spins in zip(self.fingers, self._inertias, spin_inertia, strict=True):
+            for link, ((ixx, iyy, izz), spin) in enumerate(zip(inertias, spins, strict=True)):
                 pybullet.changeDynamics(
                     body,
                     link,
@@ -127,13 +127,8 @@ class Scene:
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
 
-    def _load_fingers(self) -> list[int]:
-        urdf = finger_urdf(self.hand)
-        bases = [self.hand.base_in_world(k) for k in range(len(self.hand.fingers))]
-        return [load_chain(self.client, urdf, position, rotation) for position, rotation in bases]
-
-    def _inertia(self, link: int) -> tuple[float, float, float]:
-        diagonal = pybullet.getDynamicsInfo(self.fingers[0], link, physicsClientId=self.client)[2]
+    def _inertia(self, body: int, link: int) -> tuple[float, float, float]:
+        diagonal = pybullet.getDynamicsInfo(body, link, physicsClientId=self.client)[2]
         return (float(diagonal[0]), float(diagonal[1]), float(diagonal[2]))
 
     def _set_table(self, constants: EpisodeConstants) -> None:

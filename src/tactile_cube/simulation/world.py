@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain import DrivetrainConstants, Plant, check_damping_stability
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, TORQUE
-from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
+from tactile_cube.hand import DLR_HAND2, HandModel, tip_positions
 from tactile_cube.hand.model import JOINTS_PER_FINGER, LINKS_PER_FINGER
-from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.disturbance import Disturbance
+from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.health import find_fault
 from tactile_cube.simulation.loop import OBJECT_STATE, make_loop
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.scene import Scene
-from tactile_cube.simulation.spin_inertia import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia
 from tactile_cube.simulation.trace import read_trace
 
 Array = NDArray[np.float64]
@@ -63,24 +60,14 @@ class World:
         self.steps = 0
         self.fault = ""
         self.trace: dict[str, Array] = {}
-        self._effects = list(effects)
-        self._scene = Scene(hand, self.options)
-        self._tree = RigidBodyTree.from_urdf(finger_urdf(hand))
-        self._plant = Plant(
-            trees=[self._tree] * len(hand.fingers),
-            dt=self.options.dt,
-            effects=tuple(dict.fromkeys(type(effect) for effect in effects)),
-            joint_names=hand.joint_names,
-            trace_rows=self.options.substeps if self.options.trace else 0,
-        )
-        self._loop = make_loop(self.options.loop, self._scene.client, self._plant)
-        self._memory = np.zeros(self._plant.size)
+        self._drive = HandDrive(hand, self.options, effects)
+        self._scene = Scene(hand, self.options, self._drive.finger_urdfs())
         self._joints = np.zeros((2, len(hand.fingers), LINKS_PER_FINGER))
+        self._loop = make_loop(self.options.loop, self._scene.client, self._drive.plant)
         q, v = self._joints.reshape(2, -1)
-        self._loop.bind(self._scene.fingers, q, v, self._memory)
+        self._loop.bind(self._scene.fingers, q, v, self._drive.memory)
         self._cube = np.zeros(OBJECT_STATE)
         self._push = np.zeros(6)
-        self._down = np.array([0.0, 0.0, -1.0])
 
     # --- running -------------------------------------------------------------------------------------------------
 
@@ -98,19 +85,19 @@ class World:
         self.steps, self.fault, self.trace = 0, "", {}
         self._push[:] = 0.0
         self._disturbance = Disturbance(constants)
-        self._set_drivetrain(constants, start)
+        self._drive.reset(constants, start)
         self._set_joints(start)
         self._scene.place(constants, start, *self._joints)
-        self._scene.set_spin_inertia(self._plant.view(self._memory, "spin_inertia"))
+        self._scene.set_spin_inertia(self._drive.view("spin_inertia"))
         self._set_weight(constants.gravity_scale if constants.gravity_onset == 0 else 0.0)
-        self._sense_once()
+        self._drive.sense(*self._joints.reshape(2, -1))
         self._read_cube()
 
     def step(self, q_n: Array) -> None:
         """One policy step: `options.substeps` physics steps with the desired joint angles q_n (12,) [rad]."""
         if self.steps == self.constants.gravity_onset:
             self._set_weight(self.constants.gravity_scale)
-        self._set("goal", q_n - self.constants.joint_offset)
+        self._drive.view("goal")[:] = q_n - self.constants.joint_offset
         self._run()
         self.steps += 1
         self._read_cube()
@@ -124,7 +111,7 @@ class World:
     def pull_finger(self, finger: int, force: Array) -> None:
         """Pulls a fingertip with a force (3,) [N] in the world until changed or reset."""
         joints = slice(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1))
-        self._plant.view(self._memory, "external_torque")[joints] = self._tip_jacobian(finger).T @ force
+        self._drive.view("external_torque")[joints] = self._tip_jacobian(finger).T @ force
 
     def close(self) -> None:
         """Ends the physics server."""
@@ -150,22 +137,22 @@ class World:
     @property
     def q_m(self) -> Array:
         """Measured joint angles (12,) [rad]: motor side of the elasticity, joint offset included, without noise."""
-        return np.asarray(self._plant.signal(self._memory, MOTOR_POSITION) + self.constants.joint_offset)
+        return np.asarray(self._drive.signal(MOTOR_POSITION) + self.constants.joint_offset)
 
     @property
     def q_f(self) -> Array:
         """Target after the low-pass (12,) [rad], in what the sensors read."""
-        return np.asarray(self._plant.view(self._memory, "filtered") + self.constants.joint_offset)
+        return np.asarray(self._drive.view("filtered") + self.constants.joint_offset)
 
     @property
     def q_d(self) -> Array:
         """Target of the impedance law after rate and torque limits (12,) [rad], in what the sensors read."""
-        return np.asarray(self._plant.signal(self._memory, COMMAND) + self.constants.joint_offset)
+        return np.asarray(self._drive.signal(COMMAND) + self.constants.joint_offset)
 
     @property
     def torque(self) -> Array:
         """Joint torques of the last physics step (12,) [N m]."""
-        return self._plant.signal(self._memory, TORQUE)
+        return self._drive.signal(TORQUE)
 
     @property
     def cube_position(self) -> Array:
@@ -213,47 +200,6 @@ class World:
 
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
-    def _set_drivetrain(self, c: EpisodeConstants, start: Start) -> None:
-        """Fills the memory of the control step and puts it at rest at the start."""
-        drivetrain = DrivetrainConstants(
-            kp=c.kp,
-            kd=c.kd,
-            stiffness=c.stiffness,
-            static_friction=c.static_friction,
-            reflected_inertia=c.reflected_inertia,
-            torque_limit=c.torque_limit,
-            rate_limit=c.rate_limit,
-            sign="physical" if c.elasticity_sign > 0 else "printed",
-        )
-        self._refuse_unstable(drivetrain)
-        self._down = np.asarray(c.gravity_direction) / np.linalg.norm(c.gravity_direction)
-        gravity = np.stack([self._in_base(k, c.gravity * self._down) for k in range(len(self.hand.fingers))])
-        self._memory[:] = self._plant.memory(drivetrain, gravity=gravity, effects=self._effects)
-        self._set("time_constant", c.filter_time)
-        self._set("spin_inertia", spin_inertia(np.asarray(c.reflected_inertia)))
-        self._set("tendon_stiffness", TENDON_STIFFNESS)
-        self._set("tendon_damping", TENDON_DAMPING)
-        self._plant.reset(self._memory, start.angles, v=start.velocities)
-        for key in ("filtered", "limited", "goal"):
-            self._set(key, start.angles if start.target is None else start.target - c.joint_offset)
-
-    def _refuse_unstable(self, c: DrivetrainConstants) -> None:
-        """Raises InputError if a finger with the largest damping and smallest inertia of each joint would diverge."""
-        shape = (-1, JOINTS_PER_FINGER)
-        kd, inertia = np.reshape(c.kd, shape).max(axis=0), np.reshape(c.reflected_inertia, shape).min(axis=0)
-        weakest = replace(
-            c,
-            kp=np.reshape(c.kp, shape).max(axis=0),
-            kd=kd,
-            stiffness=np.reshape(c.stiffness, shape).min(axis=0),
-            static_friction=0.0,
-            reflected_inertia=inertia,
-        )
-        check_damping_stability(self._tree, weakest, self.options.dt)
-
-    def _set(self, key: str, value: Array | float) -> None:
-        self._plant.view(self._memory, key)[:] = value
-
     def _set_joints(self, start: Start) -> None:
         for row, values in zip(self._joints, (start.angles, start.velocities), strict=True):
             row[:, :JOINTS_PER_FINGER] = np.asarray(values).reshape(-1, JOINTS_PER_FINGER)
@@ -261,26 +207,19 @@ class World:
 
     def _set_weight(self, scale: float) -> None:
         """Gives the cube a share of its weight through Bullet's gravity; the control step keeps the fingers' whole."""
-        acceleration = scale * self.constants.gravity * self._down
+        acceleration = scale * self.constants.gravity * self.constants.down
         self._scene.set_gravity(acceleration)
-        self._set("engine_gravity", np.stack([self._in_base(k, acceleration) for k in range(len(self.hand.fingers))]))
-
-    def _sense_once(self) -> None:
-        """Computes what the sensors read at the start, without moving anything or changing any state."""
-        q, v = self._joints.reshape(2, -1)
-        states = self._memory.copy()
-        self._plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), states)
-        self._set("signals", self._plant.view(states, "signals"))
+        self._drive.set_engine_gravity(acceleration)
 
     def _run(self) -> None:
         """The physics steps of one policy step, with a trace where wanted."""
         substeps = self.options.substeps
         states = np.empty((substeps + 1, OBJECT_STATE)) if self.options.trace else None
-        filtered = self._plant.view(self._memory, "filtered").copy()
+        filtered = self._drive.view("filtered").copy()
         self._loop.run(substeps, self._scene.cube, self._wrench(), states)
         if states is not None:
             offset = np.asarray(self.constants.joint_offset)
-            self.trace = read_trace(self._plant, self._memory, filtered, offset, states, self.time)
+            self.trace = read_trace(self._drive.plant, self._drive.memory, filtered, offset, states, self.time)
 
     def _wrench(self) -> Array | None:
         """Everything that pushes the cube in this policy step, or None."""
@@ -294,10 +233,6 @@ class World:
         position, quaternion = pybullet.getBasePositionAndOrientation(cube, physicsClientId=client)
         linear, angular = pybullet.getBaseVelocity(cube, physicsClientId=client)
         self._cube = np.array([*position, *quaternion, *linear, *angular])
-
-    def _in_base(self, finger: int, vector: Array) -> Array:
-        """A world vector in the frame of a finger's base (3,)."""
-        return np.asarray(self.hand.base_in_world(finger)[1].T @ vector)
 
     def _tip_jacobian(self, finger: int) -> Array:
         """Velocity of a fingertip's centre per joint velocity (3, 3), by central differences."""

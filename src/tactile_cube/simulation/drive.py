@@ -1,0 +1,120 @@
+"""The drivetrain of all fingers in the world: constants of an episode into the memory of the compiled control step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant, check_damping_stability
+from tactile_cube.drivetrain.effects import Effect
+from tactile_cube.hand import HandModel, finger_urdf
+from tactile_cube.hand.model import JOINTS_PER_FINGER
+from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.hand.urdf import with_inertias
+from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.spin_inertia import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia
+
+Array = NDArray[np.float64]
+
+
+class HandDrive:
+    """Control step and its memory for the fingers of a hand.
+
+    Attributes:
+        plant: The compiled control step of all fingers and the layout of its memory.
+        memory: The numbers it works on; the same array for good.
+    """
+
+    def __init__(self, hand: HandModel, options: SimulationOptions, effects: Sequence[Effect]) -> None:
+        """Compiles the control step, or finds it in the cache."""
+        self._hand = hand
+        self._effects = list(effects)
+        self._tree = RigidBodyTree.from_urdf(finger_urdf(hand))
+        self.plant = Plant(
+            trees=[self._tree] * len(hand.fingers),
+            dt=options.dt,
+            effects=tuple(dict.fromkeys(type(effect) for effect in effects)),
+            joint_names=hand.joint_names,
+            trace_rows=options.substeps if options.trace else 0,
+        )
+        self.memory = self.plant.memory(DrivetrainConstants(), effects=self._effects)
+
+    def finger_urdfs(self) -> list[str]:
+        """URDF text of each finger, with the masses that effects on the mechanism have changed."""
+        text = finger_urdf(self._hand)
+        mass, com, inertia = (self.view(key) for key in ("mass", "com", "inertia"))
+        names = [link.name for link in self._hand.links]
+        texts = []
+        for k in range(len(self._hand.fingers)):
+            same = np.array_equal(mass[k], self._tree.mass) and np.array_equal(com[k], self._tree.com)
+            texts.append(text if same else with_inertias(text, names, mass[k], com[k], inertia[k]))
+        return texts
+
+    def reset(self, c: EpisodeConstants, start: Start) -> None:
+        """Fills the memory for an episode and puts it at rest at the start.
+
+        Raises:
+            InputError: The torque loop would be unstable with these constants and this time step.
+        """
+        constants = DrivetrainConstants(
+            kp=c.kp,
+            kd=c.kd,
+            stiffness=c.stiffness,
+            static_friction=c.static_friction,
+            reflected_inertia=c.reflected_inertia,
+            torque_limit=c.torque_limit,
+            rate_limit=c.rate_limit,
+            sign="physical" if c.elasticity_sign > 0 else "printed",
+        )
+        self._refuse_unstable(constants)
+        gravity = self._in_bases(c.gravity * c.down)
+        self.memory[:] = self.plant.memory(constants, gravity=gravity, effects=self._effects)
+        self.view("time_constant")[:] = c.filter_time
+        self.view("spin_inertia")[:] = spin_inertia(np.asarray(c.reflected_inertia))
+        self.view("tendon_stiffness")[:] = TENDON_STIFFNESS
+        self.view("tendon_damping")[:] = TENDON_DAMPING
+        self.plant.reset(self.memory, start.angles, v=start.velocities)
+        for key in ("filtered", "limited", "goal"):
+            self.view(key)[:] = start.angles if start.target is None else start.target - c.joint_offset
+
+    def view(self, key: str) -> Array:
+        """Writable numbers of the memory."""
+        return self.plant.view(self.memory, key)
+
+    def signal(self, row: int) -> Array:
+        """A signal of the last physics step (12,)."""
+        return self.plant.signal(self.memory, row)
+
+    def set_engine_gravity(self, acceleration: Array) -> None:
+        """Tells the control step what gravity Bullet applies (3,) [m/s^2]; the fingers keep feeling their own."""
+        self.view("engine_gravity")[:] = self._in_bases(acceleration)
+
+    def sense(self, q: Array, v: Array) -> None:
+        """Computes what the sensors read at rest, without moving anything or changing any state.
+
+        Args:
+            q: All joints (16,) [rad].
+            v: All joints (16,) [rad/s].
+        """
+        trial = self.memory.copy()
+        self.plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), trial)
+        self.view("signals")[:] = self.plant.view(trial, "signals")
+
+    def _refuse_unstable(self, c: DrivetrainConstants) -> None:
+        """Raises InputError if a finger with the largest damping and smallest inertia of each joint would diverge."""
+        of_fingers = {
+            name: np.reshape(getattr(c, name), (-1, JOINTS_PER_FINGER))
+            for name in ("kp", "kd", "stiffness", "reflected_inertia")
+        }
+        weakest = {name: values.max(axis=0) for name, values in of_fingers.items()}
+        weakest |= {name: of_fingers[name].min(axis=0) for name in ("stiffness", "reflected_inertia")}
+        check_damping_stability(self._tree, replace(c, static_friction=0.0, **weakest), self.plant.dt)
+
+    def _in_bases(self, vector: Array) -> Array:
+        """A world vector in the frame of each finger's base (fingers, 3)."""
+        rotations = [self._hand.base_in_world(k)[1] for k in range(len(self._hand.fingers))]
+        return np.stack([rotation.T @ vector for rotation in rotations])

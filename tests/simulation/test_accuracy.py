@@ -1,0 +1,20 @@
+import dataclasses
+
+from tactile_cube.simulation import SimulationOptions
+from tactile_cube.simulation.accuracy import TWIST, measure_accuracy
+
+
+def test_the_fast_preset_holds_and_twists_the_cube() -> None:
+    result = measure_accuracy(SimulationOptions.fast())
+    assert result.fault == ""
+    assert result.creep < 5e-4
+    assert result.coupling_error < 0.02
+    assert TWIST * 1.1 < result.twist < TWIST * 0.5
+    assert (result.tip_forces > 0.3).all()
+    again = measure_accuracy(SimulationOptions.fast())
+    assert dataclasses.replace(again, steps_per_second=0.0, rest=None, tip_forces=None) == dataclasses.replace(  # type: ignore[arg-type]
+        result,
+        steps_per_second=0.0,
+        rest=None,
+        tip_forces=None,  # type: ignore[arg-type]
+    )
