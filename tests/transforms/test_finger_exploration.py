@@ -50,6 +50,13 @@ def test_what_was_taken_reaches_the_world(transformed: MakeEnv) -> None:
     assert task.world.commands[-1] == pytest.approx(wanted)
 
 
+def test_targets_are_start_poses_where_asked_for(transformed: MakeEnv) -> None:
+    grasps = torch.stack([torch.full((12,), 0.25), torch.full((12,), -0.75)])
+    explore = Exploration(episodes=1.0, probability=1.0, grasps=1.0)
+    taken = run(transformed(FingerExploration(explore, grasps), worlds=60), 60, 4)
+    assert set(taken.unique().tolist()) == {-0.75, 0.0, 0.25}
+
+
 def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> None:
     env = transformed(FingerExploration(Exploration(episodes=1.0, probability=1.0, shortest=7)), worlds=2)
     data = step_mdp(env.step(env.reset().set("action", torch.zeros(2, 12))))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import torch
 from tensordict import TensorDictBase
+from torch import Tensor
 from torchrl.data import Categorical, Composite, Unbounded
 from torchrl.envs.transforms import Transform
 
@@ -32,16 +33,19 @@ class Exploration:
         probability: with which a step of such an episode begins to hold a random target.
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
+        grasps: part of the targets that are a start pose's joint angles instead of uniform ones: fingers that have
+            twisted go back to where they can grasp the cube anew.
     """
 
     episodes: float = 0.3
     probability: float = 0.06
     shortest: int = 2
     longest: int = 7
+    grasps: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
-        for key in ("episodes", "probability"):
+        for key in ("episodes", "probability", "grasps"):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise InputError(f"exploration.{key} is {getattr(self, key)}; give a number in [0, 1]")
         if not 1 <= self.shortest <= self.longest:
@@ -61,10 +65,11 @@ class FingerExploration(Transform):  # type: ignore[misc]
         >>> env = TransformedEnv(worlds, FingerExploration(Exploration(episodes=0.3)))
     """
 
-    def __init__(self, exploration: Exploration) -> None:
-        """Explores as `exploration` says."""
+    def __init__(self, exploration: Exploration, grasps: Tensor | None = None) -> None:
+        """Explores as `exploration` says; `grasps` (poses, 12) are actions that hold a start pose."""
         super().__init__(out_keys=["exploring", "action_taken"])
         self.settings = exploration
+        self._grasps = torch.zeros(1, 12) if grasps is None else grasps
         self._exploring = self._held = torch.zeros(0)
         self._target = self._fingers = self._taken = torch.zeros(0)
 
@@ -94,7 +99,8 @@ class FingerExploration(Transform):  # type: ignore[misc]
         begins = (torch.rand(*worlds, 1) < self.settings.probability) & self._exploring & (self._held == 0)
         steps = torch.randint(self.settings.shortest, self.settings.longest + 1, (*worlds, 1))
         fingers = GROUPS[torch.randint(len(GROUPS), worlds)].repeat_interleave(3, dim=-1)
-        target = 2.0 * torch.rand(*worlds, 12) - 1.0
+        grasp = self._grasps[torch.randint(len(self._grasps), worlds)]
+        target = torch.where(torch.rand(*worlds, 1) < self.settings.grasps, grasp, 2.0 * torch.rand(*worlds, 12) - 1.0)
         self._held = torch.where(begins, steps, self._held)
         self._fingers = torch.where(begins, fingers, self._fingers)
         self._target = torch.where(begins, target, self._target)
