@@ -51,8 +51,8 @@ class Sensors(_Strict):
     """What is known of the sensors: resolution and standard deviation of the position [rad], of the torque [N m].
 
     Attributes:
-        read: a row shows position and torque at the end of the control period in which its command acted (`after`),
-            or at its beginning (`before`).
+        read: a row shows position and torque at the end of the control period in which its command acted (`after`), or
+            at its beginning, before the command was sent (`before`).
     """
 
     read: Literal["after", "before"] = "after"

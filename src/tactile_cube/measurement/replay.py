@@ -117,9 +117,8 @@ class Replay:
         """What the log would show of the signals of all steps ((n + 1) substeps, signals, joints)."""
         position, torque = np.moveaxis(signals[:: self.substeps, :2], 1, 0)
         jump = half_jumps(signals[:, 2], self.substeps)
-        shown = slice(1, None)
-        if self.recording.read == "before":
-            shown, jump = slice(None, -1), -jump
+        # Either way the drive still feels the old command: a loop reads first and commands then.
+        shown = slice(None, -1) if self.recording.read == "before" else slice(1, None)
         constants = self._constants(trial, parameters)
         limits = (constants["kp"], constants["stiffness"], constants["torque_limit"])
         return Simulated(*read_out(position[shown], torque[shown], jump[shown], *limits))
