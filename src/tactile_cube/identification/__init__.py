@@ -1,1 +1,1 @@
-"""Finding which physical effect a model lacks: fit by multiple shooting, screen the catalogue, decide on held-out trials."""
+"""Finding which physical effect a model lacks: fit by multiple shooting, screen the catalogue, judge on others."""

@@ -83,6 +83,7 @@ def candidates(recording: Recording, effects: Sequence[EffectClass]) -> list[Can
         for j, joint in enumerate(recording.joints)
         if _possible(effect, recording, joint)
         for form in forms(effect)
+        if "harmonic" not in form  # those need to know the period: see periodicity
         for start in _starts(effect.name, form, seen[j])
     ]
 
@@ -125,7 +126,7 @@ def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[s
 
 
 def placed(candidate: Candidate, recording: Recording) -> dict[str, float]:
-    """Values of parameters that are not fitted but depend on the recording: the range of a position-dependent torque."""
+    """Values of parameters that the recording sets: the range of a position-dependent torque."""
     if candidate.effect.name != "position_torque":
         return {}
     seen = _Seen(recording, recording.joints.index(candidate.joints[0]))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors
+from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.intervals import Fitted, final_fit
 from tactile_cube.identification.model import Model
@@ -15,7 +16,7 @@ from tactile_cube.identification.next_experiment import Experiment, next_experim
 from tactile_cube.identification.noise import sensor_noise
 from tactile_cube.identification.problem import Problem
 from tactile_cube.identification.residual_shape import Shape, black_box, missing_torques, shapes
-from tactile_cube.identification.search import Explanation, Findings, Search
+from tactile_cube.identification.search import Findings, Search
 from tactile_cube.identification.verdict import Verdict, decide, unexplained_joints
 from tactile_cube.measurement.error import ErrorSummary
 from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor

@@ -8,9 +8,9 @@ from typing import Any
 from tactile_cube.drivetrain.model_file import EffectEstimate
 from tactile_cube.identification.candidates import Candidate
 from tactile_cube.identification.diagnosis import Diagnosis
+from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.intervals import Fitted, bounds
 from tactile_cube.identification.recommended import effect_estimate
-from tactile_cube.identification.search import Explanation
 from tactile_cube.identification.verdict import unexplained_joints
 
 RANKED = 20

@@ -63,8 +63,8 @@ def fit(
         residual = problem.residual(prediction)
         columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
         cost = float(problem.cost(residual).sum())
-        temper = _temper(problem, cost if best is None else min(cost, best.cost))
-        if best is not None and cost + temper * surprise(model, everything) >= best.cost + temper * best.surprise:
+        weight = temper(problem, cost if best is None else min(cost, best.cost))
+        if best is not None and cost + weight * surprise(model, everything) >= best.cost + weight * best.surprise:
             damping *= 10.0
         else:
             gain = np.inf if best is None else (best.cost - cost) / max(best.cost, 1e-9)
@@ -73,18 +73,19 @@ def fit(
             damping *= 0.3
             if gain < CONVERGED:
                 break
-        model = _stepped(problem, best, temper, damping)
+        model = _stepped(problem, best, weight, damping)
     assert best is not None
     return _finish(problem, best, model)
 
 
-def _temper(problem: Problem, cost: float) -> float:
+def temper(problem: Problem, cost: float) -> float:
     """Weight of what is expected beforehand.
 
     While the model is wrong its error is far above the noise and remembers itself; taking it for white noise would let
     the constants soak it up. So expectations weigh as much more as the error is larger and longer than noise.
     """
-    return CORRELATED * max(1.0, cost / max(np.count_nonzero(problem.weight), 1))
+    excess = cost / max(np.count_nonzero(problem.weight), 1) - 1.0
+    return 1.0 + CORRELATED * max(excess, 0.0)
 
 
 def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) -> Fit:
@@ -98,8 +99,8 @@ def _finish(problem: Problem, best: Fit, last: Model) -> Fit:
     """The last step is taken too if it helps."""
     residual = problem.residual(problem.predictions([last])[0])
     cost, odd = float(problem.cost(residual).sum()), surprise(last, best.unknowns)
-    temper = _temper(problem, min(cost, best.cost))
-    if cost + temper * odd >= best.cost + temper * best.surprise:
+    weight = temper(problem, min(cost, best.cost))
+    if cost + weight * odd >= best.cost + weight * best.surprise:
         return best
     return Fit(last, best.unknowns, cost, odd, residual, best.columns, best.information)
 
@@ -118,13 +119,13 @@ def _information(problem: Problem, columns: Array) -> Array:
     return np.asarray(np.einsum("grp,grq->pq", columns, problem.free(columns), optimize=True))
 
 
-def _stepped(problem: Problem, fitted: Fit, temper: float, damping: float) -> Model:
+def _stepped(problem: Problem, fitted: Fit, trust: float, damping: float) -> Model:
     """Damped Gauss-Newton step; an unknown that would leave its bounds stops there and the others are solved anew."""
     values = read_all(fitted.model, fitted.unknowns)
     scale, centre, low, high = (
         np.array([getattr(u, key) for u in fitted.unknowns]) for key in ("scale", "centre", "low", "high")
     )
-    weight = temper * precision(fitted.unknowns)
+    weight = trust * precision(fitted.unknowns)
     pull = np.einsum("grp,gr->p", fitted.columns, problem.free(fitted.residual), optimize=True)
     gradient = pull - weight * (values - centre) / scale
     information = fitted.information + np.diag(weight)
@@ -134,7 +135,7 @@ def _stepped(problem: Problem, fitted: Fit, temper: float, damping: float) -> Mo
 
 def bounded_step(information: Array, gradient: Array, damping: float, least: Array, most: Array) -> Array:
     """Step (P,) that minimises the damped quadratic model within the bounds, active bounds found one after another."""
-    step = np.zeros(len(gradient))
+    step: Array = np.zeros(len(gradient))
     held = np.zeros(len(gradient), dtype=bool)
     damped = information + damping * np.diag(np.maximum(np.diag(information), 1e-9))
     for _ in range(len(gradient) + 1):

@@ -19,6 +19,7 @@ from tactile_cube.identification.gauss_newton import Fit, fit
 from tactile_cube.identification.intervals import Fitted, final_fit
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.noise import sensor_noise
+from tactile_cube.identification.periodicity import periodic_candidates
 from tactile_cube.identification.problem import Problem
 from tactile_cube.identification.search import Search
 from tactile_cube.measurement.error import ErrorSummary
@@ -107,7 +108,9 @@ def _judged(search: Search, held_out: Recording, model: Model) -> Model:
 def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str) -> Fit:
     """The fit with one more effect, in whichever of its forms and from whichever start it does best."""
     frozen = search.frozen(current)
-    options = [c for c in candidates(search.fitted, [effect]) if c.joints == (joint,)]
+    every = candidates(search.fitted, [effect])
+    every += periodic_candidates(search.problem, search.fitted, frozen.model, frozen.residual, [effect])
+    options = [c for c in every if c.joints == (joint,)]
     refitted = [search.refit(frozen, option)[1] for option in options]
     best = refitted[int(np.argmin([one.cost for one in refitted]))]
     search.problem.linearise_starts(best.model)

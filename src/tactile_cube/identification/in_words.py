@@ -24,12 +24,13 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     error = result["error"]
     lines.append(
         f"Held-out error: {_mrad(error['nominal'])} as stated by the owner, {_mrad(error['refitted'])} with constants "
-        f"refitted, {_mrad(error['with_effects'])} with the recommended model; noise floor {_mrad(error['noise_floor'])}."
+        f"refitted, {_mrad(error['with_effects'])} with the recommended model; "
+        f"noise floor {_mrad(error['noise_floor'])}."
     )
     if experiment is not None:
         lines.append(
-            f"To decide, play {result['next_experiment']} ({experiment.name}): at {experiment.joint} the candidates will "
-            f"differ by at least {_mrad(experiment.difference)}."
+            f"To decide, play {result['next_experiment']} ({experiment.name}): at {experiment.joint} the candidates "
+            f"will differ by at least {_mrad(experiment.difference)}."
         )
     return "\n".join(lines)
 

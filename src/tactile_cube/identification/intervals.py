@@ -37,8 +37,8 @@ def final_fit(problem: Problem, recording: Recording, model: Model, iterations: 
 def standard_errors(problem: Problem, fitted: Fit) -> Array:
     """Standard errors (P,) of the unknowns.
 
-    The residual of a model that is not perfect remembers itself; so the scatter of the score is taken segment by segment
-    (cluster-robust), and never less than the sensor's noise alone would give.
+    The residual of a model that is not perfect remembers itself; so the scatter of the score is taken segment by
+    segment (cluster-robust), and never less than the sensor's noise alone would give.
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)

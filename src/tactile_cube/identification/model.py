@@ -1,4 +1,4 @@
-"""A model of a rig as a point in parameter space: constants, joint offsets, effects; and the numbers that are fitted."""
+"""A model of a rig as a point in parameter space: constants, joint offsets, effects; and what of it is fitted."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""The commands that would tell rival explanations apart: simulated under every rival, the most telling ones written down."""
+"""The commands that would tell rival explanations apart: simulated under every rival, the most telling written down."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,7 +74,7 @@ def next_experiment(
 
 
 def safe_excitations(recording: Recording, seed: int) -> dict[str, Array]:
-    """Commands (T, n) inside the positions and speeds that the recording has shown to be safe, joints in turn and together."""
+    """Commands (T, n) inside the positions and near the speeds that the recording has shown to be safe."""
     everything = np.concatenate([trial.command for trial in recording.trials])
     low, high = everything.min(axis=0), everything.max(axis=0)
     fastest = max(np.abs(np.diff(trial.command, axis=0)).max() / trial.step for trial in recording.trials)
@@ -88,7 +87,8 @@ def safe_excitations(recording: Recording, seed: int) -> dict[str, Array]:
         "fast triangles": _triangle(time[:, None] / 1.0 + phases / 6.3),
         "growing triangles": (time[:, None] / time[-1]) ** 2 * _triangle(time[:, None] / 1.5 + phases / 6.3),
         "tiny triangles": 0.05 * _triangle(time[:, None] / 2.0 + phases / 6.3),
-        "growing steps": (0.1 + 0.9 * time[:, None] / time[-1]) * np.sign(np.sin(2 * np.pi * time[:, None] / 1.6 + phases)),
+        "growing steps": (0.1 + 0.9 * time[:, None] / time[-1])
+        * np.sign(np.sin(2 * np.pi * time[:, None] / 1.6 + phases)),
         "rising frequency": 0.4 * np.sin(2 * np.pi * (0.2 * time[:, None] + 0.3 * time[:, None] ** 2) + phases),
         "holds with small moves": _holds(time, len(low), rng),
     }

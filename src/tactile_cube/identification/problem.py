@@ -1,4 +1,4 @@
-"""The least-squares problem of one set of stretches: weighted residuals, columns, and the starts of segments taken out."""
+"""The least-squares problem of one set of stretches: weighted residuals, columns, starts of segments taken out."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ STEP = 0.2  # finite differences, in units of an unknown's scale
 class Problem:
     """Residuals (G, R) of G segments with R samples, in units of the sensor noise.
 
-    Each segment's start is a nuisance with a Gaussian prior. `free(x)` multiplies by the inverse covariance that is left
-    when it is integrated out, so `sum(x * free(y))` is the inner product of the marginal likelihood.
+    Each segment's start is a nuisance with a Gaussian prior. `free(x)` multiplies by the inverse covariance that is
+    left when it is integrated out, so `sum(x * free(y))` is the inner product of the marginal likelihood.
     """
 
     def __init__(self, shooting: Shooting, stretches: Stretches) -> None:

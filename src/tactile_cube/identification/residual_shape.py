@@ -1,4 +1,4 @@
-"""What the torque that a model lacks depends on: its average over bins of each signal, and how much any law could explain."""
+"""What the torque that a model lacks depends on: its average over bins of each signal, what any law could explain."""
 
 from __future__ import annotations
 
@@ -125,7 +125,9 @@ def _shape(missing: Missing, name: str, values: Array) -> Shape:
     square = np.bincount(place, missing.torque**2) / count
     centres = np.bincount(place, values) / count
     explained = np.sum(count * (mean - missing.torque.mean()) ** 2) / max(missing.torque.var() * len(values), 1e-30)
-    chance = len(count) / max(len(np.unique(missing.segment)), 1)  # bins fit noise; samples of one segment are not independent
+    chance = len(count) / max(
+        len(np.unique(missing.segment)), 1
+    )  # bins fit noise; samples of one segment are not independent
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
     return Shape(missing.joint, name, centres, mean, spread, float(max(0.0, explained - 0.1 * min(chance, 1.0))))
 

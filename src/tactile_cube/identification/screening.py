@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.identification.candidates import Candidate
-from tactile_cube.identification.gauss_newton import CORRELATED, Fit, precision
+from tactile_cube.identification.gauss_newton import Fit, precision, temper
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.problem import Problem
 
@@ -42,7 +42,7 @@ class Screen:
         self.prediction = problem.predictions([base.model])[0]
         self.residual = problem.free(problem.residual(self.prediction))
         self.free_columns = problem.free(base.columns)
-        expected = CORRELATED * max(1.0, base.cost / max(np.count_nonzero(problem.weight), 1)) * precision(base.unknowns)
+        expected = temper(problem, base.cost) * precision(base.unknowns)
         self.information = base.information + np.diag(expected)
         offset = [(u.of(base.model) - u.centre) / u.scale for u in base.unknowns]
         self.pull = np.einsum("grp,gr->p", base.columns, self.residual, optimize=True) - expected * np.array(offset)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,13 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.base import base_unknowns, nominal_model
 from tactile_cube.identification.candidates import Candidate, candidates, model_unknowns, placed
 from tactile_cube.identification.evidence import Judgement, gain, judge, p_value
+from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.model import Model
+from tactile_cube.identification.periodicity import periodic_candidates
 from tactile_cube.identification.problem import Problem
 from tactile_cube.identification.screening import Score, screen
+from tactile_cube.identification.shared_offset import shared_offset
 from tactile_cube.identification.shooting import Shooting
 from tactile_cube.identification.stretches import Stretches, cut
 from tactile_cube.measurement.recording import Recording
@@ -32,40 +35,6 @@ PROMISING = 0.03  # share of the best first-order gain that a candidate needs to
 STRETCHES = 12  # enough data to search on; the final fit takes all
 DEEPEST = 3  # effects in combination
 BEAM = 2  # alternatives that are pursued at each depth
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """A set of effects with everything refitted.
-
-    Attributes:
-        effects: candidates in the order in which they were added.
-        fit: on the fitted trials.
-        judgement: on the held-out trials.
-        p_value: of the last effect, corrected for the number of candidates.
-        gain: held-out share that the last effect explains.
-    """
-
-    effects: tuple[Candidate, ...]
-    fit: Fit = field(repr=False)
-    judgement: Judgement = field(repr=False)
-    p_value: float
-    gain: float
-
-    @property
-    def error(self) -> float:
-        """Held-out error in units of the sensor noise."""
-        return self.judgement.error
-
-    @property
-    def label(self) -> str:
-        """Readable."""
-        return " & ".join(c.label for c in self.effects) or "base"
-
-    @property
-    def size(self) -> int:
-        """Numbers fitted beyond the base."""
-        return sum(c.size for c in self.effects)
 
 
 @dataclass(frozen=True)
@@ -111,6 +80,7 @@ class Search:
         self.all_stretches = cut(fitted, noise)
         self.problem = Problem(self.shooting, some(self.all_stretches, STRETCHES))
         self.judges = Problem(self.shooting, some(cut(held_out, noise), STRETCHES))
+        self.effects = tuple(effects)
         self.candidates = candidates(fitted, effects)
         self.start = nominal_model(fitted)
         self.start_held_out = nominal_model(held_out)
@@ -132,6 +102,8 @@ class Search:
             better.sort(key=lambda e: e.judgement.costs.sum())
             levels.append(tuple(better))
             beam = tuple(better[:BEAM])
+        if not levels and base.error <= FLOOR and (shared := shared_offset(base, self.fitted, self.effects)):
+            levels.append((shared,))
         return Findings(base, nominal, tuple(levels), scores)
 
     def fit_base(self) -> Explanation:
@@ -152,11 +124,11 @@ class Search:
     def extend(self, parent: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
         frozen = self.frozen(parent.fit)
-        self.last_scores = screen(
-            self.problem, frozen, self.candidates, [placed(c, self.fitted) for c in self.candidates]
-        )
+        periodic = periodic_candidates(self.problem, self.fitted, frozen.model, frozen.residual, self.effects)
+        wanted = [*self.candidates, *periodic]
+        self.last_scores = screen(self.problem, frozen, wanted, [placed(c, self.fitted) for c in wanted])
         chosen = with_groups(self.last_scores)[:REFITTED]
-        self.say(f"screened {len(self.candidates)} candidates, refitting {len(chosen)}")
+        self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
         raced = self.race(frozen, chosen)
         return [self.finish(parent, candidate, fitted) for candidate, fitted in raced[:FINALISTS]]
 
@@ -201,7 +173,7 @@ class Search:
 
 
 def worthwhile(explanation: Explanation, depth: int) -> bool:
-    """Whether an effect earns its place: significantly, by more than a few per cent, and the further ones decisively."""
+    """Whether an effect earns its place: significantly, by more than a few per cent, further ones decisively."""
     if explanation.gain < SMALLEST_GAIN or explanation.p_value > SIGNIFICANT:
         return False
     if depth == 0 or explanation.error <= FLOOR:

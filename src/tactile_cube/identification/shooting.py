@@ -15,7 +15,9 @@ from tactile_cube.drivetrain.signals import MOTOR_POSITION
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.stretches import Stretches
+from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.replay import CLAMPED
 
 Array = NDArray[np.float64]
 CONSTANTS = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
@@ -44,7 +46,7 @@ class Shooting:
         return self._simulate(models, np.zeros((len(models), 2 * joints)), stretches)
 
     def start_sensitivity(self, model: Model, stretches: Stretches) -> Array:
-        """d position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
+        """D position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
         joints = len(self.recording.joints)
         nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
         moved = self._simulate([model] * (2 * joints + 1), np.vstack([nudge, np.zeros(2 * joints)]), stretches)
@@ -60,8 +62,6 @@ class Shooting:
     def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
         memory = self._memory(model, stretches)
         count = len(stretches)
-        starts = stretches.position.copy()
-        starts[:, 0] = self.plant.view(memory, "q")
         self.plant.kernel.segments_batch(
             stretches.commands,
             np.arange(count),
@@ -69,7 +69,7 @@ class Shooting:
             stretches.history,
             1,
             stretches.segment,
-            starts,
+            stretches.position,
             stretches.speed,
             np.tile(nudge, (count, 1)),
             memory,
@@ -87,6 +87,12 @@ class Shooting:
         self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * posture[:, self.tree.follow]
         self.plant.reset(memory, self._links(model, stretches), stretches.speed[:, 0])
         self.plant.view(memory, "step")[:, 0] = stretches.time / self.plant.dt
+        for k, key in enumerate(("kp", "kd", "torque_limit")):
+            self.plant.view(memory, key)[:] *= stretches.gains[:, k]
+        self.plant.view(memory, "brake")[stretches.clamped] = CLAMPED
+        for k, force in enumerate(stretches.forces):
+            if force is not None:
+                self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, stretches.position[k, 0])
         return memory
 
     def memory(self, model: Model) -> Array:
@@ -100,7 +106,7 @@ class Shooting:
         return memory
 
     def _links(self, model: Model, stretches: Stretches) -> Array:
-        """Link positions (S, n) at the first row: measured less the drive's deflection."""
+        """Link positions (S, n) near those of the first row: measured less the deflection of the plain drive."""
         constants = model.constants
         error = stretches.commands[:, stretches.history] - stretches.position[:, 0]
         torque = constants["kp"] * error - constants["kd"] * stretches.speed[:, 0]

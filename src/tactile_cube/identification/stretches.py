@@ -1,20 +1,39 @@
-"""A recording cut for multiple shooting: stretches that are simulated in one go, made of short segments started anew."""
+"""A recording cut for multiple shooting: stretches simulated in one go, made of short segments started anew."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.measurement.description import KnownForce
+from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.trial import Trial
 
 Array = NDArray[np.float64]
-SEGMENT = 0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
+SEGMENT = (
+    0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
+)
 STRETCH = 10  # segments simulated without a break, so that effects with a memory keep it
-HISTORY = 0.12  # [s] of commands before a stretch, for effects that remember them
+HISTORY = 8.0  # [s] of commands before a stretch at most, for effects that remember them, such as a rate limit
+FEWEST = 4  # samples that a stretch needs
+ROWS = (
+    "commands",
+    "measured",
+    "weight",
+    "position",
+    "speed",
+    "acceleration",
+    "gains",
+    "trial",
+    "initialisation",
+    "time",
+    "clamped",
+)
+"""Arrays with one row a stretch."""
 SMOOTHING = 0.025  # [s] half width of the parabola that reads the state at a segment's start
 
 
@@ -29,9 +48,12 @@ class Stretches:
         position: (S, K, n) measured position at each segment's start [rad].
         speed: (S, K, n) [rad/s].
         acceleration: (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2].
+        gains: (S, 3, n) kp, kd and torque limit of the trial over those of the recording.
         trial: (S,) index of the trial.
         initialisation: (S,) robot initialisation.
         time: (S,) of the first row in its trial [s].
+        clamped: (S,) the links were held still.
+        forces: known forces on a link, or None.
         history: H.
         segment: rows of a segment.
     """
@@ -42,9 +64,12 @@ class Stretches:
     position: Array
     speed: Array
     acceleration: Array
+    gains: Array
     trial: NDArray[np.int64]
     initialisation: NDArray[np.int64]
     time: Array
+    clamped: NDArray[np.bool_]
+    forces: tuple[KnownForce | None, ...]
     history: int
     segment: int
 
@@ -54,12 +79,14 @@ class Stretches:
         return self.position.shape[1]
 
     def __len__(self) -> int:
+        """S."""
         return len(self.commands)
 
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Stretches:
         """Some of the stretches."""
-        rows = ("commands", "measured", "weight", "position", "speed", "acceleration", "trial", "initialisation", "time")
-        return replace(self, **{key: getattr(self, key)[chosen] for key in rows})
+        picked = {key: getattr(self, key)[chosen] for key in ROWS}
+        forces = tuple(self.forces[int(k)] for k in np.arange(len(self))[chosen])
+        return replace(self, **picked, forces=forces)
 
     def by_segment(self, values: Array) -> Array:
         """(S, K segment, n) -> (S K, segment n)."""
@@ -80,44 +107,55 @@ def cut(
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
     segment = min(segment or max(8, round(SEGMENT / recording.step)), longest)
-    count = min(STRETCH, -(-longest // segment))
-    ratio = recording.gains.kp / recording.nominal.get("stiffness", np.full(len(recording.joints), np.inf))
-    elastic = ratio / (1.0 + ratio)
-    pieces = [piece for k, trial in enumerate(trials) for piece in _pieces(trial, k, segment, count, noise, recording.read, elastic)]
-    names = ("commands", "measured", "weight", "position", "speed", "acceleration", "trial", "initialisation", "time")
-    columns = {name: np.array([piece[name] for piece in pieces]) for name in names}
-    return Stretches(**columns, history=round(HISTORY / recording.step), segment=segment)
+    rows = segment * min(STRETCH, -(-longest // segment))
+    history = min(round(HISTORY / recording.step), (longest - 1) // rows * rows)
+    pieces = [
+        piece for k, trial in enumerate(trials) for piece in _pieces(recording, trial, k, rows, segment, history, noise)
+    ]
+    columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
+    forces = tuple(piece["force"] for piece in pieces)
+    return Stretches(**columns, forces=forces, history=history, segment=segment)  # type: ignore[arg-type]
 
 
 def _pieces(
-    trial: Trial, index: int, segment: int, count: int, noise: Array, reading: str, elastic: Array
-) -> list[dict[str, object]]:
-    rows, history = segment * count, round(HISTORY / trial.step)
-    middle = _impulses(trial.command, reading)
-    measured = trial.position + _half_jump(middle, reading, elastic)
-    pieces = []
+    recording: Recording, trial: Trial, index: int, rows: int, segment: int, history: int, noise: Array
+) -> Iterator[dict[str, object]]:
+    stiffness = recording.nominal.get("stiffness", np.full(len(recording.joints), np.inf))
+    elastic = trial.gains.kp / stiffness / (1.0 + trial.gains.kp / stiffness)
+    middle = _impulses(trial.command, recording.read) / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
+    if recording.torque_controlled:
+        elastic = TORQUE_MODE_GAIN / stiffness
+    measured = trial.position + _half_jump(middle, recording.read, elastic)
     for first in range(0, len(trial.time), rows):
-        wanted = np.arange(first - history, first + rows)
-        inside = (np.arange(first, first + rows) < len(trial.time))[:, None]
-        usable = np.clip(np.arange(first, first + rows), 0, len(trial.time) - 1)
-        weight = np.where(inside & trial.valid[usable][:, None], 1.0 / noise, 0.0)
-        if np.count_nonzero(weight[:, 0]) < 4:
+        span = np.arange(first, first + rows)
+        usable = np.minimum(span, len(trial.time) - 1)
+        present = (span < len(trial.time)) & trial.valid[usable]
+        if np.count_nonzero(present) < FEWEST:
             continue
-        state = _states(trial, np.minimum(first + segment * np.arange(count), len(trial.time) - 1))
-        pieces.append(
-            {
-                "commands": middle[np.clip(wanted, 0, len(trial.time) - 1)],
-                "measured": measured[usable],
-                "weight": weight,
-                "position": state[0],
-                "speed": state[1],
-                "acceleration": state[2],
-                "trial": index,
-                "initialisation": trial.initialisation,
-                "time": first * trial.step,
-            }
-        )
-    return pieces
+        starts = np.minimum(span[::segment], len(trial.time) - 1)
+        position, speed, acceleration = _states(trial, starts)
+        yield {
+            "commands": middle[np.clip(np.arange(first - history, first + rows), 0, len(trial.time) - 1)],
+            "measured": measured[usable],
+            "weight": present[:, None] / noise,
+            "position": position,
+            "speed": speed,
+            "acceleration": acceleration,
+            "gains": _gains(recording, trial),
+            "trial": index,
+            "initialisation": trial.initialisation,
+            "time": first * trial.step,
+            "clamped": trial.clamped,
+            "force": trial.force,
+        }
+
+
+def _gains(recording: Recording, trial: Trial) -> Array:
+    """kp, kd and torque limit (3, n) of a trial over those of the recording; 1 where the recording has none."""
+    own = np.array([trial.gains.kp, trial.gains.kd, trial.gains.torque_limit])
+    common = np.array([recording.gains.kp, recording.gains.kd, recording.gains.torque_limit])
+    usable = (common > 0) & np.isfinite(common) & np.isfinite(own) & (not recording.torque_controlled)
+    return np.where(usable, own / np.where(usable, common, 1.0), 1.0)
 
 
 def _impulses(command: Array, reading: str) -> Array:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from tactile_cube.identification.evidence import p_value
-from tactile_cube.identification.search import FLOOR, Explanation, Findings
+from tactile_cube.identification.explanation import Explanation
+from tactile_cube.identification.search import FLOOR, Findings
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 AS_GOOD = 1.05  # squared error of a rival over that of the best explanation that still counts as equal

@@ -1,0 +1,43 @@
+"""A set of effects that may be what is missing, fitted and judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from tactile_cube.identification.candidates import Candidate
+from tactile_cube.identification.evidence import Judgement
+from tactile_cube.identification.gauss_newton import Fit
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects with everything refitted.
+
+    Attributes:
+        effects: candidates in the order in which they were added.
+        fit: on the fitted trials.
+        judgement: on the held-out trials.
+        p_value: of the last effect, corrected for the number of candidates.
+        gain: held-out share that the last effect explains.
+    """
+
+    effects: tuple[Candidate, ...]
+    fit: Fit = field(repr=False)
+    judgement: Judgement = field(repr=False)
+    p_value: float
+    gain: float
+
+    @property
+    def error(self) -> float:
+        """Held-out error in units of the sensor noise."""
+        return self.judgement.error
+
+    @property
+    def label(self) -> str:
+        """Readable."""
+        return " & ".join(c.label for c in self.effects) or "base"
+
+    @property
+    def size(self) -> int:
+        """Numbers fitted beyond the base."""
+        return sum(c.size for c in self.effects)

@@ -1,0 +1,77 @@
+"""Which period an effect could have: peaks in the spectrum of the missing torque over the position."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects.effect import Effect, Stage
+from tactile_cube.identification.candidates import Candidate, forms
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.problem import Problem
+from tactile_cube.identification.residual_shape import Missing, missing_torques
+from tactile_cube.measurement.recording import Recording
+
+Array = NDArray[np.float64]
+HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position
+LOWEST, HIGHEST = 2.5, 160.0  # [1/rad]
+RESOLUTION = 0.8  # grid step times the range of motion: finer than half a peak
+PEAKS = 2
+MOST_SAMPLES = 8000
+
+
+def periodic_candidates(
+    problem: Problem, recording: Recording, model: Model, residual: Array, effects: Sequence[type[Effect]]
+) -> list[Candidate]:
+    """Candidates at the strongest harmonics of what is missing, for every effect that has one."""
+    periodic = [effect for effect in effects if any(HARMONIC in form for form in forms(effect))]
+    if not periodic:
+        return []
+    found = []
+    for missing in missing_torques(problem, recording, model, residual):
+        damping = float(model.constants["kd"][recording.joints.index(missing.joint)])
+        for effect in periodic:
+            moving = effect.stage is Stage.POSITION_SENSOR
+            found += [
+                Candidate(effect, (missing.joint,), start)
+                for form in forms(effect)
+                for start in _starts(missing, form, damping if moving else None)
+            ]
+    return found
+
+
+def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) -> list[Mapping[str, float]]:
+    """The form at each strong harmonic, with the phase that the missing torque has there.
+
+    A torque that repeats with the position is seen as it is; an error of the position sensor through its slope over
+    time, which the controller damps.
+    """
+    position = missing.signals[f"position of {missing.joint} [rad]"]
+    speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
+    weight = np.ones_like(position) if damping is None else speed
+    starts: list[Mapping[str, float]] = []
+    for harmonic, sine, cosine in peaks(position, missing.torque, weight):
+        if damping is not None:  # damping * d/dt (a sin + b cos) = damping * n v (a cos - b sin)
+            sine, cosine = cosine / (damping * harmonic), -sine / (damping * harmonic)
+        size = max(abs(form["sine"]), 1e-9)
+        known = max(np.hypot(sine, cosine), 0.1 * size)
+        angle = np.arctan2(cosine, sine)
+        starts.append({**form, "sine": known * np.cos(angle), "cosine": known * np.sin(angle), HARMONIC: harmonic})
+    return starts
+
+
+def peaks(position: Array, torque: Array, weight: Array) -> list[tuple[float, float, float]]:
+    """Strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first."""
+    every = max(1, len(position) // MOST_SAMPLES)
+    q, t, w = position[::every], torque[::every], weight[::every]
+    slow = np.vander((q - q.mean()) / max(np.ptp(q), 1e-9), 4)
+    t = t - slow @ np.linalg.lstsq(slow, t, rcond=None)[0]
+    grid = np.arange(LOWEST, HIGHEST, RESOLUTION / max(np.ptp(q), 0.05))
+    spectrum = np.array([np.dot(w * t, np.exp(1j * n * q)) for n in grid])
+    power = np.abs(spectrum) ** 2
+    inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
+    strongest = inner[np.argsort(-power[inner])][:PEAKS]
+    size = 0.5 * np.sum(w**2)
+    return [(float(grid[k]), float(spectrum[k].imag / size), float(spectrum[k].real / size)) for k in strongest]

@@ -1,0 +1,44 @@
+"""Joint offsets that do not change between robot initialisations: an encoder whose zero is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.identification.candidates import Candidate
+from tactile_cube.identification.explanation import Explanation
+from tactile_cube.identification.model import Model, Term
+from tactile_cube.measurement.recording import Recording
+
+EFFECT = "position_offset"
+LEAST = 0.012  # [rad] joint offsets below this are ordinary
+OVER_SCATTER = 2.5  # mean offset over the scatter between initialisations that makes it a shared one
+
+
+def shared_offset(base: Explanation, fitted: Recording, effects: Sequence[type[Effect]]) -> Explanation | None:
+    """The base model with the offsets that all initialisations share as an effect; None if there are none.
+
+    A joint offset that differs between initialisations is what initialising does, and no error of the model.
+    """
+    effect = next((effect for effect in effects if effect.name == EFFECT), None)
+    offsets = -np.array([base.judgement.model.posture[k] for k in sorted(base.judgement.model.posture)])
+    if effect is None or len(offsets) < 2:
+        return None
+    mean, scatter = offsets.mean(axis=0), offsets.std(axis=0, ddof=1)
+    shared = (np.abs(mean) > LEAST) & (np.abs(mean) > OVER_SCATTER * scatter)
+    if not shared.any():
+        return None
+    places = np.flatnonzero(shared)
+    joints = tuple(fitted.joints[j] for j in places)
+    terms = tuple(Term(effect, fitted.joints[j], {"offset": float(mean[j])}, ("offset",)) for j in places)
+    posture = {key: value + np.where(shared, mean, 0.0) for key, value in base.fit.model.posture.items()}
+    model = Model(base.fit.model.constants, (*base.fit.model.terms, *terms), posture)
+    ratio = np.abs(mean[shared]) / np.maximum(scatter[shared], 1e-9) * np.sqrt(len(offsets))
+    likely = float(2.0 * student_t.sf(ratio.min(), len(offsets) - 1))
+    candidate = Candidate(effect, joints, {"offset": float(np.abs(mean[shared]).max())})
+    fit = replace(base.fit, model=model)
+    return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=min(1.0, likely))
