@@ -1,67 +1,112 @@
-"""The bench tests of the paper as trials: a known force on a static finger (K_P), clamped links under torque (K_e).
+"""The bench tests of the paper as trials: what to command, what is known.
+
+A known force on a static finger shows kp, clamped links under torque show the drive's stiffness, links moved until they
+touch show the range of the joint offsets; free motion, for kd and friction, is every other trial.
 
 Source: Sievers, Pitz, Bauml (ICRA 2022), section II-D.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.description import Description, KnownForce, TrialEntry
+from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.measurement.description import Description, KnownForce, Touch, TrialEntry
 from tactile_cube.measurement.excitation import safe_range
+from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.rig import Rig
 
 Array = NDArray[np.float64]
-BENCH_KINDS = ("known_force", "clamped")
-FORCE = 2.0  # [N] on the last link
-FORCES = 4  # weights, the first of them none
+FORCE = 2.0  # [N] the largest, on the last link
+WEIGHTS = 4  # of which the first is none
 HOLD = 2.0  # [s] with each weight
-SWEEP = 0.2  # [rad] of the command about the clamped posture
-SWEEP_TIME = 4.0  # [s]
+SWEEP, SWEEP_TIME = 0.2, 4.0  # [rad], [s] of the command about a clamped posture
+PRESS, APPROACH = 0.1, 2.0  # [rad] beyond the touch, [s] to get there
+
+BenchTrial = tuple[TrialEntry, Array]
 
 
-def bench_trials(
-    rig: Rig, description: Description, kinds: Iterable[str], initialisations: int, rng: np.random.Generator
-) -> list[tuple[TrialEntry, Array]]:
+@dataclass(frozen=True)
+class Bench:
+    """A rig on the bench: its description and a source of postures."""
+
+    rig: Rig
+    description: Description
+    rng: np.random.Generator
+
+    def posture(self) -> Array:
+        """Angles (joints,) [rad] in the middle half of every joint's range."""
+        low, high = np.array([safe_range(self.rig.joints[joint], 0.5) for joint in self.description.joints]).T
+        return np.asarray(self.rng.uniform(low, high))
+
+    def tip(self) -> tuple[str, list[float]]:
+        """The last joint and a point on its link, as far beyond its centre of mass as the joint is before it [m]."""
+        coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in self.description.coupled.items()}
+        tree = RigidBodyTree.from_urdf(self.rig.text, self.description.joints, coupled)
+        return tree.dof_names[-1], (2 * tree.com[-1]).tolist()
+
+    def time(self, duration: float) -> Array:
+        """Sample times [s]."""
+        return np.arange(round(duration * self.description.rate_hz)) / self.description.rate_hz
+
+
+def bench_trials(bench: Bench, kinds: Iterable[str], initialisations: int) -> list[BenchTrial]:
     """Entries and commands (n, joints) [rad] of the bench tests among `kinds`, for every initialisation."""
-    makers = {"known_force": _known_force, "clamped": _clamped}
-    chosen = [kind for kind in kinds if kind in makers]
-    return [
-        trial
-        for number in range(initialisations)
-        for kind in chosen
-        for trial in makers[kind](rig, description, number, rng)
-    ]
+    chosen = [kind for kind in kinds if kind in BENCH_KINDS]
+    return [trial for number in range(initialisations) for kind in chosen for trial in BENCH_KINDS[kind](bench, number)]
 
 
-def _known_force(
-    rig: Rig, description: Description, number: int, rng: np.random.Generator
-) -> list[tuple[TrialEntry, Array]]:
-    """One posture, held under several weights; each weight is a trial of its own."""
-    low, high = np.array([safe_range(rig.joints[joint], 0.5) for joint in description.joints]).T
-    posture = rng.uniform(low, high)
-    samples = round(HOLD * description.rate_hz)
-    last = (list(description.joints) + list(description.coupled))[-1]
+def without_bench(recording: Recording) -> Recording:
+    """The recording without its bench tests: free motion alone."""
+    return recording.with_trials([trial for trial in recording.trials if not trial.is_bench])
+
+
+def _known_force(bench: Bench, number: int) -> list[BenchTrial]:
+    """One posture, held under several weights that pull one way; each weight is a trial of its own."""
+    posture, direction = bench.posture(), bench.rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    last, point = bench.tip()
     trials = []
-    for step in range(FORCES):
-        direction = rng.normal(size=3)
-        vector = (FORCE * step / (FORCES - 1) * direction / np.linalg.norm(direction)).tolist()
-        force = KnownForce(joint=last, point=[0.0, 0.0, 0.0], vector=vector)
-        file = f"trials/known_force_{number}_{step}.parquet"
+    for weight in range(WEIGHTS):
+        vector = (FORCE * weight / (WEIGHTS - 1) * direction).tolist()
+        file = f"trials/known_force_{number}_{weight}.parquet"
+        force = KnownForce(joint=last, point=point, vector=vector)
         entry = TrialEntry(file=file, initialisation=number, kind="known_force", force=force)
-        trials.append((entry, np.tile(posture, (samples, 1))))
+        trials.append((entry, np.tile(posture, (len(bench.time(HOLD)), 1))))
     return trials
 
 
-def _clamped(
-    rig: Rig, description: Description, number: int, rng: np.random.Generator
-) -> list[tuple[TrialEntry, Array]]:
+def _clamped(bench: Bench, number: int) -> list[BenchTrial]:
     """Links held still while every command sweeps about the posture: the drive alone gives way."""
-    low, high = np.array([safe_range(rig.joints[joint], 0.5) for joint in description.joints]).T
-    posture = rng.uniform(low, high)
-    time = np.arange(round(SWEEP_TIME * description.rate_hz)) / description.rate_hz
-    sweep = SWEEP * np.sin(2 * np.pi * time / SWEEP_TIME)
+    sweep = SWEEP * np.sin(2 * np.pi * bench.time(SWEEP_TIME) / SWEEP_TIME)
     file = f"trials/clamped_{number}.parquet"
     entry = TrialEntry(file=file, initialisation=number, kind="clamped", clamped=True)
-    return [(entry, posture + sweep[:, None])]
+    return [(entry, bench.posture() + sweep[:, None])]
+
+
+def _touch(bench: Bench, number: int) -> list[BenchTrial]:
+    """Every joint in turn is moved against an obstacle and pressed there a little."""
+    trials = []
+    for index, joint in enumerate(bench.description.joints):
+        posture = bench.posture()
+        angle = float(posture[index] + 0.2)
+        way = np.clip(bench.time(APPROACH + HOLD) / APPROACH, 0.0, 1.0)
+        command = np.tile(posture, (len(way), 1))
+        command[:, index] += (0.2 + PRESS) * way
+        entry = TrialEntry(
+            file=f"trials/touch_{number}_{joint}.parquet",
+            initialisation=number,
+            kind="touch",
+            touch=Touch(joint=joint, angle=angle),
+        )
+        trials.append((entry, command))
+    return trials
+
+
+BENCH_KINDS: dict[str, Callable[[Bench, int], list[BenchTrial]]] = {
+    "known_force": _known_force,
+    "clamped": _clamped,
+    "touch": _touch,
+}

@@ -76,6 +76,18 @@ class KnownForce(_Strict):
     vector: Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
+class Touch(_Strict):
+    """A link is moved until it touches something whose place is known.
+
+    Attributes:
+        joint: the joint that moves.
+        angle: its true angle at the touch, from the geometry of link and obstacle [rad].
+    """
+
+    joint: str
+    angle: float
+
+
 class TrialEntry(_Strict):
     """One trial: its file, the robot initialisation it belongs to and the kind of excitation.
 
@@ -86,6 +98,7 @@ class TrialEntry(_Strict):
         controller: gains of this trial where they differ from the recording's.
         force: a known force on a static finger (bench test of kp).
         clamped: the links are held still (bench test of the drive stiffness).
+        touch: a link ends at a known place (bench test of the joint offsets).
         note: free text.
     """
 
@@ -95,6 +108,7 @@ class TrialEntry(_Strict):
     controller: ControllerChange | None = None
     force: KnownForce | None = None
     clamped: bool = False
+    touch: Touch | None = None
     note: str = ""
 
 

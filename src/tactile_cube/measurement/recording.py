@@ -164,6 +164,7 @@ def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: R
         gains,
         entry.force,
         entry.clamped,
+        entry.touch,
         tuple(warnings + time_warnings),
     )
 

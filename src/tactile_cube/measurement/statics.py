@@ -26,7 +26,9 @@ def swap_warning(recording: Recording) -> str | None:
     """A warning if the torques fit the weight of the links far better with two joints swapped, else None."""
     if recording.torque_controlled or len(recording.joints) < 2:
         return None
-    still = [_still(trial, trial.torque) for trial in recording.trials if trial.torque is not None and _free(trial)]
+    still = [
+        _still(trial, trial.torque) for trial in recording.trials if trial.torque is not None and not trial.is_bench
+    ]
     position = np.concatenate([one[0] for one in still]) if still else np.zeros((0, len(recording.joints)))
     if len(position) < FEWEST:
         return None
@@ -49,10 +51,6 @@ def swap_warning(recording: Recording) -> str | None:
         f"{recording.folder}: columns '{one}.torque' and '{two}.torque' miss the weight of the links by "
         f"{as_named:.3f} N m, and by {best:.3f} N m with the two joints exchanged: are they swapped?"
     )
-
-
-def _free(trial: Trial) -> bool:
-    return not trial.clamped and trial.force is None
 
 
 def _still(trial: Trial, torque: Array) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.description import KnownForce
+from tactile_cube.measurement.description import KnownForce, Touch
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,7 @@ class Trial:
         gains: the controller in this trial.
         force: a known force on a link, or None.
         clamped: the links were held still.
+        touch: the link ended at a known place, or None.
     """
 
     name: str
@@ -50,7 +51,13 @@ class Trial:
     gains: Gains
     force: KnownForce | None = None
     clamped: bool = False
+    touch: Touch | None = None
     warnings: tuple[str, ...] = field(default=(), repr=False)
+
+    @property
+    def is_bench(self) -> bool:
+        """Whether it is a bench test, and not free motion."""
+        return self.clamped or self.force is not None or self.touch is not None
 
     @property
     def step(self) -> float:

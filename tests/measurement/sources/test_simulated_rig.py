@@ -58,19 +58,6 @@ def test_positions_are_quantised_and_offsets_differ(urdf: str) -> None:
     assert made.description.sensors.position_resolution == 0.01
 
 
-def test_bench_tests_are_trials_of_their_kind(urdf: str, tmp_path: Path) -> None:
-    made = SimulatedRig(urdf=urdf, kinds=["known_force", "clamped"], validation=False, **SETTINGS).recordings(seed=0)
-    write_recording(tmp_path / "r", made[""])
-    trials = read_recording(tmp_path / "r").trials
-    forces = [trial.force for trial in trials if trial.kind == "known_force"]
-    assert len(forces) == 8
-    assert all(force is not None for force in forces)
-    clamped = next(trial for trial in trials if trial.clamped)
-    assert clamped.torque is not None
-    slope = np.polyfit(clamped.torque[:, 0], clamped.position[:, 0], 1)[0]
-    assert slope == pytest.approx(1 / 25.0, rel=0.05)
-
-
 def test_a_hidden_effect_takes_typical_values_unless_told() -> None:
     name, values = parse_effect("stribeck_friction@q3: excess=0.08")
     assert name == "stribeck_friction@q3"

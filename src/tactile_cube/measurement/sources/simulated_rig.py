@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
-from tactile_cube.measurement.bench import BENCH_KINDS, bench_trials
-from tactile_cube.measurement.description import Coupling, Description, TrialEntry, per_joint
+from tactile_cube.measurement.bench import BENCH_KINDS, Bench, bench_trials
+from tactile_cube.measurement.description import Coupling, Description, Touch, TrialEntry, per_joint
 from tactile_cube.measurement.excitation import excitation, safe_range
 from tactile_cube.measurement.parameters import Parameters
 from tactile_cube.measurement.recording import Recording
@@ -21,6 +21,7 @@ from tactile_cube.measurement.trial import Gains, Trial
 from tactile_cube.measurement.writing import RecordingTables, TrialTable
 
 Array = NDArray[np.float64]
+OBSTACLE = 500.0  # [N m/rad] stiffness of what a link touches
 SETTLING = 1.0  # [s] at the first command before a trial is logged
 BUILT_IN = {"finger": lambda: finger_urdf(DLR_HAND2), "hand": lambda: hand_urdf(DLR_HAND2)}
 
@@ -82,7 +83,8 @@ class SimulatedRig:
         commands = {kind: self._command(kind, rig, description, rng) for kind in self.kinds if kind not in BENCH_KINDS}
         fresh = {kind: self._command(kind, rig, description, rng) for kind in commands}
         rig_only = _unmeasured(description, rig, constants)
-        simulator = Replay(rig_only, [name for name, _ in effects], self.step, self.engine)
+        stops = [f"joint_stop@{joint}" for joint in description.joints] if "touch" in self.kinds else []
+        simulator = Replay(rig_only, [*(name for name, _ in effects), *stops], self.step, self.engine)
         session = _Session(self, simulator, constants, effects, rng)
         last = self.initialisations - 1
         repeated = [
@@ -90,7 +92,7 @@ class SimulatedRig:
             for n, offset in enumerate(offsets)
             for kind, command in commands.items()
         ]
-        bench = bench_trials(rig, description, self.kinds, self.initialisations, rng)
+        bench = bench_trials(Bench(rig, description, rng), self.kinds, self.initialisations)
         benched = [session.play(entry, command, offsets[entry.initialisation]) for entry, command in bench]
         result = {"": RecordingTables(description, rig.text, repeated + benched)}
         if self.validation:
@@ -147,13 +149,19 @@ class _Session:
         """Simulate one trial and log it as the rig's sensors would."""
         settle = round(SETTLING * self.settings.rate)
         trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), self.simulator.recording, entry)
-        result = self.simulator.simulate([trial], Parameters(self.constants, self.effects, -offset))[0]
+        effects = self.effects if entry.touch is None else (*self.effects, self._obstacle(entry.touch, offset))
+        result = self.simulator.simulate([trial], Parameters(self.constants, effects, -offset))[0]
         position = result.position[settle:] + self.rng.normal(0, self.settings.noise, command.shape)
         if self.settings.resolution > 0:
             position = np.round(position / self.settings.resolution) * self.settings.resolution
         torque = result.torque[settle:] + self.rng.normal(0, self.settings.torque_noise, command.shape)
         time = np.arange(len(command)) / self.settings.rate
         return TrialTable(entry, time, command, position, torque)
+
+    def _obstacle(self, touch: Touch, offset: Array) -> tuple[str, dict[str, float]]:
+        """A hard stop where the touching joint meets the obstacle, in the coordinates of its sensor."""
+        place = touch.angle + float(offset[self.simulator.recording.joints.index(touch.joint)])
+        return f"joint_stop@{touch.joint}", {"upper": place, "stiffness": OBSTACLE, "damping": 0.5}
 
 
 def _unmeasured(description: Description, rig: Rig, constants: dict[str, Array]) -> Recording:
