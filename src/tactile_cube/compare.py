@@ -20,6 +20,7 @@ def main(config: DictConfig) -> None:
     from omegaconf import OmegaConf
 
     from tactile_cube.drivetrain.model_file import read_model
+    from tactile_cube.measurement.bench import without_touches
     from tactile_cube.measurement.comparison import as_json, compare
     from tactile_cube.measurement.recording import read_recording
     from tactile_cube.visualization.comparison_report import comparison_report
@@ -29,7 +30,7 @@ def main(config: DictConfig) -> None:
     begin = time.perf_counter()
     folder = Path(HydraConfig.get().runtime.output_dir)
     model = read_model(config.model) if config.model is not None else None
-    recording = read_recording(config.recording)
+    recording = without_touches(read_recording(config.recording))
     for line in recording.warnings:
         print(f"warning: {line}", file=sys.stderr)
     spread = OmegaConf.to_container(config.band.spread)

@@ -11,7 +11,7 @@ SHAPES = 3  # of the missing torque of one joint, most telling first
 
 @verb("diagnose")
 def main(config: DictConfig) -> None:
-    """Write diagnosis.json, model.yaml and report.html; print the answer in plain words."""
+    """Write diagnosis.json, model.yaml, report.html and diagnosis.rrd; print the answer in plain words."""
     import json
     import shlex
     import sys
@@ -26,6 +26,7 @@ def main(config: DictConfig) -> None:
     from tactile_cube.identification.diagnosis_json import as_json
     from tactile_cube.identification.in_words import answer
     from tactile_cube.identification.recommended import model_file
+    from tactile_cube.measurement.bench import without_touches
     from tactile_cube.measurement.comparison import compare
     from tactile_cube.measurement.recording import read_recording
     from tactile_cube.visualization.comparison_episode import write_comparison
@@ -35,7 +36,7 @@ def main(config: DictConfig) -> None:
 
     begin = time.perf_counter()
     folder = Path(HydraConfig.get().runtime.output_dir)
-    recording = read_recording(config.recording)
+    recording = without_touches(read_recording(config.recording))
     for line in recording.warnings:
         print(f"warning: {line}", file=sys.stderr)
     effects = dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)])

@@ -22,6 +22,8 @@ def main(config: DictConfig) -> None:
     from tactile_cube.identification.identification import identify
     from tactile_cube.identification.in_words import staircase
     from tactile_cube.identification.recommended import model_file
+    from tactile_cube.measurement.bench import without_touches
+    from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
     from tactile_cube.measurement.comparison import compare
     from tactile_cube.measurement.recording import read_recording
     from tactile_cube.visualization.comparison_episode import write_comparison
@@ -38,9 +40,12 @@ def main(config: DictConfig) -> None:
     def say(line: str) -> None:
         print(f"[{time.perf_counter() - begin:5.1f} s] {line}", file=sys.stderr, flush=True)
 
+    offsets = bench_estimates(recording).offsets
+    recording = without_touches(recording)
     found = identify(recording, list(config.effects), config.engine, config.step, config.seed, say)
     command = shlex.join(["python", "-m", "tactile_cube.identify", *sys.argv[1:]])
     model = model_file(recording, found.fitted, found.errors(), found.held_out, command, config.seed)
+    model = BenchEstimates(offsets=offsets).into(model)
     write_model(model, folder / "model.yaml")
     stages = {name: summary.overall for name, summary in found.stages.items()} | {"noise_floor": found.floor.overall}
     joints = {name: summary.joints for name, summary in found.stages.items()}

@@ -63,6 +63,11 @@ def without_bench(recording: Recording) -> Recording:
     return recording.with_trials([trial for trial in recording.trials if not trial.is_bench])
 
 
+def without_touches(recording: Recording) -> Recording:
+    """The recording without links that touch something, which no model of a free mechanism can follow."""
+    return recording.with_trials([trial for trial in recording.trials if trial.touch is None])
+
+
 def _known_force(bench: Bench, number: int) -> list[BenchTrial]:
     """One posture, held under several weights that pull one way; each weight is a trial of its own."""
     posture, direction = bench.posture(), bench.rng.normal(size=3)
