@@ -8,6 +8,9 @@ from tactile_cube.identification.candidates import Candidate
 from tactile_cube.identification.evidence import Judgement
 from tactile_cube.identification.gauss_newton import Fit
 
+FLOOR = 1.1  # error / sensor noise at which nothing is left to explain
+NEARLY, NEARLY_EXPLAINED = 1.5, 0.99  # the same where almost all of a large error is explained: laws differ in detail
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -41,3 +44,11 @@ class Explanation:
     def size(self) -> int:
         """Numbers fitted beyond the base."""
         return sum(c.size for c in self.effects)
+
+    def explained(self, base: Explanation) -> float:
+        """Share of the base model's excess over the sensor noise that is explained."""
+        return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
+
+    def complete(self, base: Explanation) -> bool:
+        """Whether nothing is left that would be worth a further effect."""
+        return self.error <= FLOOR or (self.error <= NEARLY and self.explained(base) >= NEARLY_EXPLAINED)

@@ -84,7 +84,7 @@ def temper(problem: Problem, cost: float) -> float:
     While the model is wrong its error is far above the noise and remembers itself; taking it for white noise would let
     the constants soak it up. So expectations weigh as much more as the error is larger and longer than noise.
     """
-    excess = cost / max(np.count_nonzero(problem.weight), 1) - 1.0
+    excess = cost / max(float(np.count_nonzero(problem.weight)), 1.0) - 1.0
     return 1.0 + CORRELATED * max(excess, 0.0)
 
 

@@ -81,9 +81,8 @@ def identify(
     fitted_part, held_out = held_out_split(recording, seed=seed)
     classes = tuple(dict.fromkeys(effect for effect, _ in wanted))
     search = Search(fitted_part, held_out, sensor_noise(recording), classes, say)
-    stages = {"nominal": search.start_held_out, "refitted": None}
     base = search.fit_base()
-    stages["refitted"] = base.judgement.model
+    stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
     current = base.fit
     for effect, joint in wanted:
         current = _with_effect(search, current, effect, joint)

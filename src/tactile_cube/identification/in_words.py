@@ -28,11 +28,17 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
         f"noise floor {_mrad(error['noise_floor'])}."
     )
     if experiment is not None:
-        lines.append(
-            f"To decide, play {result['next_experiment']} ({experiment.name}): at {experiment.joint} the candidates "
-            f"will differ by at least {_mrad(experiment.difference)}."
-        )
+        lines.append(f"To decide, play {result['next_experiment']}: {expected(experiment)}")
     return "\n".join(lines)
+
+
+def expected(experiment: Experiment) -> str:
+    """What the next experiment is expected to show."""
+    names = ", ".join(experiment.predictions)
+    return (
+        f"{experiment.name} of {experiment.time[-1]:.0f} s; at {experiment.joint} any two of {names} will differ by at "
+        f"least {_mrad(experiment.difference)}."
+    )
 
 
 def _effect(entry: dict[str, Any]) -> str:

@@ -47,7 +47,7 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     correction = segments / max(segments - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse
     variance = np.maximum(np.diag(robust), np.diag(inverse))
-    return np.sqrt(variance) * np.array([u.scale for u in fitted.unknowns])
+    return np.asarray(np.sqrt(variance) * np.array([u.scale for u in fitted.unknowns]))
 
 
 def bounds(fitted: Fitted) -> dict[tuple[str, str, int, int], tuple[float, float, float]]:

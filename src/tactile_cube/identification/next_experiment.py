@@ -78,7 +78,7 @@ def safe_excitations(recording: Recording, seed: int) -> dict[str, Array]:
     everything = np.concatenate([trial.command for trial in recording.trials])
     low, high = everything.min(axis=0), everything.max(axis=0)
     fastest = max(np.abs(np.diff(trial.command, axis=0)).max() / trial.step for trial in recording.trials)
-    time = np.arange(round(DURATION / recording.step)) * recording.step
+    time: Array = np.arange(round(DURATION / recording.step), dtype=np.float64) * recording.step
     rng = np.random.default_rng(seed)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     phases = rng.uniform(0.0, 2.0 * np.pi, len(low))
@@ -113,7 +113,7 @@ def _limited(command: Array, most: float) -> Array:
 
 
 def _trial(recording: Recording, name: str, commands: Array) -> Trial:
-    time = np.arange(len(commands)) * recording.step
+    time: Array = np.arange(len(commands), dtype=np.float64) * recording.step
     valid = np.ones(len(time), dtype=bool)
     return Trial(name, "", name, 0, time, commands, commands.copy(), None, valid, recording.gains)
 

@@ -18,7 +18,7 @@ def sensor_noise(recording: Recording) -> Array:
         [_white(trial.position[trial.valid, j]) for j in range(len(recording.joints))] for trial in recording.trials
     ]
     resolution = recording.description.sensors.position_resolution
-    return np.maximum(np.median(np.array(estimates), axis=0), max(resolution / np.sqrt(12.0), SMALLEST))
+    return np.asarray(np.maximum(np.median(np.array(estimates), axis=0), max(resolution / np.sqrt(12.0), SMALLEST)))
 
 
 def _white(signal: Array) -> float:

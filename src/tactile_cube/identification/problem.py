@@ -41,9 +41,9 @@ class Problem:
         acceleration = np.abs(self.stretches.acceleration).reshape(len(self.weight), -1)
         speed = START_SPEED + START_SPEED_PER_ACCELERATION * acceleration
         spread = np.concatenate([np.full_like(speed, START_POSITION), speed], axis=1)
-        self._starts = columns * self.weight[..., None] * spread[:, None]
+        self._starts = np.asarray(columns * self.weight[..., None] * spread[:, None])
         gram = np.swapaxes(self._starts, 1, 2) @ self._starts
-        self._inverse = np.linalg.inv(gram + np.eye(gram.shape[-1]))
+        self._inverse = np.asarray(np.linalg.inv(gram + np.eye(gram.shape[-1])), dtype=np.float64)
 
     def free(self, x: Array) -> Array:
         """Residuals or columns (G, R) or (G, R, P) with the starts integrated out."""
@@ -80,7 +80,7 @@ class Problem:
     def _masked(self, column: Array, unknown: Unknown) -> Array:
         if unknown.kind != "posture":
             return column
-        return column * (self.segment_initialisation == unknown.initialisation)[:, None]
+        return np.asarray(column * (self.segment_initialisation == unknown.initialisation)[:, None])
 
 
 def _key(unknown: Unknown) -> tuple[str, str, int]:

@@ -79,8 +79,8 @@ def screen(
         models = [c.added_to(base.model, v)[0] for c, v in zip(part, values[first : first + batch], strict=True)]
         for candidate, model, prediction in zip(part, models, problem.predictions(models), strict=True):
             pull, size, cross = view.terms(view.column(prediction))
-            left = size - cross @ np.linalg.solve(view.information, cross)
-            pull -= cross @ solved
+            left = size - float(cross @ np.linalg.solve(view.information, cross))
+            pull -= float(cross @ solved)
             factor = pull / left if left > 1e-6 * size and size > 1e-3 else 0.0
             scores.append(Score(candidate, model, factor * pull, factor))
     return sorted(scores, key=lambda score: -score.gain)

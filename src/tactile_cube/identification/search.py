@@ -12,7 +12,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.base import base_unknowns, nominal_model
 from tactile_cube.identification.candidates import Candidate, candidates, model_unknowns, placed
 from tactile_cube.identification.evidence import Judgement, gain, judge, p_value
-from tactile_cube.identification.explanation import Explanation
+from tactile_cube.identification.explanation import FLOOR, Explanation
 from tactile_cube.identification.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.periodicity import periodic_candidates
@@ -24,12 +24,12 @@ from tactile_cube.identification.stretches import Stretches, cut
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
-FLOOR = 1.1  # error / sensor noise at which nothing is left to explain
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
 SIGNIFICANT = 0.01  # after Holm's correction
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
 BRIEF = 3  # iterations of a brief refit
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
+REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
 COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 STRETCHES = 12  # enough data to search on; the final fit takes all
@@ -91,12 +91,12 @@ class Search:
         nominal = judge(self.judges, self.held_out, self.with_postures(self.start))
         levels: list[tuple[Explanation, ...]] = []
         scores: tuple[Score, ...] = ()
-        beam = (base,)
-        while len(levels) < DEEPEST and min(e.error for e in beam) > FLOOR:
-            found = [e for parent in beam for e in self.extend(parent)]
+        beam: tuple[Explanation, ...] = (base,)
+        while len(levels) < DEEPEST and not any(e.complete(base) for e in beam):
+            found = [(parent, e) for parent in beam for e in self.extend(parent)]
             if not scores:
                 scores = tuple(self.last_scores)
-            better = [e for e in found if worthwhile(e, len(levels))]
+            better = [e for parent, e in found if worthwhile(e, parent, base)]
             if not better:
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
@@ -172,15 +172,17 @@ class Search:
         return explanation
 
 
-def worthwhile(explanation: Explanation, depth: int) -> bool:
-    """Whether an effect earns its place: significantly, by more than a few per cent, further ones decisively."""
+def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation) -> bool:
+    """Whether an effect earns its place.
+
+    Significantly, and by more than a few per cent; a further effect has to complete the explanation, or to do most of
+    what is left while that is a real part of the whole.
+    """
     if explanation.gain < SMALLEST_GAIN or explanation.p_value > SIGNIFICANT:
         return False
-    if depth == 0 or explanation.error <= FLOOR:
+    if not parent.effects or explanation.error <= FLOOR:
         return True
-    before = explanation.judgement.costs.sum() / (1.0 - explanation.gain)
-    samples = explanation.judgement.samples.sum()
-    return bool(before - explanation.judgement.costs.sum() > COMPLETED * (before - samples))
+    return parent.explained(base) < REAL_PART and explanation.explained(parent) > COMPLETED
 
 
 def some(stretches: Stretches, count: int) -> Stretches:

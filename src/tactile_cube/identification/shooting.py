@@ -20,7 +20,6 @@ from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.replay import CLAMPED
 
 Array = NDArray[np.float64]
-CONSTANTS = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
 POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] finite differences of a segment's start
 
 
@@ -50,7 +49,8 @@ class Shooting:
         joints = len(self.recording.joints)
         nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
         moved = self._simulate([model] * (2 * joints + 1), np.vstack([nudge, np.zeros(2 * joints)]), stretches)
-        return (moved[:-1] - moved[-1]) / nudge.max(axis=1)[:, None, None, None]
+        slopes: Array = (moved[:-1] - moved[-1]) / nudge.max(axis=1)[:, None, None, None]
+        return slopes
 
     def _simulate(self, models: Sequence[Model], nudge: Array, stretches: Stretches) -> Array:
         count, rows = len(stretches), stretches.measured.shape[1]
@@ -97,7 +97,15 @@ class Shooting:
 
     def memory(self, model: Model) -> Array:
         """Memory (size,) of the plant with a model's constants and effects."""
-        constants = DrivetrainConstants(**{key: model.constants[key] for key in CONSTANTS})
+        known = model.constants
+        constants = DrivetrainConstants(
+            kp=known["kp"],
+            kd=known["kd"],
+            stiffness=known["stiffness"],
+            static_friction=known["static_friction"],
+            reflected_inertia=known["reflected_inertia"],
+            torque_limit=known["torque_limit"],
+        )
         memory: Array = self.plant.memory(constants, gravity=self.recording.gravity)
         self.plant.view(memory, "friction_creep")[:] = model.constants["friction_creep"]
         self.plant.view(memory, "command_torque_limit")[:] = np.inf

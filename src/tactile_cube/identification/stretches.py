@@ -76,7 +76,7 @@ class Stretches:
     @property
     def segments(self) -> int:
         """K, segments of a stretch."""
-        return self.position.shape[1]
+        return int(self.position.shape[1])
 
     def __len__(self) -> int:
         """S."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from tactile_cube.identification.evidence import p_value
-from tactile_cube.identification.explanation import Explanation
-from tactile_cube.identification.search import FLOOR, Findings
+from tactile_cube.identification.explanation import FLOOR, Explanation
+from tactile_cube.identification.search import Findings
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 AS_GOOD = 1.05  # squared error of a rival over that of the best explanation that still counts as equal
@@ -38,11 +38,10 @@ def decide(findings: Findings) -> Verdict:
     base = findings.base
     if not findings.levels:
         return Verdict("adequate" if base.error <= ADEQUATE else "unknown_effect", base)
-    level = next((level for level in findings.levels if level[0].error <= FLOOR), findings.levels[-1])
+    level = next((level for level in findings.levels if level[0].complete(base)), findings.levels[-1])
     chosen = simplest(level)
-    explained = (base.error**2 - chosen.error**2) / (base.error**2 - 1.0)
-    complete = chosen.error <= TOLERATED or (explained > EXPLAINED and chosen.error < TOLERATED_IF_EXPLAINED)
-    if not complete:
+    near = chosen.explained(base) > EXPLAINED and chosen.error < TOLERATED_IF_EXPLAINED
+    if chosen.error > TOLERATED and not near:
         return Verdict("unknown_effect", chosen)
     rivals = find_rivals(chosen, level)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
