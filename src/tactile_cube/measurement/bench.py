@@ -21,9 +21,10 @@ from tactile_cube.measurement.rig import Rig
 Array = NDArray[np.float64]
 FORCE = 2.0  # [N] the largest, on the last link
 WEIGHTS = 4  # of which the first is none
-HOLD = 2.0  # [s] with each weight
+SIDE = 0.1  # [rad] from either side of which a weighed posture is approached, so that friction cancels
+MOVE, HOLD = 0.5, 1.0  # [s] of each approach and of each hold
 SWEEP, SWEEP_TIME = 0.2, 4.0  # [rad], [s] of the command about a clamped posture
-PRESS, APPROACH = 0.1, 2.0  # [rad] beyond the touch, [s] to get there
+PRESS, APPROACH = 0.1, 2.0  # [rad] beyond the touch, [s] to get there; then HOLD
 
 BenchTrial = tuple[TrialEntry, Array]
 
@@ -69,7 +70,7 @@ def without_touches(recording: Recording) -> Recording:
 
 
 def _known_force(bench: Bench, number: int) -> list[BenchTrial]:
-    """One posture, held under several weights that pull one way; each weight is a trial of its own."""
+    """One posture, approached from both sides under several weights that pull one way; a trial for each weight."""
     posture, direction = bench.posture(), bench.rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     last, point = bench.tip()
@@ -79,8 +80,14 @@ def _known_force(bench: Bench, number: int) -> list[BenchTrial]:
         file = f"trials/known_force_{number}_{weight}.parquet"
         force = KnownForce(joint=last, point=point, vector=vector)
         entry = TrialEntry(file=file, initialisation=number, kind="known_force", force=force)
-        trials.append((entry, np.tile(posture, (len(bench.time(HOLD)), 1))))
+        trials.append((entry, posture + _from_both_sides(bench)[:, None]))
     return trials
+
+
+def _from_both_sides(bench: Bench) -> Array:
+    """Offset (n,) [rad] of a command that comes to rest at zero from above and then from below."""
+    corners = np.cumsum([0.0, MOVE, MOVE, HOLD, MOVE, MOVE, HOLD])
+    return np.asarray(np.interp(bench.time(corners[-1]), corners, SIDE * np.array([0, 1, 0, 0, -1, 0, 0])))
 
 
 def _clamped(bench: Bench, number: int) -> list[BenchTrial]:

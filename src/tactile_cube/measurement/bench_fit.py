@@ -11,11 +11,14 @@ from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.regimes import latest_direction
 from tactile_cube.measurement.trial import Trial
 
 Array = NDArray[np.float64]
 SETTLED = 0.5  # last share of a trial, at rest
-LEAST_TORQUE = 0.01  # [N m] a weaker pull says nothing about kp
+LEAST_TORQUE = 0.03  # [N m] a weaker pull says nothing about kp
+LONG_ENOUGH = 0.5  # [s] of a command at rest, after which the joint rests too
+OFFSET = 0.02  # [rad] of a joint, as large as a new initialisation brings it
 CONFIDENCE = 0.95
 
 
@@ -55,29 +58,61 @@ def bench_estimates(recording: Recording) -> BenchEstimates:
 def _gains(recording: Recording, trials: Sequence[Trial]) -> dict[str, Estimate]:
     """The gain kp of each joint: the torque that the drive must hold, over command minus position.
 
-    Friction takes part of a pull, always against it; its size is fitted along.
+    The intervals allow for joint offsets, which turn the levers of the forces.
     """
     coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
     tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
-    held, errors, pulls = [], [], []
-    for trial in trials:
-        position, command = _at_rest(trial, trial.position), _at_rest(trial, trial.command)
-        assert trial.force is not None
-        pull = force_torque(tree, trial.force, position)
-        weight = tree.coupling.T @ tree.equations(tree.expand(position), np.zeros(tree.dofs), recording.gravity)[1]
-        held.append(weight - pull)
-        errors.append(command - position)
-        pulls.append(pull)
-    groups = np.array([trial.initialisation for trial in trials])
+    rests = [_rest(trial) for trial in trials]
+    errors = np.array([error for _, error in rests])
+    starts = np.array([trial.initialisation for trial in trials])
+
+    def slopes(offset: Array) -> list[Estimate | None]:
+        held = np.array([_held(recording, tree, t, p + offset) for t, (p, _) in zip(trials, rests, strict=True)])
+        groups = [starts == start for start in np.unique(starts)]
+        return [_slope(np.stack([e, *groups], axis=1), h, "N m/rad") for e, h in zip(errors.T, held.T, strict=True)]
+
+    pulls = np.array([_pull(tree, t, p) for t, (p, _) in zip(trials, rests, strict=True)])
+    central = slopes(np.zeros(len(recording.joints)))
+    turned = [slopes(row) for row in np.diag(np.full(len(recording.joints), OFFSET))]
     found = {}
     for index, joint in enumerate(recording.joints):
-        pull = np.array(pulls)[:, index]
-        friction = np.where(np.abs(pull) > LEAST_TORQUE, -np.sign(pull), 0.0)
-        columns = np.stack([np.array(errors)[:, index], friction, *(groups == g for g in np.unique(groups))], axis=1)
-        estimate = _slope(columns, np.array(held)[:, index], "N m/rad")
-        if np.abs(pull).max() > 3 * LEAST_TORQUE and estimate is not None:
-            found[joint] = estimate
+        estimate, others = central[index], [row[index] for row in turned]
+        if estimate is not None and np.abs(pulls[:, index]).max() > LEAST_TORQUE:
+            changes = [one.value - estimate.value for one in others if one is not None]
+            half = float(np.hypot(estimate.high - estimate.value, np.linalg.norm(changes)))
+            low, high = estimate.value - half, estimate.value + half
+            found[joint] = Estimate(value=estimate.value, low=low, high=high, unit=estimate.unit)
     return found
+
+
+def _pull(tree: RigidBodyTree, trial: Trial, position: Array) -> Array:
+    """Torques (joints,) [N m] of the trial's known force."""
+    return np.zeros(len(position)) if trial.force is None else force_torque(tree, trial.force, position)
+
+
+def _held(recording: Recording, tree: RigidBodyTree, trial: Trial, position: Array) -> Array:
+    """What the drives must hold (joints,) [N m]: the links' weight less what the known force takes."""
+    weight = tree.equations(tree.expand(position), np.zeros(tree.dofs), recording.gravity)[1]
+    return np.asarray(tree.coupling.T @ weight - _pull(tree, trial, position))
+
+
+def _rest(trial: Trial) -> tuple[Array, Array]:
+    """Position and command minus position, (joints,) [rad], where a trial came to rest.
+
+    Friction stops a joint short of its balance; the mean of rests after motion up and after motion down is without it.
+    """
+    still = np.concatenate([[False], (np.diff(trial.command, axis=0) == 0).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(still.astype(int)))
+    direction = latest_direction(np.diff(trial.command[:, 0], prepend=trial.command[0, 0]) / trial.step)
+    both = np.stack([trial.position, trial.command - trial.position])
+    rests: dict[float, list[Array]] = {}
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        if (end - start) * trial.step >= LONG_ENOUGH:
+            part = slice(end - round(0.4 * LONG_ENOUGH / trial.step), end)
+            rests.setdefault(float(direction[start]), []).append(both[:, part].mean(axis=1))
+    sides = [np.mean(side, axis=0) for way, side in rests.items() if way != 0] or [both.mean(axis=1)]
+    position, error = np.mean(sides, axis=0)
+    return position, error
 
 
 def _stiffnesses(recording: Recording, trials: Sequence[Trial]) -> dict[str, Estimate]:

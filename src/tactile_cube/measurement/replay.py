@@ -145,7 +145,9 @@ class Replay:
         if trial.clamped:
             self.plant.view(memory, "brake")[:] = CLAMPED
         if trial.force is not None:
-            self.plant.view(memory, "external_torque")[:] = force_torque(self.tree, trial.force, position)
+            self.plant.view(memory, "external_torque")[:] = force_torque(
+                self.tree, trial.force, trial.position.mean(axis=0)
+            )
         return memory
 
     def _constants(self, trial: Trial, parameters: Parameters) -> dict[str, Array]:

@@ -1,7 +1,7 @@
 """A recording of a simulated rig: commands, joint offsets, sensor noise, effects that the reader does not know of."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -150,7 +150,11 @@ class _Session:
         settle = round(SETTLING * self.settings.rate)
         trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), self.simulator.recording, entry)
         effects = self.effects if entry.touch is None else (*self.effects, self._obstacle(entry.touch, offset))
-        result = self.simulator.simulate([trial], Parameters(self.constants, effects, -offset))[0]
+        parameters = Parameters(self.constants, effects, -offset)
+        result = self.simulator.simulate([trial], parameters)[0]
+        if entry.force is not None:  # a force pulls at the posture that it leads to
+            trial = replace(trial, position=result.position)
+            result = self.simulator.simulate([trial], parameters)[0]
         position = result.position[settle:] + self.rng.normal(0, self.settings.noise, command.shape)
         if self.settings.resolution > 0:
             position = np.round(position / self.settings.resolution) * self.settings.resolution
