@@ -124,7 +124,7 @@ def error_section(comparison: Comparison) -> Section:
     return Section("How well", text, [Table(header, rows), *(guess if floor.source == "guess" else [])])
 
 
-def where_section(comparison: Comparison) -> Section:
+def where_section(comparison: Comparison, title: str = "Where it fails") -> Section:
     """In words, and as a map of joints and regimes."""
     caption = (
         "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A cell that "
@@ -132,10 +132,10 @@ def where_section(comparison: Comparison) -> Section:
         "delay and inertia at high speed, gravity and springs by posture."
     )
     blocks: list[Block] = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
-    return Section("Where it fails", (), blocks)
+    return Section(title, (), blocks)
 
 
-def overlay_section(comparison: Comparison) -> Section:
+def overlay_section(comparison: Comparison, title: str = "Measured and simulated") -> Section:
     """Measured over simulated, the worst trial of each joint."""
     blocks = []
     order = sorted(comparison.errors.joints, key=lambda j: -comparison.errors.joints[j] / comparison.floor.joints[j])
@@ -156,7 +156,7 @@ def overlay_section(comparison: Comparison) -> Section:
                 "What the simulation did not follow. Shaded red: more than three noise floors.",
             )
         )
-    return Section("Measured and simulated", (), blocks)
+    return Section(title, (), blocks)
 
 
 def band_section(comparison: Comparison) -> list[Section]:

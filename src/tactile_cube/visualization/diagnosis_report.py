@@ -62,8 +62,8 @@ def diagnosis_report(
         *ranking_section(diagnosis["ranking"]),
         next_section(diagnosis, model_path, before, experiment),
         recording_section(before.recording, before.model),
-        where_section(before),
-        overlay_section(after or before),
+        where_section(before, "Where the stated model fails"),
+        overlay_section(after or before, "Measured and simulated, with what was found"),
         *([] if after is None else [test_section(after)]),
     ]
     return Report(
@@ -153,6 +153,10 @@ def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
     blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
     blocks.append(Figure(interval_chart(intervals), "Values and 95 % intervals, each on a scale of its own."))
     return [Section("What was found, and how sure that is", (), blocks)]
+
+
+def _percent(share: float) -> str:
+    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
 
 
 def shape_section(shapes: Sequence[Shape]) -> list[Section]:
