@@ -1,4 +1,4 @@
-"""Verb: simulate a recording's commands, show how far model and measurement are apart, and where."""
+"""Simulate a recording's commands and show how far model and measurement are apart, and where."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verb: find out which physical effect a model lacks, from a recording of the real mechanism."""
+"""Find out which physical effect a model lacks, from a recording of the real mechanism."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verb: fit a rig's constants and the effects that you name, and see the error fall."""
+"""Fit a rig's constants and the effects that you name, and see the error fall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verb: write a recording, from a simulated rig with hidden effects or from files of other programs."""
+"""Write a recording, from a simulated rig with hidden effects or from files of other programs."""
 
 from __future__ import annotations
 
