@@ -1,0 +1,97 @@
+"""Section: fit the constants of a simulated finger to its recording."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from tactile_cube.benchmarking.mujoco_sysid import fit_finger
+from tactile_cube.benchmarking.peers import find_peer
+from tactile_cube.benchmarking.report import Figure, Section
+from tactile_cube.identification.free_run import free_run, free_run_error
+from tactile_cube.identification.noise import sensor_noise
+from tactile_cube.identification.search import Search
+from tactile_cube.measurement.recording import Recording, read_recording
+from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
+from tactile_cube.measurement.split import held_out_split
+from tactile_cube.measurement.writing import write_recording
+
+YARDSTICK = "mujoco.sysid"
+CONTROLLER = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0}
+NOMINAL = {"stiffness": float("inf"), "static_friction": 0.02, "reflected_inertia": 0.003}
+STEP = 0.002
+
+
+def identification(rounds: int, peers: bool = True, duration: float = 8.0, kinds: int = 3) -> Section:
+    """Damping, dry friction and rotor inertia of three joints, from trials without joint offsets.
+
+    Args:
+        rounds: fits a figure, at most 3.
+        peers: whether to measure other people's programs too.
+        duration: of a trial [s].
+        kinds: of excitation, one trial each.
+    """
+    title = f"fit of a finger's constants to trials of {duration:g} s; note: free-running error on held-out trials"
+    section = Section("identification", title, YARDSTICK)
+    recording = simulated_recording(duration, kinds)
+    fitted, held_out = held_out_split(recording, seed=0)
+    mujoco = find_peer("mujoco", section.missing) if peers else None
+    sysid = find_peer("mujoco.sysid", section.missing, needs="optimize") if mujoco is not None else None
+    found: dict[str, tuple[list[float], float]] = {}
+    for _ in range(min(rounds, 3)):
+        _note(found, "tactile_cube, base fit", *_ours(fitted, held_out))
+        if mujoco is not None and sysid is not None:
+            _note(found, YARDSTICK, *_theirs(mujoco, sysid, fitted, held_out))
+    section.figures = _figures(found)
+    return section
+
+
+def simulated_recording(duration: float, kinds: int) -> Recording:
+    """A finger on a bench, in three initialisations without joint offsets."""
+    source = SimulatedRig(
+        controller=CONTROLLER,
+        nominal=NOMINAL,
+        kinds=("multisine", "ramps", "policy")[:kinds],
+        initialisations=2,
+        offset=0.0,
+        duration=duration,
+        validation=False,
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        ((_, tables),) = source.recordings(0).items()
+        write_recording(Path(folder), tables)
+        return read_recording(folder)
+
+
+def _note(found: dict[str, tuple[list[float], float]], name: str, seconds: float, error: float) -> None:
+    found.setdefault(name, ([], error))[0].append(seconds)
+
+
+def _ours(fitted: Recording, held_out: Recording) -> tuple[float, float]:
+    """Processor seconds of the fit, and the error on the held-out trials [rad]."""
+    began = time.process_time()
+    search = Search(fitted, held_out, sensor_noise(fitted), (), lambda line: None)
+    base = search.fit_base()
+    seconds = time.process_time() - began
+    model = base.judgement.model
+    return seconds, free_run_error(held_out, free_run(held_out, model, "fast", STEP)).overall
+
+
+def _theirs(mujoco: ModuleType, sysid: ModuleType, fitted: Recording, held_out: Recording) -> tuple[float, float]:
+    began = time.process_time()
+    fit = fit_finger(mujoco, sysid, fitted, STEP)
+    return time.process_time() - began, fit.error(held_out)
+
+
+def _figures(found: dict[str, tuple[list[float], float]]) -> list[Figure]:
+    base = float(np.median(found[YARDSTICK][0])) if YARDSTICK in found else None
+    figures = []
+    for name, (seconds, error) in found.items():
+        low, median, high = (float(value) for value in np.quantile(seconds, [0.25, 0.5, 0.75]))
+        ratio = None if base is None else base / median
+        figures.append(Figure(name, median, low, high, "CPU s", ratio, f"error {error * 1e3:.2f} mrad"))
+    return figures

@@ -1,0 +1,23 @@
+"""The environment that collectors and learners are timed on: the table task of `+experiment=table`."""
+
+from __future__ import annotations
+
+from tactile_cube.training.environment import Environment, rotation_environment
+from tactile_cube.transforms import EnvConfig
+
+
+def table_config() -> EnvConfig:
+    """The configuration of the experiment, composed as on the command line."""
+    from hydra import compose, initialize_config_dir
+    from hydra.utils import instantiate
+
+    from tactile_cube.cli import CONFIG
+
+    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+        config: EnvConfig = instantiate(compose("train", overrides=["+experiment=table"]).env)
+    return config
+
+
+def table_environment() -> Environment:
+    """The same, as training takes it."""
+    return rotation_environment(table_config())
