@@ -62,7 +62,8 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
     weight = problem.weight.reshape(-1, segment, n)
     error = np.divide(residual.reshape(weight.shape), weight, out=np.zeros_like(weight), where=weight > 0)
     measured = problem.measured.reshape(weight.shape)
-    commands = problem.stretches.commands[:, problem.stretches.history :].reshape(weight.shape)
+    fine = problem.stretches.substeps
+    commands = problem.stretches.commands[:, problem.stretches.history * fine :: fine].reshape(weight.shape)
     step = recording.step
     position, velocity, acceleration = _derivatives(measured, step)
     constants = model.constants

@@ -14,7 +14,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.signals import MOTOR_POSITION
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.identification.model import Model
-from tactile_cube.identification.stretches import Stretches
+from tactile_cube.identification.stretches import Stretches, steps_per_row
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.replay import CLAMPED
@@ -36,7 +36,8 @@ class Shooting:
         coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
         self.recording = recording
         self.tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
-        self.plant = Plant([self.tree], dt=recording.step, effects=tuple(effects), joint_names=recording.joints)
+        dt = recording.step / steps_per_row(recording)
+        self.plant = Plant([self.tree], dt=dt, effects=tuple(effects), joint_names=recording.joints)
         self.workers = min(4, len(os.sched_getaffinity(0)))
 
     def positions(self, models: Sequence[Model], stretches: Stretches) -> Array:
@@ -54,21 +55,22 @@ class Shooting:
 
     def _simulate(self, models: Sequence[Model], nudge: Array, stretches: Stretches) -> Array:
         count, rows = len(stretches), stretches.measured.shape[1]
-        out = np.zeros((len(models), count, rows, 1, len(self.recording.joints)))
+        out = np.zeros((len(models), count, rows, len(self.recording.joints)))
         with ThreadPoolExecutor(self.workers) as pool:
             list(pool.map(lambda k: self._one(models[k], nudge[k], stretches, out[k]), range(len(models))))
-        return out[:, :, :, 0]
+        return out
 
     def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
         memory = self._memory(model, stretches)
-        count = len(stretches)
+        count, fine = len(stretches), stretches.substeps
+        signals = np.zeros((count, out.shape[1] * fine, 1, out.shape[2]))
         self.plant.kernel.segments_batch(
             stretches.commands,
             np.arange(count),
-            np.full(count, out.shape[1]),
-            stretches.history,
+            np.full(count, signals.shape[1]),
+            stretches.history * fine,
             1,
-            stretches.segment,
+            stretches.segment * fine,
             stretches.position,
             stretches.speed,
             np.tile(nudge, (count, 1)),
@@ -76,8 +78,9 @@ class Shooting:
             np.array([MOTOR_POSITION]),
             0,
             count,
-            out,
+            signals,
         )
+        out[:] = signals[:, ::fine, 0]
 
     def _memory(self, model: Model, stretches: Stretches) -> Array:
         """One block (S, size) for each stretch, at rest at its start."""
@@ -116,7 +119,7 @@ class Shooting:
     def _links(self, model: Model, stretches: Stretches) -> Array:
         """Link positions (S, n) near those of the first row: measured less the deflection of the plain drive."""
         constants = model.constants
-        error = stretches.commands[:, stretches.history] - stretches.position[:, 0]
+        error = stretches.commands[:, stretches.history * stretches.substeps] - stretches.position[:, 0]
         torque = constants["kp"] * error - constants["kd"] * stretches.speed[:, 0]
         limit = constants["torque_limit"]
         return stretches.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]

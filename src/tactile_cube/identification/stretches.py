@@ -19,6 +19,7 @@ SEGMENT = (
 )
 STRETCH = 10  # segments simulated without a break, so that effects with a memory keep it
 HISTORY = 8.0  # [s] of commands before a stretch at most, for effects that remember them, such as a rate limit
+LONGEST_STEP = 0.0021  # [s] of the simulation
 FEWEST = 4  # samples that a stretch needs
 ROWS = (
     "commands",
@@ -42,7 +43,7 @@ class Stretches:
     """S stretches of K segments of `segment` rows each; n joints.
 
     Attributes:
-        commands: (S, H + K segment, n) commands at the middle of each step, after `history` rows of the past [rad].
+        commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
         measured: (S, K segment, n) measured positions [rad].
         weight: (S, K segment, n) 1 / sensor noise; 0 where nothing was measured [1/rad].
         position: (S, K, n) measured position at each segment's start [rad].
@@ -56,6 +57,7 @@ class Stretches:
         forces: known forces on a link, or None.
         history: H.
         segment: rows of a segment.
+        substeps: simulation steps from row to row.
     """
 
     commands: Array
@@ -72,6 +74,7 @@ class Stretches:
     forces: tuple[KnownForce | None, ...]
     history: int
     segment: int
+    substeps: int
 
     @property
     def segments(self) -> int:
@@ -114,7 +117,7 @@ def cut(
     ]
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces = tuple(piece["force"] for piece in pieces)
-    return Stretches(**columns, forces=forces, history=history, segment=segment)  # type: ignore[arg-type]
+    return Stretches(**columns, forces=forces, history=history, segment=segment, substeps=steps_per_row(recording))  # type: ignore[arg-type]
 
 
 def _pieces(
@@ -122,10 +125,12 @@ def _pieces(
 ) -> Iterator[dict[str, object]]:
     stiffness = recording.nominal.get("stiffness", np.full(len(recording.joints), np.inf))
     elastic = trial.gains.kp / stiffness / (1.0 + trial.gains.kp / stiffness)
-    middle = _impulses(trial.command, recording.read) / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
     if recording.torque_controlled:
         elastic = TORQUE_MODE_GAIN / stiffness
-    measured = trial.position + _half_jump(middle, recording.read, elastic)
+    command = trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
+    substeps = steps_per_row(recording)
+    fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
+    measured = trial.position + elastic * _half_jump(command, recording.read)
     for first in range(0, len(trial.time), rows):
         span = np.arange(first, first + rows)
         usable = np.minimum(span, len(trial.time) - 1)
@@ -135,7 +140,7 @@ def _pieces(
         starts = np.minimum(span[::segment], len(trial.time) - 1)
         position, speed, acceleration = _states(trial, starts)
         yield {
-            "commands": middle[np.clip(np.arange(first - history, first + rows), 0, len(trial.time) - 1)],
+            "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": measured[usable],
             "weight": present[:, None] / noise,
             "position": position,
@@ -150,6 +155,20 @@ def _pieces(
         }
 
 
+def _rows(fine: Array, first: int, last: int) -> Array:
+    """Rows of a trial's commands (T, substeps, n); before the trial its first command, after it the last one."""
+    wanted = np.arange(first, last)
+    chosen = fine[np.clip(wanted, 0, len(fine) - 1)]
+    chosen[wanted < 0] = fine[0, 0]
+    chosen[wanted >= len(fine)] = fine[-1, -1]
+    return chosen
+
+
+def steps_per_row(recording: Recording) -> int:
+    """Simulation steps between two samples."""
+    return max(1, int(np.ceil(recording.step / LONGEST_STEP - 1e-6)))
+
+
 def _gains(recording: Recording, trial: Trial) -> Array:
     """kp, kd and torque limit (3, n) of a trial over those of the recording; 1 where the recording has none."""
     own = np.array([trial.gains.kp, trial.gains.kd, trial.gains.torque_limit])
@@ -158,25 +177,30 @@ def _gains(recording: Recording, trial: Trial) -> Array:
     return np.where(usable, own / np.where(usable, common, 1.0), 1.0)
 
 
-def _impulses(command: Array, reading: str) -> Array:
-    """Commands (T, n) as a step of the simulation takes them: an impulse at the instant that row k reads.
+def _impulses(command: Array, reading: str, substeps: int) -> Array:
+    """Commands (T, n) as the simulation's steps take them, (T substeps, n), from the instant at which row 0 is read.
 
-    A held command acts as the mean of the commands before and after that instant (second order in the step). Row k is
-    read at the end of the period in which command k acts, or at its beginning.
+    A step acts like an impulse at its beginning, a held command from there on; so the first step of a row takes the
+    mean of the commands before and after that instant, which makes the simulation second order in its step. A row is
+    read at the end of the period in which its command acts, or at its beginning.
     """
-    middle = command.copy()
+    before, after = _around(command, reading)
+    fine = np.repeat(after, substeps, axis=0)
+    fine[::substeps] = 0.5 * (before + after)
+    return fine
+
+
+def _around(command: Array, reading: str) -> tuple[Array, Array]:
+    """Commands (T, n) in force just before and just after each row is read."""
     if reading == "after":
-        middle[:-1] = 0.5 * (command[:-1] + command[1:])
-    else:
-        middle[1:] = 0.5 * (command[:-1] + command[1:])
-    return middle
+        return command, np.concatenate([command[1:], command[-1:]])
+    return np.concatenate([command[:1], command[:-1]]), command
 
 
-def _half_jump(middle: Array, reading: str, elastic: Array) -> Array:
-    """What the drive's deflection at the instant of reading lacks of that under the mean command (T, n) [rad]."""
-    jump = np.zeros_like(middle)
-    jump[1:-1] = 0.25 * (middle[2:] - middle[:-2])
-    return elastic * jump if reading == "after" else -elastic * jump
+def _half_jump(command: Array, reading: str) -> Array:
+    """The mean command less the one that the log feels (T, n): the drive deflects accordingly."""
+    before, after = _around(command, reading)
+    return 0.5 * (after - before) if reading == "after" else 0.5 * (before - after)
 
 
 def _states(trial: Trial, rows: NDArray[np.int64]) -> tuple[Array, Array, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, resolve
+from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, catalogue, resolve
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
@@ -82,11 +82,12 @@ class Replay:
         coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
         self.tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
         self._classes = {name: resolve([name], recording.joints) for name in effects}
-        classes = {cls for pairs in self._classes.values() for cls, _ in pairs}
+        named = [cls for pairs in self._classes.values() for cls, _ in pairs]
         self.plant = Plant(
             [self.tree],
             dt=recording.step / self.substeps,
-            effects=tuple(sorted(classes, key=lambda cls: cls.name)),
+            # the whole catalogue: one kernel, compiled once, for every model of this rig
+            effects=tuple(dict.fromkeys([*catalogue().values(), *named])),
             joint_names=recording.joints,
         )
         self._world = _pybullet(self.plant) if engine == "pybullet" else None
