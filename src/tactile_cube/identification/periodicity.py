@@ -73,5 +73,9 @@ def peaks(position: Array, torque: Array, weight: Array) -> list[tuple[float, fl
     power = np.abs(spectrum) ** 2
     inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
     strongest = inner[np.argsort(-power[inner])][:PEAKS]
-    size = 0.5 * np.sum(w**2)
-    return [(float(grid[k]), float(spectrum[k].imag / size), float(spectrum[k].real / size)) for k in strongest]
+    found = []
+    for k in strongest:
+        waves = np.column_stack([w * np.sin(grid[k] * q), w * np.cos(grid[k] * q), slow])
+        sine, cosine = np.linalg.lstsq(waves, t, rcond=None)[0][:2]
+        found.append((float(grid[k]), float(sine), float(cosine)))
+    return found

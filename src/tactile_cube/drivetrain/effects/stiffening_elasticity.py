@@ -42,7 +42,7 @@ class StiffeningElasticity(Effect):
         """Deflection q_m - q [rad]: the real root of cubic * d^3 + K d = tau (Cardano)."""
         torque = x[TORQUE, j]
         deflection = x[DEFLECTION, j] + p[0] * torque
-        if p[1] <= 0.0 or torque == 0.0 or deflection == 0.0:
+        if p[1] <= 0.0 or torque * deflection <= 0.0:
             return deflection
         linear = torque / deflection / p[1]
         half_width = sqrt(linear / 3.0)

@@ -1,0 +1,88 @@
+"""What the evidence says, without any simulation: costs of segments are made up."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.candidates import Candidate, forms
+from tactile_cube.identification.evidence import Judgement, gain, p_value
+from tactile_cube.identification.explanation import Explanation
+from tactile_cube.identification.gauss_newton import Fit
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.search import Findings, worthwhile
+from tactile_cube.identification.verdict import decide, unexplained_joints
+
+MODEL = Model({}, (), {})
+NOTHING = np.zeros((0, 0))
+FIT = Fit(MODEL, (), 0.0, 0.0, NOTHING, NOTHING, NOTHING)
+
+
+def judged(error: float, seed: int = 0) -> Judgement:
+    """60 segments of 100 samples whose RMS error is about `error` times the noise."""
+    scatter = np.random.default_rng(seed).uniform(0.8, 1.2, 60)
+    costs = 100.0 * error**2 * scatter / scatter.mean()
+    return Judgement(MODEL, costs, np.full(60, 100), NOTHING, np.array([error, 1.0]))
+
+
+def explanation(name: str, error: float, base: float = 20.0, seed: int = 0) -> Explanation:
+    effect = find_effect(name)
+    candidate = Candidate(effect, ("q1",), forms(effect)[0])
+    before, after = judged(base), judged(error, seed)
+    return Explanation((candidate,), FIT, after, 1e-9, gain(before, after))
+
+
+def findings(base: float, *level: Explanation) -> Findings:
+    start = Explanation((), FIT, judged(base), 1.0, 0.0)
+    return Findings(start, judged(2 * base), (level,) if level else (), ())
+
+
+def test_a_base_model_at_the_noise_is_adequate() -> None:
+    assert decide(findings(1.02)).kind == "adequate"
+
+
+def test_an_error_that_no_effect_lowers_is_unknown() -> None:
+    assert decide(findings(8.0)).kind == "unknown_effect"
+
+
+def test_the_only_effect_that_reaches_the_noise_is_the_missing_one() -> None:
+    verdict = decide(findings(20.0, explanation("command_delay", 1.03), explanation("actuator_lag", 6.0)))
+    assert verdict.kind == "missing_effect"
+    assert verdict.chosen.effects[0].effect.name == "command_delay"
+
+
+def test_two_effects_that_do_equally_well_are_ambiguous() -> None:
+    verdict = decide(findings(20.0, explanation("torque_bias", 1.03), explanation("torque_gain", 1.031, seed=1)))
+    assert verdict.kind == "ambiguous"
+    assert [one.effects[0].effect.name for one in verdict.rivals] == ["torque_gain"]
+
+
+def test_a_richer_effect_that_does_no_better_is_no_rival() -> None:
+    verdict = decide(findings(20.0, explanation("stribeck_friction", 1.03), explanation("coulomb_friction", 1.03)))
+    assert verdict.kind == "missing_effect"
+    assert verdict.chosen.effects[0].effect.name == "coulomb_friction"
+
+
+def test_an_effect_that_leaves_much_unexplained_is_not_named() -> None:
+    assert decide(findings(20.0, explanation("backlash", 9.0))).kind == "unknown_effect"
+
+
+def test_joints_are_unexplained_while_their_error_stays_above_the_noise() -> None:
+    assert unexplained_joints(explanation("backlash", 9.0), ("q1", "q2")) == ["q1"]
+
+
+def test_a_further_effect_needs_a_real_part_of_the_error() -> None:
+    base = Explanation((), FIT, judged(20.0), 1.0, 0.0)
+    first = explanation("command_delay", 2.0)
+    tiny = replace(explanation("torque_bias", 1.9), gain=0.1)
+    completing = replace(explanation("torque_bias", 1.05), gain=0.7)
+    assert not worthwhile(tiny, first, base)
+    assert worthwhile(completing, first, base)
+
+
+@pytest.mark.parametrize(("better", "significant"), [(0.9, True), (1.0, False)])
+def test_paired_segments_tell_a_real_gain_from_none(better: float, significant: bool) -> None:
+    before = judged(2.0)
+    after = replace(before, costs=before.costs * better)
+    assert (p_value(before, after) < 1e-3) == significant
