@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.columns import pick_columns
+from tactile_cube.measurement.consistency import check_coupling, check_joints, check_nominal, gains_of, joints_where
 from tactile_cube.measurement.description import Coupling, Description, TrialEntry, per_joint
 from tactile_cube.measurement.plausibility import check_assignment, check_units
 from tactile_cube.measurement.rig import Rig, read_rig
@@ -111,7 +112,7 @@ def read_recording(folder: str | Path) -> Recording:
     file = folder / DESCRIPTION
     description = read_schema(file, Description)
     rig = read_rig(_inside(folder, description.rig, "rig"))
-    _check_joints(description, rig, file)
+    check_joints(description, rig, file)
     try:
         recording = _assemble(folder, description, rig)
     except InputError:
@@ -125,12 +126,12 @@ def read_recording(folder: str | Path) -> Recording:
 def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     joints = tuple(description.joints)
     nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
-    warnings = _check_nominal(nominal, joints)
-    warnings += [f"{folder / DESCRIPTION}: {line}" for line in _check_coupling(description, rig)]
-    trials, gains = [], _gains(description, None, "controller")
+    check_nominal(nominal, joints)
+    warnings = [f"{folder / DESCRIPTION}: {line}" for line in check_coupling(description, rig)]
+    trials, gains = [], gains_of(description, None, "controller")
     if description.controller.mode != "torque" and (gains.kd == 0).any():
         warnings.append(
-            f"{folder / DESCRIPTION}: key 'controller.kd': 0 for {_where(gains.kd == 0, joints)}: no damping"
+            f"{folder / DESCRIPTION}: key 'controller.kd': 0 for {joints_where(gains.kd == 0, joints)}: no damping"
         )
     for index, entry in enumerate(description.trials):
         trial = read_trial(folder, entry, description, rig, f"trials.{index}.controller")
@@ -143,7 +144,7 @@ def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: R
     """One trial, checked and on the uniform grid of the recording's rate."""
     path = _inside(folder, entry.file, "trials.file")
     joints = tuple(description.joints)
-    gains = _gains(description, entry, key)
+    gains = gains_of(description, entry, key)
     columns, warnings = pick_columns(read_table(path), joints, path)
     columns, time_warnings = check_time(columns, description.rate_hz, path)
     limits = [rig.joints[joint] for joint in joints]
@@ -174,82 +175,3 @@ def _inside(folder: Path, name: str, key: str) -> Path:
     if not path.resolve().is_relative_to(folder.resolve()):
         raise InputError(f"{folder / DESCRIPTION}: key '{key}': '{name}' lies outside the recording's folder")
     return path
-
-
-def _check_joints(description: Description, rig: Rig, file: Path) -> None:
-    named = [(joint, "joints") for joint in description.joints]
-    named += [(joint, "coupled") for joint in description.coupled]
-    named += [(coupling.joint, f"coupled.{joint}.joint") for joint, coupling in description.coupled.items()]
-    for joint, key in named:
-        if joint not in rig.joints:
-            raise InputError(
-                f"{file}: key '{key}': joint '{joint}' is not in {rig.path} (its movable joints: {list(rig.joints)})"
-            )
-    for joint, coupling in description.coupled.items():
-        if coupling.joint not in description.joints:
-            raise InputError(
-                f"{file}: key 'coupled.{joint}.joint': '{coupling.joint}' is not among joints {description.joints}"
-            )
-        if joint in description.joints:
-            raise InputError(f"{file}: key 'coupled.{joint}': the joint is actuated too (joints {description.joints})")
-
-
-def _check_coupling(description: Description, rig: Rig) -> list[str]:
-    mimics = {name: joint.mimics for name, joint in rig.joints.items() if joint.mimics is not None}
-    warnings = []
-    for name, leader in mimics.items():
-        said = description.coupled.get(name)
-        if name in description.joints or (said is not None and said.joint == leader):
-            continue
-        warnings.append(
-            f"key 'coupled': the URDF lets '{name}' mimic '{leader}', recording.yaml says "
-            f"{said.joint if said else 'nothing of it'}"
-        )
-    free = [name for name in rig.joints if name not in {*description.joints, *description.coupled, *mimics}]
-    if free:
-        warnings.append(
-            f"key 'joints': {free} of the URDF are in neither 'joints' nor 'coupled': they are held at zero"
-        )
-    return warnings
-
-
-def _gains(description: Description, entry: TrialEntry | None, key: str) -> Gains:
-    controller, joints = description.controller, tuple(description.joints)
-    change = entry.controller if entry is not None else None
-    values = {}
-    for name in ("kp", "kd", "torque_limit"):
-        own = getattr(change, name) if change is not None else None
-        values[name] = per_joint(getattr(controller, name) if own is None else own, joints, f"{key}.{name}")
-    gains = Gains(**values)
-    if controller.mode == "position":
-        _require_gains(gains, joints, key)
-    return gains
-
-
-def _require_gains(gains: Gains, joints: tuple[str, ...], key: str) -> None:
-    for name, values in (("kp", gains.kp), ("torque_limit", gains.torque_limit)):
-        if not (values > 0).all():
-            wrong = int(np.argmin(values > 0))
-            raise ValueError(
-                f"key '{key}.{name}': received {values[wrong]:g} for {joints[wrong]}: with it no command can "
-                "move the joint; give the gain of the controller that made the recording"
-            )
-    if not (gains.kd >= 0).all() or not np.isfinite(gains.kp).all() or not np.isfinite(gains.kd).all():
-        raise ValueError(
-            f"key '{key}': received kp {gains.kp.tolist()}, kd {gains.kd.tolist()}; expected finite gains, kd >= 0"
-        )
-
-
-def _check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> list[str]:
-    for key, values in nominal.items():
-        if np.isnan(values).any() or (values < 0).any():
-            raise ValueError(
-                f"key 'nominal.{key}': received {values.tolist()}; expected numbers >= 0 for {list(joints)}"
-            )
-    if (nominal.get("stiffness", np.ones(1)) == 0).any():
-        raise ValueError("key 'nominal.stiffness': received 0: the drive would transmit nothing; .inf means rigid")
-    return []
-
-
-def _where(mask: NDArray[np.bool_], joints: tuple[str, ...]) -> str:
-    return ", ".join(joint for joint, wrong in zip(joints, mask, strict=True) if wrong)

@@ -1,7 +1,8 @@
 """A comparison in the terminal, and as Markdown beside the robot."""
 
 from tactile_cube.measurement.comparison import Comparison
-from tactile_cube.visualization.comparison_report import answer, floor_source
+from tactile_cube.visualization.comparison_report import answer
+from tactile_cube.visualization.comparison_sections import floor_source
 
 
 def summary(comparison: Comparison) -> str:

@@ -81,13 +81,16 @@ def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float
     """Topic -> (time [s], message); the header's stamp where a message has one, else when it was logged."""
     try:
         from mcap.exceptions import McapError
-        from mcap_ros2.reader import read_ros2_messages
+        from mcap.reader import make_reader
+        from mcap_ros2.decoder import DecoderFactory
     except ImportError:
         raise InputError("source=mcap needs the optional extra: pip install 'tactile-cube[ros]'") from None
     found: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
     try:
-        for message in read_ros2_messages(str(path), topics=list(topics)):
-            found[message.channel.topic].append((_stamp(message), message.ros_msg))
+        with path.open("rb") as stream:
+            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+            for _, channel, logged, message in reader.iter_decoded_messages(topics=list(topics)):
+                found[channel.topic].append((_stamp(message, logged.log_time), message))
     except (OSError, McapError) as error:
         raise InputError(f"{path}: not a complete MCAP file: {error}") from None
     for topic, messages in found.items():
@@ -98,11 +101,11 @@ def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float
     return {topic: sorted(messages, key=lambda one: one[0]) for topic, messages in found.items()}
 
 
-def _stamp(message: Any) -> float:
-    header = getattr(message.ros_msg, "header", None)
+def _stamp(message: Any, log_time: int) -> float:
+    header = getattr(message, "header", None)
     if header is not None and (header.stamp.sec or header.stamp.nanosec):
         return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
-    return float(message.log_time_ns) * 1e-9
+    return 1e-9 * log_time
 
 
 def _by_joint(message: Any, joints: list[str], path: Path, signal: str) -> Array:

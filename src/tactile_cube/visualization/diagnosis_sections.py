@@ -1,0 +1,152 @@
+"""Sections of the reports of `diagnose` and `identify`."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tactile_cube.identification.next_experiment import Experiment
+from tactile_cube.identification.residual_shape import Shape
+from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.visualization.numbers import mrad, p_value, short
+from tactile_cube.visualization.report import Figure, Listing, Section, Table
+from tactile_cube.visualization.svg import PALETTE, SIMULATED, Axes, Band, Line, line_chart
+from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_chart
+
+STAGES = {
+    "nominal": "as stated by the owner",
+    "refitted": "known constants refitted",
+    "with_effects": "with what was found",
+}
+MOST_RANKED = 15
+
+
+def staircase_section(stages: Mapping[str, float | None], joints: Mapping[str, Mapping[str, float]]) -> Section:
+    """The error after each step, down to the noise floor."""
+    bars = [(STAGES.get(key, key), 1e3 * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
+    floor = stages.get("noise_floor")
+    caption = (
+        "RMS position error on trials that were held out from the fit; the dashed line is what noise alone would leave."
+    )
+    blocks: list[Figure | Table] = [Figure(bar_chart(bars, "mrad", None if floor is None else 1e3 * floor), caption)]
+    if joints:
+        names = list(next(iter(joints.values())))
+        rows = [(STAGES.get(stage, stage), *(mrad(row[name]) for name in names)) for stage, row in joints.items()]
+        blocks.append(Table(("", *names), rows))
+    return Section("How the error falls", (), blocks)
+
+
+def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
+    """Every effect that was found: parameters with intervals, held-out gain, rivals."""
+    if not effects:
+        return []
+    intervals, lines = [], []
+    for effect in effects:
+        place = ", ".join(effect["joints"])
+        for name, estimate in effect["parameters"].items():
+            one = estimate if isinstance(estimate, Mapping) else estimate.model_dump()
+            label = f"{effect['name']}@{place}: {name}"
+            intervals.append(Interval(label, one["value"], one["low"], one["high"], one["unit"]))
+        if "heldout_gain" in effect:
+            lines.append(
+                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the error on held-out "
+                f"trials (p {p_value(effect['p_value'])})"
+                + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
+            )
+    blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
+    blocks.append(Figure(interval_chart(intervals), "Values and 95 % intervals, each on a scale of its own."))
+    return [Section("What was found, and how sure that is", (), blocks)]
+
+
+def _percent(share: float) -> str:
+    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
+
+
+def shape_section(shapes: Sequence[Shape]) -> list[Section]:
+    """What the missing torque depends on, where no effect of the catalogue explains it."""
+    if not shapes:
+        return []
+    text = [
+        "The torque that the model lacks, averaged over bins of one signal at a time. A clear curve is a law of that "
+        "signal alone; write it as an effect of your own, fit it, and see whether the error falls."
+    ]
+    blocks = []
+    for one in sorted(shapes, key=lambda shape: -shape.explained):
+        axes = Axes(one.against, f"{one.joint} [mN m]", height=200)
+        low, high = 1e3 * (one.mean - one.spread), 1e3 * (one.mean + one.spread)
+        band = Band("+- one standard deviation", one.centres, low, high)
+        chart = line_chart(axes, [Line("missing torque", one.centres, 1e3 * one.mean, SIMULATED, 2.0)], [band])
+        blocks.append(Figure(chart, f"{one.joint} against {one.against}: explains {100 * one.explained:.0f} % of it."))
+    return [Section("The shape of what is unexplained", text, blocks)]
+
+
+def ranking_section(ranking: Sequence[Any]) -> list[Section]:
+    """The candidates that were weighed, best first."""
+    rows = [row for row in ranking if isinstance(row, Mapping)][:MOST_RANKED]
+    if not rows:
+        return []
+    keys = [key for key, value in rows[0].items() if isinstance(value, str | int | float)]
+    table = Table([key.replace("_", " ") for key in keys], [[_cell(row.get(key)) for key in keys] for row in rows])
+    return [Section("What else was weighed", (), [table], folded=True)]
+
+
+def value_section(comparison: Comparison) -> Section:
+    """The constants of the model and their intervals, beside what the owner believed."""
+    rows = []
+    if comparison.model is not None:
+        for key, by_joint in comparison.model.values.items():
+            for joint, one in by_joint.items():
+                interval = f"{short(one.low)} .. {short(one.high)}" if one.high > one.low else "not fitted"
+                believed = comparison.recording.stated(key, joint)
+                stated = "" if believed is None else short(believed)
+                rows.append((f"{key} {joint}", short(one.value), interval, stated, one.unit))
+    return Section("The constants", (), [Table(("", "value", "95 % interval", "owner's value", "unit"), rows)])
+
+
+def next_section(
+    diagnosis: Mapping[str, Any], model_path: str | None, before: Comparison, experiment: Experiment | None
+) -> Section:
+    """What to record or to type next."""
+    if experiment is not None:
+        return experiment_section(experiment, str(diagnosis["next_experiment"]))
+    folder, model = before.recording.folder, model_path or "MODEL.yaml"
+    identify = f"python -m tactile_cube.identify recording={folder} effects"
+    train = f"python -m tactile_cube.train +experiment=finetune model={model}"
+    if diagnosis["verdict"] == "adequate":
+        said, lines = "Train with the refitted constants:", [train]
+    elif diagnosis["verdict"] == "missing_effect":
+        names = [f"{effect['name']}@{joint}" for effect in diagnosis["effects"] for joint in effect["joints"]]
+        said, lines = (
+            "Fit exactly these effects, and train with the result:",
+            [f"{identify}=[{','.join(names)}]", train],
+        )
+    else:
+        joint = (diagnosis["unexplained_joints"] or ["JOINT"])[0]
+        said = "Look at the shapes above, write the law as an effect of your own, and fit it:"
+        lines = [f"{identify}=[my_rig.MyEffect@{joint}]"]
+    return Section("What to do next", [said], [Listing(lines, code=True)])
+
+
+def experiment_section(experiment: Experiment, file: str) -> Section:
+    """The commands that would decide, and what each rival predicts."""
+    text = [
+        "This recording cannot decide between the candidates. Play these commands on the rig, add the trial to the "
+        "recording and diagnose again:"
+    ]
+    joint = experiment.joints.index(experiment.joint)
+    predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
+    mean = sum(predictions.values()) / len(predictions)
+    lines = [
+        Line(name, experiment.time, 1e3 * (values - mean), PALETTE[k % len(PALETTE)], 1.3)
+        for k, (name, values) in enumerate(predictions.items())
+    ]
+    chart = line_chart(Axes("time [s]", f"{experiment.joint} [mrad]", height=220), lines)
+    caption = (
+        f"What each candidate predicts for {experiment.joint}, relative to their mean: they differ by at least "
+        f"{mrad(experiment.difference)} (RMS)."
+    )
+    return Section("What to record next", text, [Listing([file], code=True), Figure(chart, caption)])
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return short(value) if isinstance(value, float) else str(value)
