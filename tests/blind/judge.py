@@ -105,11 +105,17 @@ def _truth_class(line: dict[str, Any]) -> str:
     return "one effect" if effects[0]["in_catalogue"] else "outside the catalogue"
 
 
+def set_size(diagnosis: dict[str, Any]) -> int:
+    """How many candidates an ambiguous answer leaves open."""
+    return len({n for e in diagnosis["effects"] for n in [f"{e['name']}@{e['joints']}", *e.get("rivals", [])]})
+
+
 def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
     """Counts, shares, the confusion matrix and how near the validation error came to the floor."""
     outcomes = Counter(x["score"]["outcome"] for x in lines)
     none = [x for x in lines if not x["truth"]["effects"]]
     known = [x for x in lines if x["truth"]["effects"] and all(e["in_catalogue"] for e in x["truth"]["effects"])]
+    sets = sorted(set_size(x["diagnosis"]) for x in lines if x["score"]["answer"].startswith("ambiguous"))
     matrix: dict[str, Counter[str]] = {}
     for line in lines:
         matrix.setdefault(_truth_class(line), Counter())[_answer_class(line)] += 1
@@ -120,6 +126,7 @@ def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
         "wrong": outcomes["wrong"],
         "confidently_wrong": sum(x["score"]["confident"] for x in lines),
         "false_alarms": [sum(x["score"]["outcome"] == "wrong" for x in none), len(none)],
+        "ambiguous_set_sizes": sets,
         "reasons": dict(Counter(f"{x['score']['outcome']}: {x['score']['why']}" for x in lines)),
         "confusion": {k: dict(v) for k, v in matrix.items()},
         "unseen_error_over_sensor_noise": _spread([x["noise_ratio"] for x in known]),
@@ -176,6 +183,7 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
         f"({s['confidently_wrong']} of them confidently); right or acceptable {100 * share:.0f} %",
         f"- false alarms where nothing is hidden: {s['false_alarms'][0]} of {s['false_alarms'][1]}",
         *(_sentence(s, key, words) for key, words in FLOORS.items()),
+        f"- candidates left open by an ambiguous answer: {', '.join(map(str, s['ambiguous_set_sizes'])) or '-'}",
         f"- median time of a diagnosis: {s['median_seconds']} s",
         "",
         "| hidden | " + " | ".join(columns) + " |",
