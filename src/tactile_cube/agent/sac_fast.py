@@ -94,14 +94,16 @@ class FastSac:
     def update(self, batch: Batch) -> dict[str, Tensor]:
         """One step of critics, actor and temperature, then of the target critics."""
         metrics = self.compute_gradients(batch.to(self.device))
+        self.step()
+        return metrics
+
+    @torch.no_grad()
+    def step(self) -> None:
+        """Follow the gradients last computed: networks, temperature, targets, working copies."""
         if self._single_pass is not None:
             self.optimizer.step()  # the temperature alone
             self._single_pass.step()
-        else:
-            self._step()
-        return metrics
-
-    def _step(self) -> None:
+            return
         networks = self.networks
         if networks.gradient.dtype != networks.master.dtype:
             networks.master.grad.copy_(networks.gradient)  # type: ignore[union-attr]

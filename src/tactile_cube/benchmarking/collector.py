@@ -42,7 +42,7 @@ def collector(
     section = Section("collector", "environment steps on the table task, untrained policy", YARDSTICK)
     environment = table_environment()
     with ExitStack() as stack:
-        cases = {YARDSTICK: _bare(steps), "Gymnasium, one world": _gymnasium(steps)}
+        cases: dict[str, Callable[[], object]] = {YARDSTICK: _bare(steps), "Gymnasium, one world": _gymnasium(steps)}
         scale = dict.fromkeys(cases, steps)
         for n in worlds:
             name = f"TorchRL collector, {n} world{'s' if n > 1 else ''}"
@@ -101,7 +101,7 @@ def _bare(steps: int) -> Callable[[], None]:
 
     def run() -> None:
         for _ in range(steps):
-            moment = task.step(next(actions))
+            moment = task.step(next(actions).astype(np.float64))
             if moment.terminated or moment.truncated:
                 task.reset()
 

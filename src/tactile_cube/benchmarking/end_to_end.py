@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 
+from tactile_cube.agent.interface import Agent
 from tactile_cube.agent.sac import Sac
 from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.benchmarking.peers import find_peer
@@ -50,7 +51,10 @@ def end_to_end(
     title = f"table task, {frames} environment steps and {updates} updates of batch 256 an iteration"
     section = Section("end_to_end", title, YARDSTICK)
     environment = table_environment()
-    agents = {"tactile_cube, sac_fast bf16": partial(FastSac, precision="bf16"), "tactile_cube, SACLoss": Sac}
+    agents: dict[str, Callable[..., Agent]] = {
+        "tactile_cube, sac_fast bf16": partial(FastSac, precision="bf16"),
+        "tactile_cube, SACLoss": Sac,
+    }
     with ExitStack() as stack:
         cases: dict[str, Callable[[], object]] = {}
         workers: dict[str, Callable[[], float]] = {}
@@ -72,7 +76,7 @@ def end_to_end(
 
 def _run(
     environment: Environment,
-    make_agent: Callable[..., Sac | FastSac],
+    make_agent: Callable[..., Agent],
     folder: Path,
     worlds: int,
     steps: int,
@@ -111,14 +115,13 @@ def _figures(timings: dict[str, Timing], simulating: dict[str, float], frames: i
     base_cpu = np.median(timings[YARDSTICK].cpu) if YARDSTICK in timings else None
     figures = []
     for name, timing in timings.items():
-        low, median, high = np.quantile(timing.wall, [0.25, 0.5, 0.75])
-        ratio = None if base_wall is None else float(base_wall / median)
-        speeds = (float(frames / seconds) for seconds in (median, high, low))
-        figures.append(Figure(name, *speeds, "steps/s on the clock", ratio))
+        fast, median, slow = (float(frames / seconds) for seconds in np.quantile(timing.wall, [0.25, 0.5, 0.75]))
+        ratio = None if base_wall is None else float(base_wall / frames * median)
+        figures.append(Figure(name, median, slow, fast, "steps/s on the clock", ratio))
     for name, timing in timings.items():
         extra = simulating.get(name, 0.0)
-        low, median, high = np.quantile(timing.cpu, [0.25, 0.5, 0.75]) + extra
-        ratio = None if base_cpu is None else float(base_cpu / median)
-        costs = (float(seconds / frames * 1000.0) for seconds in (median, low, high))
-        figures.append(Figure(name, *costs, "core-seconds / 1000 steps", ratio))
+        quartiles = np.quantile(timing.cpu, [0.25, 0.5, 0.75]) + extra
+        low, median, high = (float(seconds / frames * 1000.0) for seconds in quartiles)
+        ratio = None if base_cpu is None else float(base_cpu / frames * 1000.0 / median)
+        figures.append(Figure(name, median, low, high, "core-seconds / 1000 steps", ratio))
     return figures

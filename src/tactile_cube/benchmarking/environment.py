@@ -28,10 +28,18 @@ def environment(rounds: int, peers: bool = True, calls: int = CALLS) -> Section:
     title = "one world, cube held at full weight, 50 physics steps a policy step; note: creep of the held cube in 5 s"
     section = Section("environment", title, YARDSTICK)
     worlds = _worlds(peers, section.missing)
+    try:
+        _measure(section, worlds, rounds, calls)
+    finally:
+        for world in worlds.values():
+            world.close()
+    return section
+
+
+def _measure(section: Section, worlds: dict[str, Holding], rounds: int, calls: int) -> None:
     notes = {name: f"creep {creep(world) * 1e3:.2f} mm" for name, world in worlds.items()}
     timings = in_turns({name: _stepping(world) for name, world in worlds.items()}, rounds, calls)
     section.figures = rates(timings, YARDSTICK, "steps/s", notes)
-    return section
 
 
 def _worlds(peers: bool, missing: list[str]) -> dict[str, Holding]:

@@ -33,6 +33,9 @@ class Holding(Protocol):
     def step(self, q_n: Array, /) -> None:
         """One policy step of 0.1 s towards desired joint angles (12,) [rad]."""
 
+    def close(self) -> None:
+        """Ends the simulation."""
+
 
 def targets(yaw: float) -> Array:
     """Joint angles (12,) [rad] that press on a cube turned by `yaw` [rad]."""

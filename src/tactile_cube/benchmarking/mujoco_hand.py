@@ -55,6 +55,9 @@ class MujocoHand:
         self.data.ctrl[:] = q_n
         self._mujoco.mj_step(self.model, self.data, nstep=SUBSTEPS)
 
+    def close(self) -> None:
+        """Nothing to end: MuJoCo has no server."""
+
 
 def _model(mujoco: ModuleType, c: EpisodeConstants, impratio: float, noslip: int) -> Any:
     spec = mujoco.MjSpec.from_string(hand_urdf(DLR_HAND2))

@@ -125,9 +125,9 @@ def _sequence(mujoco: ModuleType, sysid: ModuleType, spec: Any, trial: Trial, st
 
 def _resample(trial: Trial, values: Array, step: float) -> Array:
     """Values on the simulation's grid: each holds until the next."""
-    count = int(round(trial.duration / step))
+    count = round(trial.duration / step)
     index = np.minimum((step * np.arange(count) / trial.step + 1e-6).astype(int), len(values) - 1)
-    return values[index]
+    return np.asarray(values[index])
 
 
 def _with_coupled(angles: Array) -> Array:

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 DT, SUBSTEPS, ITERATIONS = 0.002, 50, 50
 FRICTION_SPEED = 0.05
 """Speed at which the friction of the joints has risen to three quarters [rad/s]."""
+_PALM = '<link name="palm">'
+_INERTIAL = '<inertial><mass value="1"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial>'
+"""The palm never moves; its numbers do nothing, but PyBullet warns about links without any."""
 
 
 class NaivePyBullet:
@@ -85,7 +88,7 @@ class NaivePyBullet:
         quaternion = Rotation.from_matrix(DLR_HAND2.rotation).as_quat().tolist()
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "hand.urdf"
-            file.write_text(hand_urdf(DLR_HAND2), encoding="utf-8")
+            file.write_text(hand_urdf(DLR_HAND2).replace(_PALM, _PALM + _INERTIAL), encoding="utf-8")
             pose = DLR_HAND2.position.tolist(), quaternion
             return int(
                 pybullet.loadURDF(

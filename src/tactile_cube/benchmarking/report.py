@@ -18,7 +18,7 @@ class Figure:
         low: lower quartile.
         high: upper quartile.
         unit: of all three.
-        ratio: to the section's yardstick, above 1 where this one is better; None for the yardstick's own kind of number.
+        ratio: to the section's yardstick, above 1 where this one is better; None where the yardstick is missing.
         note: what one should know about it.
     """
 

@@ -50,10 +50,8 @@ def startup(rounds: int, commands: Sequence[str] = tuple(COMMANDS), trains: bool
         run = run_and_watch(TRAIN)
         section.figures += _waiting("first training iteration, start to end", [run], TRAIN_LIMIT)
         if run.memory > 0.0:
-            figure = Figure(
-                "memory of its processes together", *[run.memory] * 3, "GiB", note=f"limit {MEMORY_LIMIT:g} GiB"
-            )
-            section.figures.append(figure)
+            note = f"limit {MEMORY_LIMIT:g} GiB"
+            section.figures.append(_spread("memory of its processes together", [run.memory], "GiB", note))
     return section
 
 

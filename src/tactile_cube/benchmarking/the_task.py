@@ -9,10 +9,12 @@ from tactile_cube.transforms import EnvConfig
 def table_config() -> EnvConfig:
     """The configuration of the experiment, composed as on the command line."""
     from hydra import compose, initialize_config_dir
+    from hydra.core.global_hydra import GlobalHydra
     from hydra.utils import instantiate
 
     from tactile_cube.cli import CONFIG
 
+    GlobalHydra.instance().clear()  # of the verb that runs this, which has its configuration already
     with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
         config: EnvConfig = instantiate(compose("train", overrides=["+experiment=table"]).env)
     return config
