@@ -8,6 +8,7 @@ from tactile_cube.visualization.svg import ERROR, FLOOR, MEASURED, SIMULATED, Ax
 from tactile_cube.visualization.svg_tables import heat_map
 
 Array = NDArray[np.float64]
+MOST_KINDS = 6
 
 
 def overlay(comparison: Comparison, trial: int, joint: int) -> str:
@@ -46,8 +47,11 @@ def band(comparison: Comparison, trial: int, joint: int) -> str:
 
 
 def regime_map(comparison: Comparison) -> str:
-    """Error / noise floor of every joint in every regime."""
+    """Error / noise floor of every joint in every regime; of many kinds of trial only the worst."""
+    worst_first = sorted((one for one in comparison.regimes if one.dimension == "kind"), key=lambda one: -one.error)
+    kinds = list(dict.fromkeys(one.regime for one in worst_first))[:MOST_KINDS]
     names = list(dict.fromkeys((one.dimension, one.regime) for one in comparison.regimes))
+    names = [(dimension, regime) for dimension, regime in names if dimension != "kind" or regime in kinds]
     cells = {(one.joint, one.dimension, one.regime): one.error for one in comparison.regimes}
     values: list[list[float | None]] = []
     for joint in comparison.recording.joints:

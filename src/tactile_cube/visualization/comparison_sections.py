@@ -10,6 +10,7 @@ from tactile_cube.visualization.report import Block, Callout, Figure, Listing, S
 
 MOST_OVERLAYS = 6
 MOST_CORRELATIONS = 8
+MOST_WARNINGS = 4
 
 
 def recording_section(recording: Recording, model: ModelFile | None) -> Section:
@@ -31,7 +32,10 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
         ("robot initialisations", f"{starts}, each with joint offsets of its own"),
         ("simulated with", said),
     ]
-    warnings = [Callout(line, "warn") for line in recording.warnings]
+    more = len(recording.warnings) - MOST_WARNINGS
+    shown = [*recording.warnings[:MOST_WARNINGS], *([f"and {more} more, see the terminal"] if more > 0 else [])]
+    odd = Callout(f"{len(recording.warnings)} things were odd about this recording:", "warn")
+    warnings: list[Block] = [odd, Listing(shown)] if shown else []
     text = [
         "The same commands that the rig received were given to the simulation. It started where the rig started and "
         "then ran freely to the end of each trial: nothing pulls it back to the measurement."
