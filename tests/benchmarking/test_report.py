@@ -6,7 +6,7 @@ from pathlib import Path
 from PIL import Image
 
 from tactile_cube.benchmarking.picture import write_picture
-from tactile_cube.benchmarking.report import Figure, Growth, Section, rates
+from tactile_cube.benchmarking.report import Figure, Growth, Section, durations, rates
 from tactile_cube.benchmarking.table import table
 from tactile_cube.benchmarking.timing import Timing
 
@@ -25,6 +25,12 @@ def test_rates_are_calls_a_second_and_above_one_where_ours_is_faster() -> None:
     assert (ours.value, ours.ratio) == (5.0, 2.0)
     assert ours.low < ours.value < ours.high
     assert (peer.value, peer.ratio) == (2.5, 1.0)
+
+
+def test_durations_are_milliseconds_with_quartiles_in_order() -> None:
+    ours = durations(TIMINGS)[0]
+    assert (ours.value, ours.unit) == (200.0, "CPU ms")
+    assert ours.low < ours.value < ours.high
 
 
 def test_without_the_yardstick_there_are_no_ratios() -> None:

@@ -93,3 +93,9 @@ def rates(timings: dict[str, Timing], yardstick: str, unit: str, notes: dict[str
         ratio = None if base is None else base / median
         figures.append(Figure(name, 1.0 / median, 1.0 / high, 1.0 / low, unit, ratio, (notes or {}).get(name, "")))
     return figures
+
+
+def durations(timings: dict[str, Timing]) -> list[Figure]:
+    """Processor time a call [ms]."""
+    milliseconds = {name: [1e3 * seconds for seconds in timing.quartiles] for name, timing in timings.items()}
+    return [Figure(name, median, low, high, "CPU ms") for name, (low, median, high) in milliseconds.items()]
