@@ -15,10 +15,13 @@ def main(config: DictConfig) -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # one core against one core
 
     import json
+    import shlex
+    import sys
     from pathlib import Path
 
     from hydra.core.hydra_config import HydraConfig
 
+    from tactile_cube.agent.policy_file import current_commit
     from tactile_cube.benchmarking.machine import busy, machine
     from tactile_cube.benchmarking.picture import write_picture
     from tactile_cube.benchmarking.sections import check_sections, measure
@@ -28,7 +31,10 @@ def main(config: DictConfig) -> None:
     settings = RunSettings(sections=tuple(config.sections), rounds=config.rounds, peers=config.peers)
     check_sections(settings.sections)
     folder = Path(HydraConfig.get().runtime.output_dir)
-    facts = machine()
+    facts = machine() | {
+        "commit": current_commit(),
+        "command": shlex.join(["python", "-m", "tactile_cube.benchmark", *sys.argv[1:]]),
+    }
     head = "\n".join(f"{key}: {value}" for key, value in facts.items())
     warning = (
         "other programs are running: compare ratios and processor times, not times on the clock\n" if busy() else ""
