@@ -28,9 +28,11 @@ BATCHES = (64, 256, 1024, 4096)
 WIDTHS = (128, 256, 512, 1024)
 REPLAY_SIZES = (10_000, 50_000, 150_000, 500_000)
 MEGABYTE = 2**20
+CALLS = 20
+"""Updates in a row, as in training: the first after something else finds cold caches."""
 
 
-def update(rounds: int, peers: bool = True, calls: int = 4, hidden: int = 512) -> Section:
+def update(rounds: int, peers: bool = True, calls: int = CALLS, hidden: int = 512) -> Section:
     """One update with sampling: batch 256, actor and twin critics of two hidden layers, targets, temperature.
 
     Args:
