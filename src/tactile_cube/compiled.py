@@ -27,7 +27,7 @@ def _as_pointer(context: Any, address: Any) -> Any:
     def build(target: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
 
-    return types.CPointer(types.float64)(address), build
+    return types.CPointer(types.float64)(address), build  # type: ignore[no-untyped-call]
 
 
 @compiled
@@ -41,4 +41,4 @@ def borrowed(array: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """
     if array.strides[0] != array.itemsize:
         raise ValueError("an array with gaps: pass a contiguous one")
-    return numba.carray(_as_pointer(array.ctypes.data), array.shape)  # type: ignore[no-any-return]
+    return numba.carray(_as_pointer(array.ctypes.data), array.shape)  # type: ignore

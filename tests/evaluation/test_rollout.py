@@ -10,7 +10,7 @@ from torchrl.envs import TransformedEnv
 from tactile_cube.env import Task
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.evaluation import Evaluation
-from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy, action_of
+from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.replay import NearlyEqualStart
 from tactile_cube.evaluation.rollout import run_episode
@@ -95,7 +95,7 @@ def test_scripted_gait_is_deterministic_and_bounded(env: TransformedEnv) -> None
 
 def test_actions_and_angles_are_inverse() -> None:
     angles = np.random.default_rng(0).uniform(DLR_HAND2.action_lower, DLR_HAND2.action_upper)
-    action = action_of(DLR_HAND2, angles)
+    action = DLR_HAND2.action_of(angles)
     half_range = 0.5 * (DLR_HAND2.action_upper - DLR_HAND2.action_lower)
     np.testing.assert_allclose(DLR_HAND2.action_lower + half_range * (action + 1.0), angles)
 

@@ -50,11 +50,28 @@ def test_what_was_taken_reaches_the_world(transformed: MakeEnv) -> None:
     assert task.world.commands[-1] == pytest.approx(wanted)
 
 
-def test_targets_are_start_poses_where_asked_for(transformed: MakeEnv) -> None:
-    grasps = torch.stack([torch.full((12,), 0.25), torch.full((12,), -0.75)])
-    explore = Exploration(episodes=1.0, probability=1.0, grasps=1.0)
-    taken = run(transformed(FingerExploration(explore, grasps), worlds=60), 60, 4)
-    assert set(taken.unique().tolist()) == {-0.75, 0.0, 0.25}
+def test_stretches_of_a_gait_are_played_in_order_with_all_fingers(transformed: MakeEnv) -> None:
+    walks = (torch.arange(2.0)[:, None] + torch.arange(1.0, 9.0) / 10.0)[..., None].expand(2, 8, 12)
+    explore = Exploration(episodes=1.0, probability=0.2, shortest=3, gait=1.0, gait_longest=8)
+    taken = run(transformed(FingerExploration(explore, walks), worlds=40), 40, 30)
+    assert torch.equal(taken.amin((2, 3)), taken.amax((2, 3)))
+    played, lengths = taken[:, :, 0, 0], []
+    for world in range(40):
+        steps = played[:, world].tolist()
+        for step, value in enumerate(steps):
+            begins = value in (pytest.approx(0.1), pytest.approx(1.1))
+            assert value == 0.0 or begins or value == pytest.approx(steps[step - 1] + 0.1)
+            if begins:
+                lengths.append(0)
+            if value != 0.0:
+                lengths[-1] += 1
+    assert max(lengths) <= 8
+    assert {3, 8} <= set(lengths)
+
+
+def test_a_stretch_longer_than_the_gaits_is_refused() -> None:
+    with pytest.raises(InputError, match="gaits last 4 steps"):
+        FingerExploration(Exploration(gait=1.0, gait_longest=9), torch.zeros(1, 4, 12))
 
 
 def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> None:

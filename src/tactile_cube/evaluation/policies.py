@@ -13,7 +13,7 @@ from tactile_cube.agent.networks import Actor
 from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
-from tactile_cube.hand import HandModel, grasp_angles
+from tactile_cube.hand import grasp_angles
 
 SQUEEZE = 0.010
 """How far the targets of the tips lie inside the faces when a baseline holds the cube [m]; gives 1 to 3 N."""
@@ -27,13 +27,6 @@ class Policy(Protocol):
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return the action `(12,)` in [-1, 1] for the stacked observation `(120,)`."""
-
-
-def action_of(hand: HandModel, angles: Array) -> Array:
-    """Return the action in [-1, 1] that asks for joint angles `(..., 12)` [rad]; angles out of range are clipped."""
-    middle = 0.5 * (hand.action_lower + hand.action_upper)
-    half_range = 0.5 * (hand.action_upper - hand.action_lower)
-    return np.clip((angles - middle) / half_range, -1.0, 1.0)
 
 
 class ActorPolicy:
@@ -60,7 +53,7 @@ class HoldPolicy:
         world = env.world
         size = np.asarray(env.constants.cube_size)
         angles = grasp_angles(env.hand, size, world.cube_position, world.cube_quaternion, clearance=-SQUEEZE)
-        self._action = action_of(env.hand, angles)
+        self._action = env.hand.action_of(angles)
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return the same action at every step."""
@@ -98,7 +91,7 @@ class ReplayPolicy:
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Scale the targets to the hand's action range."""
-        self._actions = action_of(env.hand, self._targets)
+        self._actions = env.hand.action_of(self._targets)
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return the recorded action of this step."""

@@ -1,63 +1,13 @@
-"""A hand-crafted gait: fingertips walk on a circle around the cube, one pair holds while the other goes back.
-
-The paper compares with a hand-crafted trajectory (11 rad, then the cube drops). This one follows a clock and feels
-nothing.
-"""
+"""The hand-crafted gait as a policy."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.env import RotationEnv
 from tactile_cube.evaluation.episode_record import Array
-from tactile_cube.evaluation.policies import action_of
-from tactile_cube.hand import HandModel, finger_angles
-
-PLACES = np.radians([-90.0, 0.0, 90.0, 180.0])
-"""Where ring, middle, fore and thumb stand around the cube."""
-PHASES = np.array([0.0, 0.5, 0.0, 0.5])
-"""Part of the cycle by which each finger is ahead: opposing fingers move together."""
-
-
-@dataclass(frozen=True)
-class Gait:
-    """Shape of the walk.
-
-    Found by trying 140 gaits at random at full weight and T_s 0.5 s; turning about -z is what this hand pose does best.
-
-    Attributes:
-        swing: a finger walks from +swing to -swing about its place, and back in the air, to turn the cube in -z [rad].
-        shift: of the middle of the swing from the finger's place [rad].
-        period: policy steps of a cycle.
-        air_share: part of the cycle in which a finger is in the air.
-        pressed: distance of a holding tip's target from the vertical axis; 54 mm would just touch the faces [m].
-        lifted: the same in the air [m].
-        height: of the tips' targets over the middle of the cube [m].
-        closing: policy steps in which all fingers close around the cube before they begin to walk.
-    """
-
-    swing: float = 0.725
-    shift: float = -0.110
-    period: int = 49
-    air_share: float = 0.281
-    pressed: float = 0.0438
-    lifted: float = 0.0934
-    height: float = 0.0066
-    closing: int = 10
-
-    def tips(self, step: int, direction: int = -1) -> Array:
-        """Return the targets of the fingertips `(4, 3)` [m] at a policy step; direction +1 turns about +z."""
-        holding = 1.0 - self.air_share
-        phase = ((step - self.closing) / self.period + PHASES) % 1.0 if step >= self.closing else np.zeros(4)
-        on_cube = phase < holding
-        forth = 1.0 - 2.0 * phase / holding
-        back = -1.0 + 2.0 * (phase - holding) / self.air_share
-        walk = -direction * self.swing * np.where(on_cube, forth, back) if step >= self.closing else np.zeros(4)
-        angle, radius = PLACES - direction * self.shift + walk, np.where(on_cube, self.pressed, self.lifted)
-        return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(4, self.height)], axis=1)
+from tactile_cube.hand import Gait
 
 
 class ScriptedPolicy:
@@ -72,9 +22,4 @@ class ScriptedPolicy:
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return the action of the clock's step."""
-        return action_of(self._hand, joint_angles(self._hand, self._gait.tips(step, self._direction)))
-
-
-def joint_angles(hand: HandModel, tips: Array) -> Array:
-    """Return the joint angles `(12,)` [rad] that bring the tips to their targets `(4, 3)` [m]."""
-    return np.concatenate([finger_angles(hand, finger, tip[None])[0] for finger, tip in enumerate(tips)])
+        return self._gait.action(self._hand, step, self._direction)

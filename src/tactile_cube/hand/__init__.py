@@ -1,8 +1,18 @@
 """What the mechanism is: the hand's geometry, masses and limits, its kinematics and its URDF description."""
 
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2
+from tactile_cube.hand.gait import Gait
 from tactile_cube.hand.kinematics import finger_angles, grasp_angles, tip_positions
 from tactile_cube.hand.model import HandModel
 from tactile_cube.hand.urdf import finger_urdf, hand_urdf
 
-__all__ = ["DLR_HAND2", "HandModel", "finger_angles", "finger_urdf", "grasp_angles", "hand_urdf", "tip_positions"]
+__all__ = [
+    "DLR_HAND2",
+    "Gait",
+    "HandModel",
+    "finger_angles",
+    "finger_urdf",
+    "grasp_angles",
+    "hand_urdf",
+    "tip_positions",
+]

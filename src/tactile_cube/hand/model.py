@@ -106,6 +106,12 @@ class HandModel:
         """Names of the actuated joints, e.g. `ring_q1`."""
         return tuple(f"{finger.name}_q{j}" for finger in self.fingers for j in range(1, JOINTS_PER_FINGER + 1))
 
+    def action_of(self, angles: Array) -> Array:
+        """Action in [-1, 1] that asks for joint angles `(..., 12)` [rad]; angles out of range are clipped."""
+        middle = 0.5 * (self.action_lower + self.action_upper)
+        half_range = 0.5 * (self.action_upper - self.action_lower)
+        return np.clip((angles - middle) / half_range, -1.0, 1.0)
+
     @property
     def tip_radius(self) -> float:
         """Radius of the fingertip's sphere [m]."""

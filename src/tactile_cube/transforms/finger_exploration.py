@@ -22,6 +22,7 @@ GROUPS = torch.tensor(
     ]
 )
 """Fingers that move together (8, 4): each alone, the opposing pairs ring-fore and middle-thumb, all (twice)."""
+HOLDS = -1  # in place of a walk's index: a random target is held
 
 
 @dataclass(frozen=True)
@@ -33,24 +34,30 @@ class Exploration:
         probability: with which a step of such an episode begins to hold a random target.
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
-        grasps: part of the targets that are a start pose's joint angles instead of uniform ones: fingers that have
-            twisted go back to where they can grasp the cube anew.
+        gait: part of the targets that are a stretch of a hand-crafted gait with all fingers instead of a held
+            random one.
+        gait_longest: most steps of such a stretch.
     """
 
     episodes: float = 0.3
     probability: float = 0.06
     shortest: int = 2
     longest: int = 7
-    grasps: float = 0.0
+    gait: float = 0.0
+    gait_longest: int = 40
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
-        for key in ("episodes", "probability", "grasps"):
+        for key in ("episodes", "probability", "gait"):
             if not 0.0 <= getattr(self, key) <= 1.0:
                 raise InputError(f"exploration.{key} is {getattr(self, key)}; give a number in [0, 1]")
         if not 1 <= self.shortest <= self.longest:
             raise InputError(
                 f"exploration holds {self.shortest} to {self.longest} steps; give 1 <= shortest <= longest"
+            )
+        if not self.shortest <= self.gait_longest:
+            raise InputError(
+                f"exploration.gait_longest is {self.gait_longest}; give at least exploration.shortest={self.shortest}"
             )
 
 
@@ -65,13 +72,21 @@ class FingerExploration(Transform):  # type: ignore[misc]
         >>> env = TransformedEnv(worlds, FingerExploration(Exploration(episodes=0.3)))
     """
 
-    def __init__(self, exploration: Exploration, grasps: Tensor | None = None) -> None:
-        """Explores as `exploration` says; `grasps` (poses, 12) are actions that hold a start pose."""
+    def __init__(self, exploration: Exploration, walks: Tensor | None = None) -> None:
+        """Explores as `exploration` says; `walks` (walks, steps, 12) are actions of gaits, needed if gait > 0.
+
+        Raises:
+            InputError: the walks are shorter than a stretch of the gait may be.
+        """
         super().__init__(out_keys=["exploring", "action_taken"])
         self.settings = exploration
-        self._grasps = torch.zeros(1, 12) if grasps is None else grasps
+        self._walks = torch.zeros(1, exploration.gait_longest, 12) if walks is None else walks
+        if self._walks.shape[1] < exploration.gait_longest:
+            raise InputError(
+                f"exploration.gait_longest is {exploration.gait_longest}; the gaits last {self._walks.shape[1]} steps"
+            )
         self._exploring = self._held = torch.zeros(0)
-        self._target = self._fingers = self._taken = torch.zeros(0)
+        self._walk = self._clock = self._target = self._fingers = self._taken = torch.zeros(0)
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         mask = reset_mask(tensordict, tensordict_reset)
@@ -79,6 +94,8 @@ class FingerExploration(Transform):  # type: ignore[misc]
         if self._exploring.shape != mask.shape:
             self._exploring = torch.zeros_like(mask)
             self._held = torch.zeros_like(mask, dtype=torch.int64)
+            self._walk = torch.full(worlds, HOLDS)
+            self._clock = torch.zeros(worlds, dtype=torch.int64)
             self._target = torch.zeros(*worlds, 12)
             self._fingers = torch.zeros(*worlds, 12, dtype=torch.bool)
             self._taken = torch.zeros(*worlds, 12)
@@ -90,7 +107,10 @@ class FingerExploration(Transform):  # type: ignore[misc]
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         action = tensordict.get("action")
         self._begin(action.shape[:-1])
-        self._taken = torch.where(self._fingers & (self._held > 0), self._target, action)
+        played = self._walks[self._walk.clamp_min(0), self._clock]
+        target = torch.where((self._walk == HOLDS).unsqueeze(-1), self._target, played)
+        self._taken = torch.where(self._fingers & (self._held > 0), target, action)
+        self._clock = (self._clock + 1).clamp_max(self._walks.shape[1] - 1)
         self._held = (self._held - 1).clamp_min(0)
         return tensordict.set("action", self._taken)
 
@@ -99,11 +119,16 @@ class FingerExploration(Transform):  # type: ignore[misc]
         begins = (torch.rand(*worlds, 1) < self.settings.probability) & self._exploring & (self._held == 0)
         steps = torch.randint(self.settings.shortest, self.settings.longest + 1, (*worlds, 1))
         fingers = GROUPS[torch.randint(len(GROUPS), worlds)].repeat_interleave(3, dim=-1)
-        grasp = self._grasps[torch.randint(len(self._grasps), worlds)]
-        target = torch.where(torch.rand(*worlds, 1) < self.settings.grasps, grasp, 2.0 * torch.rand(*worlds, 12) - 1.0)
-        self._held = torch.where(begins, steps, self._held)
-        self._fingers = torch.where(begins, fingers, self._fingers)
+        plays = torch.rand(*worlds, 1) < self.settings.gait
+        stretch = torch.randint(self.settings.shortest, self.settings.gait_longest + 1, (*worlds, 1))
+        walk = torch.randint(len(self._walks), worlds)
+        target = 2.0 * torch.rand(*worlds, 12) - 1.0
+        self._held = torch.where(begins, torch.where(plays, stretch, steps), self._held)
+        self._fingers = torch.where(begins, fingers | plays, self._fingers)
         self._target = torch.where(begins, target, self._target)
+        once = begins.squeeze(-1)
+        self._walk = torch.where(once, torch.where(plays.squeeze(-1), walk, HOLDS), self._walk)
+        self._clock = self._clock.masked_fill(once, 0)
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
         next_tensordict.set("exploring", self._exploring)

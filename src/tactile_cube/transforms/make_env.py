@@ -14,6 +14,7 @@ from tactile_cube.env import Curriculum, Reward, RotationEnv, Task
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand.gait import walks as gait_walks
 from tactile_cube.randomization import Randomization, StartPoses, StartStates
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
@@ -22,6 +23,8 @@ from tactile_cube.transforms.observation_stack import ObservationStack
 from tactile_cube.transforms.privileged_state import PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
+
+WALKS, WALK_STEPS = 64, 120  # gaits that exploration chooses from, and their length in policy steps
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ def make_env(
     poses = config.start.of(hand)
     tasks = [rotation_env(config, hand, poses) for _ in range(worlds)]
     base = WorldsEnv(tasks, None if evaluation else config.curriculum)
-    env = TransformedEnv(base, Compose(*transforms(config, hand, poses, explore=not evaluation)))
+    env = TransformedEnv(base, Compose(*transforms(config, hand, explore=not evaluation)))
     env.set_seed(seed)
     return env
 
@@ -90,7 +93,7 @@ def rotation_env(config: EnvConfig, hand: HandModel = DLR_HAND2, poses: StartPos
     return RotationEnv(world, config.task, config.reward, config.randomization, start, config.constants, hand)
 
 
-def transforms(config: EnvConfig, hand: HandModel, poses: StartPoses, explore: bool) -> list[Transform]:
+def transforms(config: EnvConfig, hand: HandModel, explore: bool) -> list[Transform]:
     """The transforms, from the world to the policy: readings pass them downwards, actions upwards."""
     disturbances = config.randomization
     half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)
@@ -102,12 +105,6 @@ def transforms(config: EnvConfig, hand: HandModel, poses: StartPoses, explore: b
         StickyAction(disturbances.sticky_probability),
     ]
     if explore and config.exploration.episodes > 0.0:
-        chain.append(FingerExploration(config.exploration, grasp_actions(hand, poses)))
+        walks = gait_walks(hand, WALKS, WALK_STEPS, config.task.direction)
+        chain.append(FingerExploration(config.exploration, torch.tensor(walks, dtype=torch.float32)))
     return chain
-
-
-def grasp_actions(hand: HandModel, poses: StartPoses) -> torch.Tensor:
-    """Actions (poses, 12) in [-1, 1] that hold the fingers in the start poses."""
-    middle = 0.5 * (hand.action_upper + hand.action_lower)
-    half_range = 0.5 * (hand.action_upper - hand.action_lower)
-    return torch.tensor((poses.angles - middle) / half_range, dtype=torch.float32).clamp(-1.0, 1.0)
