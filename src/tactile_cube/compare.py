@@ -17,7 +17,6 @@ def main(config: DictConfig) -> None:
     from pathlib import Path
 
     from hydra.core.hydra_config import HydraConfig
-    from omegaconf import OmegaConf
 
     from tactile_cube.drivetrain.model_file import read_model
     from tactile_cube.measurement.bench import without_touches
@@ -33,10 +32,8 @@ def main(config: DictConfig) -> None:
     recording = without_touches(read_recording(config.recording))
     for line in recording.warnings:
         print(f"warning: {line}", file=sys.stderr)
-    spread = OmegaConf.to_container(config.band.spread)
-    comparison = compare(
-        recording, model, config.engine, config.step, config.band.simulations, dict(spread), config.seed
-    )
+    spread = {str(key): float(value) for key, value in config.band.spread.items()}
+    comparison = compare(recording, model, config.engine, config.step, config.band.simulations, spread, config.seed)
     command = shlex.join(["python", "-m", "tactile_cube.compare", *sys.argv[1:]])
     result = as_json(comparison) | {"model": config.model, "engine": config.engine, "command": command}
     result["seconds"] = round(time.perf_counter() - begin, 2)

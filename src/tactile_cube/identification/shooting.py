@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.signals import MOTOR_POSITION
+from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.stretches import Stretches, steps_per_row
@@ -20,6 +20,7 @@ from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.replay import CLAMPED
 
 Array = NDArray[np.float64]
+PROBE = 1e-4  # [rad] jump of the command by which its way to the sensor is probed
 POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] finite differences of a segment's start
 
 
@@ -63,7 +64,8 @@ class Shooting:
     def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
         memory = self._memory(model, stretches)
         count, fine = len(stretches), stretches.substeps
-        signals = np.zeros((count, out.shape[1] * fine, 1, out.shape[2]))
+        felt = self._jump_ratio(memory, stretches)
+        signals = np.zeros((count, out.shape[1] * fine, 2, out.shape[2]))
         self.plant.kernel.segments_batch(
             stretches.commands,
             np.arange(count),
@@ -75,12 +77,30 @@ class Shooting:
             stretches.speed,
             np.tile(nudge, (count, 1)),
             memory,
-            np.array([MOTOR_POSITION]),
+            np.array([MOTOR_POSITION, COMMAND]),
             0,
             count,
             signals,
         )
-        out[:] = signals[:, ::fine, 0]
+        out[:] = signals[:, ::fine, 0] - felt * _jumps(signals[:, :, 1], stretches)
+
+    def _jump_ratio(self, memory: Array, stretches: Stretches) -> Array:
+        """How much of a jump of the command the position sensor shows at once (n,), whatever effects lie between.
+
+        Two steps of a copy from the first start, with and without a jump in the second one.
+        """
+        command = stretches.commands[0, stretches.history * stretches.substeps]
+        seen = []
+        for jump in (0.0, PROBE):
+            copy = memory[0].copy()
+            self.plant.kernel.step(command, copy)
+            self.plant.kernel.step(command + jump, copy)
+            seen.append(np.stack([self.plant.signal(copy, MOTOR_POSITION), self.plant.signal(copy, COMMAND)]))
+        position, acted = seen[1] - seen[0]
+        soft = self.plant.view(memory, "kp")[0] * self.plant.view(memory, "compliance")[0]
+        passed = np.abs(acted) > 0.5 * PROBE
+        ratio: Array = np.where(passed, position / np.where(passed, acted, 1.0), soft / (1.0 + soft))
+        return ratio
 
     def _memory(self, model: Model, stretches: Stretches) -> Array:
         """One block (S, size) for each stretch, at rest at its start."""
@@ -123,3 +143,17 @@ class Shooting:
         torque = constants["kp"] * error - constants["kd"] * stretches.speed[:, 0]
         limit = constants["torque_limit"]
         return stretches.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
+
+
+def _jumps(acting: Array, stretches: Stretches) -> Array:
+    """Simulated command at each reading less the one that the log feels (S, K segment, n).
+
+    Known exactly unless an effect changes the command on its way; then half the change from row to row, smoothed.
+    """
+    first, fine = stretches.history * stretches.substeps, stretches.substeps
+    if np.array_equal(acting, stretches.commands[:, first:]):
+        return stretches.jump
+    rows = acting[:, ::fine]
+    jumps = np.zeros_like(rows)
+    jumps[:, 1:-1] = 0.25 * (rows[:, 2:] - rows[:, :-2])
+    return jumps if stretches.read_after else -jumps

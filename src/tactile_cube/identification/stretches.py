@@ -24,6 +24,7 @@ FEWEST = 4  # samples that a stretch needs
 ROWS = (
     "commands",
     "measured",
+    "jump",
     "weight",
     "position",
     "speed",
@@ -45,6 +46,7 @@ class Stretches:
     Attributes:
         commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
         measured: (S, K segment, n) measured positions [rad].
+        jump: (S, K segment, n) mean command at each reading less the one that the log feels [rad].
         weight: (S, K segment, n) 1 / sensor noise; 0 where nothing was measured [1/rad].
         position: (S, K, n) measured position at each segment's start [rad].
         speed: (S, K, n) [rad/s].
@@ -58,10 +60,12 @@ class Stretches:
         history: H.
         segment: rows of a segment.
         substeps: simulation steps from row to row.
+        read_after: a row is read at the end of the period in which its command acts, not at its beginning.
     """
 
     commands: Array
     measured: Array
+    jump: Array
     weight: Array
     position: Array
     speed: Array
@@ -75,6 +79,7 @@ class Stretches:
     history: int
     segment: int
     substeps: int
+    read_after: bool
 
     @property
     def segments(self) -> int:
@@ -117,20 +122,23 @@ def cut(
     ]
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces = tuple(piece["force"] for piece in pieces)
-    return Stretches(**columns, forces=forces, history=history, segment=segment, substeps=steps_per_row(recording))  # type: ignore[arg-type]
+    return Stretches(
+        **columns,
+        forces=forces,  # type: ignore[arg-type]
+        history=history,
+        segment=segment,
+        substeps=steps_per_row(recording),
+        read_after=recording.read == "after",
+    )
 
 
 def _pieces(
     recording: Recording, trial: Trial, index: int, rows: int, segment: int, history: int, noise: Array
 ) -> Iterator[dict[str, object]]:
-    stiffness = recording.nominal.get("stiffness", np.full(len(recording.joints), np.inf))
-    elastic = trial.gains.kp / stiffness / (1.0 + trial.gains.kp / stiffness)
-    if recording.torque_controlled:
-        elastic = TORQUE_MODE_GAIN / stiffness
     command = trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
     substeps = steps_per_row(recording)
     fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
-    measured = trial.position + elastic * _half_jump(command, recording.read)
+    jump = _half_jump(command, recording.read)
     for first in range(0, len(trial.time), rows):
         span = np.arange(first, first + rows)
         usable = np.minimum(span, len(trial.time) - 1)
@@ -141,7 +149,8 @@ def _pieces(
         position, speed, acceleration = _states(trial, starts)
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
-            "measured": measured[usable],
+            "measured": trial.position[usable],
+            "jump": np.where((span < len(trial.time))[:, None], jump[usable], 0.0),
             "weight": present[:, None] / noise,
             "position": position,
             "speed": speed,
