@@ -38,10 +38,12 @@ class EpisodeConstants:
         joint_offset: What the position sensors read too much (12,) [rad]; targets are meant in what the sensors read.
         cube_size: Edge lengths (3,) [m]; a float means a cube.
         cube_mass: [kg].
+        cube_com: Centre of mass from the cube's centre, in the cube's frame (3,) [m].
         cube_friction: Lateral friction factor of the cube; that of a contact is the product of both bodies'.
         tip_friction: Lateral friction factor of the fingertips.
         link_friction: Lateral friction factor of all other links.
         tip_spinning_friction: Torque against spinning under a fingertip per normal force [m].
+        tip_compliance: How far the tips' skin gives way per normal force on the cube [m/N]; 0: hard.
         table_height: Top of the table in the world [m]; None: no table.
         table_friction: Lateral friction factor of the table.
         force_mean: Mean size of the random force on the cube [N].
@@ -68,10 +70,12 @@ class EpisodeConstants:
     joint_offset: Array | float = 0.0
     cube_size: Array | tuple[float, ...] | float = 0.08
     cube_mass: float = 0.05
+    cube_com: Array | tuple[float, ...] | float = 0.0
     cube_friction: float = 1.0
     tip_friction: float = 0.9
     link_friction: float = 0.09
     tip_spinning_friction: float = 0.1
+    tip_compliance: float = 0.0
     table_height: float | None = None
     table_friction: float = 0.5
     force_mean: float = 0.0
@@ -84,6 +88,7 @@ class EpisodeConstants:
     _LENGTHS: ClassVar[dict[str, int]] = {
         "gravity_direction": 3,
         "cube_size": 3,
+        "cube_com": 3,
         "kp": _JOINTS,
         "kd": _JOINTS,
         "stiffness": _JOINTS,
@@ -102,7 +107,13 @@ class EpisodeConstants:
         "cube_mass",
         "force_interval",
     )
-    _ANY_SIGN: ClassVar[tuple[str, ...]] = ("gravity_direction", "elasticity_sign", "joint_offset", "table_height")
+    _ANY_SIGN: ClassVar[tuple[str, ...]] = (
+        "gravity_direction",
+        "elasticity_sign",
+        "joint_offset",
+        "cube_com",
+        "table_height",
+    )
 
     def __post_init__(self) -> None:
         """Give every vector its length and refuse values without a physical meaning."""

@@ -26,6 +26,8 @@ _TIP = LINKS_PER_FINGER - 1
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
 _ALL_GROUPS = 0xFF
 _URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+_SKIN_RELAXATION = 5e-3
+"""Damping over stiffness of a fingertip's skin [s]: rubber settles within a few ms."""
 _NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
 
 
@@ -59,6 +61,12 @@ def load_chain(client: int, urdf: str, position: Array, rotation: Array) -> int:
     return int(body)
 
 
+def com_arm(constants: EpisodeConstants, quaternion: Array) -> Array:
+    """From the cube's centre to its centre of mass, in the world (3,) [m]."""
+    com = np.asarray(constants.cube_com)
+    return Rotation.from_quat(quaternion).as_matrix() @ com if com.any() else np.zeros(3)
+
+
 class Scene:
     """The hand, the cube and the table of one world.
 
@@ -82,7 +90,7 @@ class Scene:
             pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
         )
         self._cube_shape = -1
-        self._cube_size = np.zeros(3)
+        self._cube_size = self._cube_com = np.zeros(3)
 
     def place(self, constants: EpisodeConstants, start: Start, angles: Array, velocities: Array) -> None:
         """Puts everything at the start of an episode.
@@ -149,15 +157,17 @@ class Scene:
     def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
         """A new body each time: Bullet keeps the inertia in the world of a used one for a step after it is moved.
 
-        It is a plain rigid body; as a multibody without links it would make the solver 8 % slower.
+        It is a plain rigid body; as a multibody without links it would make the solver 8 % slower. Its origin in Bullet is
+        its centre of mass. The skin of the fingertips is written on the cube, since Bullet cannot take it away again.
         """
         if self.cube >= 0:
             pybullet.removeBody(self.cube, physicsClientId=self.client)
+        arm = com_arm(constants, np.asarray(start.cube_quaternion))
         self.cube = int(
             pybullet.createMultiBody(
                 constants.cube_mass,
-                self._shape_of(np.asarray(constants.cube_size)),
-                basePosition=list(np.asarray(start.cube_position)),
+                self._shape_of(np.asarray(constants.cube_size), np.asarray(constants.cube_com)),
+                basePosition=list(np.asarray(start.cube_position) + arm),
                 baseOrientation=list(np.asarray(start.cube_quaternion)),
                 useMaximalCoordinates=True,
                 physicsClientId=self.client,
@@ -173,15 +183,27 @@ class Scene:
             **_NO_DAMPING,
             physicsClientId=self.client,
         )
-        velocity = list(np.asarray(start.cube_linear_velocity)), list(np.asarray(start.cube_angular_velocity))
-        pybullet.resetBaseVelocity(self.cube, *velocity, physicsClientId=self.client)
+        if constants.tip_compliance > 0.0:
+            skin = {
+                "contactStiffness": 1.0 / constants.tip_compliance,
+                "contactDamping": _SKIN_RELAXATION / constants.tip_compliance,
+            }
+            pybullet.changeDynamics(self.cube, -1, **skin, physicsClientId=self.client)
+        turning = np.asarray(start.cube_angular_velocity)
+        linear = np.asarray(start.cube_linear_velocity) + np.cross(turning, arm)
+        pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), physicsClientId=self.client)
 
-    def _shape_of(self, size: Array) -> int:
-        """The box of the last cube if it had this size, else a new one."""
-        if not np.array_equal(size, self._cube_size):
-            half = (0.5 * size).tolist()
-            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client)
-            self._cube_shape, self._cube_size = int(shape), size.copy()
+    def _shape_of(self, size: Array, com: Array) -> int:
+        """The box of the last cube if it had this size and centre of mass, else a new one.
+
+        Only a box off its centre of mass pays for a compound shape around it.
+        """
+        if not (np.array_equal(size, self._cube_size) and np.array_equal(com, self._cube_com)):
+            place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX, halfExtents=(0.5 * size).tolist(), **place, physicsClientId=self.client
+            )
+            self._cube_shape, self._cube_size, self._cube_com = int(shape), size.copy(), com.copy()
         return self._cube_shape
 
     def _set_friction(self, constants: EpisodeConstants) -> None:

@@ -20,7 +20,7 @@ from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.health import find_fault
 from tactile_cube.simulation.loop import OBJECT_STATE, make_loop
 from tactile_cube.simulation.options import SimulationOptions
-from tactile_cube.simulation.scene import Scene
+from tactile_cube.simulation.scene import Scene, com_arm
 from tactile_cube.simulation.trace import read_trace
 
 Array = NDArray[np.float64]
@@ -105,7 +105,7 @@ class World:
         self.fault = self.fault or find_fault(self._joints[0], self._joints[1], self._cube, distances)
 
     def push_cube(self, force: Array, torque: Array) -> None:
-        """Pushes the cube's centre with force [N] and torque [N m] in the world until changed or reset."""
+        """Pushes the cube's centre of mass with force [N] and torque [N m] in the world until changed or reset."""
         self._push[:] = np.concatenate([force, torque])
 
     def pull_finger(self, finger: int, force: Array) -> None:
@@ -219,6 +219,8 @@ class World:
         self._loop.run(substeps, self._scene.cube, self._wrench(), states)
         if states is not None:
             offset = np.asarray(self.constants.joint_offset)
+            if np.asarray(self.constants.cube_com).any():
+                states[:, :3] -= [com_arm(self.constants, state[3:7]) for state in states]
             self.trace = read_trace(self._drive.plant, self._drive.memory, filtered, offset, states, self.time)
 
     def _wrench(self) -> Array | None:
@@ -233,6 +235,10 @@ class World:
         position, quaternion = pybullet.getBasePositionAndOrientation(cube, physicsClientId=client)
         linear, angular = pybullet.getBaseVelocity(cube, physicsClientId=client)
         self._cube = np.array([*position, *quaternion, *linear, *angular])
+        if np.asarray(self.constants.cube_com).any():  # Bullet speaks of the centre of mass
+            arm = com_arm(self.constants, self._cube[3:7])
+            self._cube[:3] -= arm
+            self._cube[7:10] -= np.cross(self._cube[10:13], arm)
 
     def _tip_jacobian(self, finger: int) -> Array:
         """Velocity of a fingertip's centre per joint velocity (3, 3), by central differences."""
