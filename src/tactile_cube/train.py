@@ -23,6 +23,7 @@ def main(config: "DictConfig") -> None:
     from hydra.utils import instantiate
     from omegaconf import OmegaConf
 
+    from tactile_cube.drivetrain.model_file import read_model
     from tactile_cube.training.build import build_run
     from tactile_cube.training.collection import CollectionError
     from tactile_cube.training.environment import as_environment
@@ -30,6 +31,8 @@ def main(config: "DictConfig") -> None:
     from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
+    if config.model is not None:  # its contents, so that the policy file needs no other file
+        plain["env"]["model"] = read_model(config.model).model_dump()
     folder = Path(HydraConfig.get().runtime.output_dir)
     try:
         run = build_run(

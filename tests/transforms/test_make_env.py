@@ -1,6 +1,7 @@
 import pickle
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from torchrl.envs.utils import check_env_specs, step_mdp
@@ -9,6 +10,7 @@ from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import Randomization, StartStates, Uniform
 from tactile_cube.transforms import EnvConfig, Exploration, make_env
+from tactile_cube.transforms.make_env import rotation_env
 
 DISTURBED = Randomization(
     start_angles=Uniform(-0.03, 0.03),
@@ -77,3 +79,24 @@ def test_configuration_can_be_sent_to_another_process() -> None:
 def test_no_worlds_are_refused() -> None:
     with pytest.raises(InputError, match="number of worlds is 0"):
         make_env(config(), worlds=0, seed=0)
+
+
+def test_a_model_shapes_the_world_that_is_trained_in() -> None:
+    effect = {"effect": "torque_bias@q2", "parameters": {"bias": {"value": -0.2, "low": -0.21, "high": -0.19}}}
+    model = {"joints": ["q1", "q2", "q3"], "effects": [effect], "values": {"kp": {"q3": 3.0}}}
+    config = EnvConfig(Task("full"), model=model)
+    assert [(one.joint, one.values) for one in config.effects] == [
+        (f"{finger}_q2", {"bias": -0.2}) for finger in ("ring", "middle", "fore", "thumb")
+    ]
+    assert config.constants.kp[2] == 3.0
+    assert config.model is None  # done: replacing a part does not do it again
+    env = rotation_env(config)
+    env.reset()
+    sizes = [effect.values["bias"] for effect in env.constants.effects]
+    assert len(set(sizes)) == 4
+    np.testing.assert_allclose(sizes, -0.2, atol=0.01)
+
+
+def test_effects_are_named_as_text() -> None:
+    config = EnvConfig(Task("full"), effects=["backlash@q3: play=0.05"])
+    assert [one.values["play"] for one in config.effects] == [0.05] * 4

@@ -1,12 +1,14 @@
 """The one file that says what was identified: values, intervals, effects, provenance and errors, as plain YAML."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from tactile_cube.drivetrain.plain_yaml import read_schema
+from tactile_cube.drivetrain.plain_yaml import describe, read_schema
+from tactile_cube.errors import InputError
 
 
 class _Strict(BaseModel):
@@ -117,6 +119,22 @@ def read_model(path: str | Path) -> ModelFile:
         InputError: naming the file, the key and the value received.
     """
     return read_schema(Path(path), ModelFile)
+
+
+def as_model(given: ModelFile | Mapping[str, Any] | str | Path) -> ModelFile:
+    """A model, from its contents or from the path of its file.
+
+    Raises:
+        InputError: naming the key and the value received.
+    """
+    if isinstance(given, ModelFile):
+        return given
+    if isinstance(given, str | Path):
+        return read_model(given)
+    try:
+        return ModelFile.model_validate(given)
+    except ValidationError as error:
+        raise InputError(f"model: {describe(error)}") from None
 
 
 def write_model(model: ModelFile, path: str | Path) -> None:

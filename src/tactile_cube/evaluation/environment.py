@@ -21,18 +21,24 @@ TRUSTED = "tactile_cube."
 def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
     """Return the environment of `source` with the overrides of the command line.
 
-    A group chosen on the command line (`task=full`) replaces the policy's; single values (`+task.filter_time=0.3`,
+    `model` and `effects` replace those that the policy was trained with. A group chosen on the command line
+    (`task=full`) replaces the policy's; single values (`+task.filter_time=0.3`,
     `+env.simulation.solver_iterations=100`) change it.
 
     Raises:
         InputError: the policy file's configuration cannot be used.
     """
     trained = source.config.get("env")
+    named = config.get("model") is not None or config.get("effects") is not None
     settings: Any
     if trained is None:
         settings = OmegaConf.create(OmegaConf.to_container(config.untrained, resolve=True))
     else:
         settings = OmegaConf.create(_checked(trained, source.label) | {"curriculum": None, "exploration": None})
+        if not named:
+            _refuse_foreign_effects(trained, source.label)
+    if named:
+        settings.model, settings.effects = config.model, config.effects or []
     choices = HydraConfig.get().runtime.choices
     for group in GROUPS:
         if group in config:
@@ -58,6 +64,20 @@ def _checked(config: Mapping[str, Any], label: str) -> dict[str, Any]:
         if not str(target).startswith(TRUSTED):
             raise InputError(f"policy={label}: its configuration names {target!r}; only {TRUSTED}* is made from a file")
     return {str(key): value for key, value in config.items()}
+
+
+def _refuse_foreign_effects(config: Mapping[str, Any], label: str) -> None:
+    """Code is imported because a user names it, never because a policy file does."""
+    model = config.get("model") or {}
+    named = [str(one.get("effect")) for one in model.get("effects", [])] + [
+        str(one) for one in config.get("effects", [])
+    ]
+    own = [name for name in named if "." in name.partition("@")[0] and not name.startswith("{")]
+    if own:
+        raise InputError(
+            f"policy={label}: was trained with {', '.join(own)}, a class of its owner's, which no policy file can have "
+            "imported; give model=FILE or effects=[...] to name it yourself"
+        )
 
 
 def _targets(value: Any) -> list[Any]:

@@ -126,5 +126,6 @@ WORLD_SIGNALS = ("q", "q_f", "cube_position", "cube_quaternion")
 
 def _numbers(constants: EpisodeConstants) -> dict[str, float | str]:
     """Return the scalar constants of the episode for its label; vectors over the joints by their mean."""
-    values = {field.name: getattr(constants, field.name) for field in dataclasses.fields(constants)}
+    fields = (field.name for field in dataclasses.fields(constants) if field.name != "effects")
+    values = {name: getattr(constants, name) for name in fields}
     return {name: float(np.mean(value)) for name, value in values.items() if value is not None}

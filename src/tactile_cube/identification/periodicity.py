@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.identification.candidates import Candidate, forms
 from tactile_cube.identification.model import Model
-from tactile_cube.identification.problem import Problem
-from tactile_cube.identification.residual_shape import Missing, missing_torques
+from tactile_cube.identification.residual_shape import Missing
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
@@ -23,14 +22,12 @@ MOST_SAMPLES = 8000
 
 
 def periodic_candidates(
-    problem: Problem, recording: Recording, model: Model, residual: Array, effects: Sequence[type[Effect]]
+    missing_torques: Sequence[Missing], recording: Recording, model: Model, effects: Sequence[type[Effect]]
 ) -> list[Candidate]:
     """Candidates at the strongest harmonics of what is missing, for every effect that has one."""
     periodic = [effect for effect in effects if any(HARMONIC in form for form in forms(effect))]
-    if not periodic:
-        return []
     found = []
-    for missing in missing_torques(problem, recording, model, residual):
+    for missing in missing_torques:
         damping = float(model.constants["kd"][recording.joints.index(missing.joint)])
         for effect in periodic:
             moving = effect.stage is Stage.POSITION_SENSOR
@@ -48,6 +45,8 @@ def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) 
     A torque that repeats with the position is seen as it is; an error of the position sensor through its slope over
     time, which the controller damps.
     """
+    if damping == 0.0:  # commanded torques: no controller takes the sensor's error for motion
+        return []
     position = missing.signals[f"position of {missing.joint} [rad]"]
     speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
     weight = np.ones_like(position) if damping is None else speed

@@ -1,17 +1,30 @@
 """Distributions as values; the constants and the start of one episode drawn from them."""
 
-from tactile_cube.randomization.distributions import Constant, Distribution, LogUniform, Normal, Uniform, sample
+from tactile_cube.randomization.distributions import (
+    Constant,
+    Distribution,
+    LogUniform,
+    Normal,
+    Uniform,
+    UniformPerJoint,
+    sample,
+)
+from tactile_cube.randomization.effect_range import EffectRange
+from tactile_cube.randomization.identified import identified
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.randomization.start_states import StartPoses, StartStates
 
 __all__ = [
     "Constant",
     "Distribution",
+    "EffectRange",
     "LogUniform",
     "Normal",
     "Randomization",
     "StartPoses",
     "StartStates",
     "Uniform",
+    "UniformPerJoint",
+    "identified",
     "sample",
 ]

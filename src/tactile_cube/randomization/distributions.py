@@ -60,6 +60,24 @@ class Uniform:
 
 
 @dataclass(frozen=True)
+class UniformPerJoint:
+    """Equally likely between bounds of each joint's own, low (joints,) and high (joints,)."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
+        if len(self.low) != len(self.high) or not np.all(np.asarray(self.low) <= np.asarray(self.high)):
+            raise InputError(f"UniformPerJoint: low {self.low} and high {self.high}; give low <= high for each joint")
+
+    def quantile(self, u: Array) -> Array:
+        """Linear between the bounds; the last axis of `u` is the joints'."""
+        low, high = np.asarray(self.low), np.asarray(self.high)
+        return np.asarray(low + (high - low) * np.asarray(u))
+
+
+@dataclass(frozen=True)
 class LogUniform:
     """Equally likely in every factor: the logarithm is uniform in [log low, log high)."""
 

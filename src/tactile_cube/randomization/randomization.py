@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.randomization.distributions import Constant, Distribution, sample
+from tactile_cube.randomization.effect_range import EffectRange
 from tactile_cube.simulation import EpisodeConstants
 
 Array = NDArray[np.float64]
@@ -32,6 +33,7 @@ class Randomization:
         values: what replaces a constant.
         factors: what multiplies a constant.
         shifts: what is added to a constant.
+        effects: effects of the drivetrain that draw their numbers; the world must have them.
         cube_position: distributions (3,) of the cube's displacement at the start [m].
         cube_rotation: distributions (3,) of its rotation about x, y, z at the start [rad].
         start_angles: distribution of each joint's displacement at the start [rad].
@@ -43,6 +45,7 @@ class Randomization:
     values: Mapping[str, Distribution] = field(default_factory=dict)
     factors: Mapping[str, Distribution] = field(default_factory=dict)
     shifts: Mapping[str, Distribution] = field(default_factory=dict)
+    effects: Sequence[EffectRange] = ()
     cube_position: tuple[Distribution, ...] = (Constant(0.0),) * 3
     cube_rotation: tuple[Distribution, ...] = (Constant(0.0),) * 3
     start_angles: Distribution = field(default_factory=lambda: Constant(0.0))
@@ -75,6 +78,7 @@ class Randomization:
                 shape = () if key in DRAWN_ONCE else np.shape(value)
                 changed[key] = _plain(combine(value, sample(distribution, rng, shape)))
         changed["force_seed"] = int(rng.integers(2**31))
+        changed["effects"] = tuple(effect.draw(rng) for effect in self.effects)
         return dataclasses.replace(nominal, **changed)
 
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.errors import InputError
 from tactile_cube.hand import dlr_hand2
 
@@ -34,6 +35,7 @@ class EpisodeConstants:
         stiffness: Elasticity K_e between motor and joint (12,) [N m/rad].
         elasticity_sign: +1: the motor is ahead of a driven joint (physical); -1: as printed in the paper's eq. (2).
         static_friction: Dry friction of the joint (12,) [N m].
+        friction_creep: How fast a joint held by dry friction gives way (12,) [rad/s per N m].
         reflected_inertia: Rotor inertia seen at the joint (12,) [kg m^2].
         joint_offset: What the position sensors read too much (12,) [rad]; targets are meant in what the sensors read.
         cube_size: Edge lengths (3,) [m]; a float means a cube.
@@ -52,6 +54,7 @@ class EpisodeConstants:
         torque_std: Its standard deviation [N m].
         force_interval: Time after which force and torque are redrawn [s].
         force_seed: Seed of these draws.
+        effects: Numbers that effects of the world's drivetrain take in this episode; none: as the world was built.
     """
 
     gravity: float = 9.81
@@ -66,6 +69,7 @@ class EpisodeConstants:
     stiffness: Array | float = dlr_hand2.STIFFNESS
     elasticity_sign: int = 1
     static_friction: Array | float = dlr_hand2.STATIC_FRICTION
+    friction_creep: Array | float = 0.0
     reflected_inertia: Array | float = dlr_hand2.REFLECTED_INERTIA
     joint_offset: Array | float = 0.0
     cube_size: Array | tuple[float, ...] | float = 0.08
@@ -84,6 +88,7 @@ class EpisodeConstants:
     torque_std: float = 0.0
     force_interval: float = 0.5
     force_seed: int = 0
+    effects: tuple[Effect, ...] = ()
 
     _LENGTHS: ClassVar[dict[str, int]] = {
         "gravity_direction": 3,
@@ -93,6 +98,7 @@ class EpisodeConstants:
         "kd": _JOINTS,
         "stiffness": _JOINTS,
         "static_friction": _JOINTS,
+        "friction_creep": _JOINTS,
         "reflected_inertia": _JOINTS,
         "joint_offset": _JOINTS,
     }
@@ -113,6 +119,7 @@ class EpisodeConstants:
         "joint_offset",
         "cube_com",
         "table_height",
+        "effects",
     )
 
     def __post_init__(self) -> None:

@@ -72,7 +72,8 @@ class HandDrive:
         )
         self._refuse_unstable(constants)
         gravity = self._in_bases(c.gravity * c.down)
-        self.memory[:] = self.plant.memory(constants, gravity=gravity, effects=self._effects)
+        self.memory[:] = self.plant.memory(constants, gravity=gravity, effects=[*self._effects, *c.effects])
+        self.view("friction_creep")[:] = c.friction_creep
         self.view("time_constant")[:] = c.filter_time
         self.view("spin_inertia")[:] = spin_inertia(np.asarray(c.reflected_inertia))
         self.view("tendon_stiffness")[:] = TENDON_STIFFNESS

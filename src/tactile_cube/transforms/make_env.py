@@ -10,12 +10,14 @@ import torch
 from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import Compose, Transform
 
+from tactile_cube.drivetrain.effects import Effect, parse_effect, resolve
+from tactile_cube.drivetrain.model_file import as_model
 from tactile_cube.env import Curriculum, Reward, RotationEnv, Task
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel
 from tactile_cube.hand.gait import walks as gait_walks
-from tactile_cube.randomization import Randomization, StartPoses, StartStates
+from tactile_cube.randomization import Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
 from tactile_cube.transforms.joint_offset import JointOffset
@@ -40,7 +42,9 @@ class EnvConfig:
         curriculum: how conditions change in training; None: they do not.
         constants: nominal constants, which the task and the randomization change.
         simulation: numerical options of the world.
-        effects: effects of the drivetrain beyond the basic model.
+        effects: effects of the drivetrain beyond the basic model: instances, or text such as `backlash@q2: play=0.02`.
+        model: an identified model, as the path of its file, its contents or a ModelFile: its values, intervals and
+            effects replace those of the drive in `constants` and `randomization`. None once that is done.
         stack: readings in an observation, N_stack.
     """
 
@@ -53,10 +57,20 @@ class EnvConfig:
     constants: EpisodeConstants = field(default_factory=EpisodeConstants)
     simulation: SimulationOptions = field(default_factory=SimulationOptions)
     effects: Sequence[Any] = ()
+    model: Any = None
     stack: int = 5
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
+        """Makes the effects, puts the model in place, and refuses values without a meaning."""
+        effects = [one for effect in self.effects for one in placed_effects(effect)]
+        if self.model is not None:
+            model = as_model(self.model)
+            known = identified(model, self.constants, self.randomization, DLR_HAND2.joint_names)
+            for key, value in zip(("constants", "randomization"), known[:2], strict=True):
+                object.__setattr__(self, key, value)
+            effects += known[2]
+            object.__setattr__(self, "model", None)
+        object.__setattr__(self, "effects", effects)
         if self.stack < 1:
             raise InputError(f"env.stack is {self.stack}; give at least 1 reading")
 
@@ -108,3 +122,11 @@ def transforms(config: EnvConfig, hand: HandModel, explore: bool) -> list[Transf
         walks = gait_walks(hand, WALKS, WALK_STEPS, config.task.direction)
         chain.append(FingerExploration(config.exploration, torch.tensor(walks, dtype=torch.float32)))
     return chain
+
+
+def placed_effects(effect: Effect | str) -> list[Effect]:
+    """The effects that a text such as `backlash@q2: play=0.02` names, one for each joint that matches."""
+    if isinstance(effect, Effect):
+        return [effect]
+    name, values = parse_effect(effect)
+    return [kind(joint, **values) for kind, joint in resolve([name], DLR_HAND2.joint_names)]

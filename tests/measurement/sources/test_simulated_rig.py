@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recording import read_recording
-from tactile_cube.measurement.sources.hidden_effect import parse_effect
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 from tactile_cube.measurement.writing import write_recording
 from tests.measurement.small_rig import URDF

@@ -2,6 +2,7 @@
 
 from tactile_cube.drivetrain.effects.catalogue import catalogue, find_effect, matching_joints, resolve
 from tactile_cube.drivetrain.effects.effect import Effect, Parameter, Place, Stage
+from tactile_cube.drivetrain.effects.effect_text import parse_effect
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
     COMMAND,
@@ -43,5 +44,6 @@ __all__ = [
     "catalogue",
     "find_effect",
     "matching_joints",
+    "parse_effect",
     "resolve",
 ]

@@ -65,5 +65,5 @@ def _trial(motion: str, gain: int, log: dict[str, np.ndarray]) -> TrialTable:
     off = np.flatnonzero(log["torque_enable"] < 0.5)
     end = int(off[0]) if len(off) else len(log["t_s"])
     controller = ControllerChange(kp=stiffness(gain))
-    entry = TrialEntry(file=f"trials/{motion}_{gain}.parquet", kind=f"{motion}_{gain}", controller=controller)
+    entry = TrialEntry(file=f"trials/{motion}_{gain}.parquet", kind=motion, controller=controller)
     return TrialTable(entry, log["t_s"][:end], log["goal_rad"][:end, None], log["q_rad"][:end, None])

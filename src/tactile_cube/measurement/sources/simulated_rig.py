@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
 from tactile_cube.measurement.bench import BENCH_KINDS, Bench, bench_trials
 from tactile_cube.measurement.description import Coupling, Description, Touch, TrialEntry, per_joint
@@ -15,7 +16,6 @@ from tactile_cube.measurement.parameters import Parameters
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.replay import Engine, Replay
 from tactile_cube.measurement.rig import Rig, parse_rig, read_rig
-from tactile_cube.measurement.sources.hidden_effect import parse_effect
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.measurement.trial import Gains, Trial
 from tactile_cube.measurement.writing import RecordingTables, TrialTable

@@ -1,24 +1,31 @@
 """An effect as a user writes it: `stribeck_friction@q3` or `stribeck_friction@q3: excess=0.08, velocity=0.3`."""
 
-from tactile_cube.drivetrain.effects import find_effect
+from collections.abc import Callable
+from typing import Any
+
+from tactile_cube.drivetrain.effects.catalogue import find_effect
 from tactile_cube.errors import InputError
 
 
-def parse_effect(text: str) -> tuple[str, dict[str, float]]:
+def parse_effect(text: str, find: Callable[[str], Any] = find_effect) -> tuple[str, dict[str, float]]:
     """`NAME@JOINT` and parameter -> value; what is not given takes its typical value.
+
+    Args:
+        text: as a user writes it.
+        find: gives the effect of a name.
 
     Raises:
         InputError: an unknown effect or parameter, or a value that is no number.
     """
     name, _, assignments = text.partition(":")
     name = name.strip()
-    parameters = {one.name: one.typical for one in find_effect(name.partition("@")[0]).parameters}
+    parameters = {one.name: one.typical for one in find(name.partition("@")[0]).parameters}
     for assignment in filter(None, (part.strip() for part in assignments.split(","))):
         key, equals, value = (part.strip() for part in assignment.partition("="))
         if key not in parameters or not equals:
-            raise InputError(f"hidden: '{assignment}' in '{text}': {name} has the parameters {sorted(parameters)}")
+            raise InputError(f"effect: '{assignment}' in '{text}': {name} has the parameters {sorted(parameters)}")
         try:
             parameters[key] = float(value)
         except ValueError:
-            raise InputError(f"hidden: '{assignment}' in '{text}': '{value}' is no number") from None
+            raise InputError(f"effect: '{assignment}' in '{text}': '{value}' is no number") from None
     return name, parameters

@@ -1,0 +1,93 @@
+"""What a model file says about the drive, as nominal constants, ranges and effects of the training world."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects import Effect, Stage, resolve
+from tactile_cube.drivetrain.effects.catalogue import matching_joints
+from tactile_cube.drivetrain.model_file import Estimate, ModelFile
+from tactile_cube.errors import InputError
+from tactile_cube.randomization.distributions import Constant, Distribution, Uniform, UniformPerJoint
+from tactile_cube.randomization.effect_range import EffectRange
+from tactile_cube.randomization.randomization import Randomization
+from tactile_cube.simulation import EpisodeConstants
+
+Array = NDArray[np.float64]
+PER_JOINT = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "friction_creep")
+
+
+def identified(
+    model: ModelFile, constants: EpisodeConstants, randomization: Randomization, joints: Sequence[str]
+) -> tuple[EpisodeConstants, Randomization, list[Effect]]:
+    """The hand that was identified: values in place of nominal ones, intervals in place of ranges, effects added.
+
+    A model of one finger (q1, q2, q3) stands for all four. Constants that were fitted are drawn from their intervals;
+    those that were not keep the relative range of `randomization` around the model's value.
+
+    Args:
+        model: what `identify` or `diagnose` wrote.
+        constants: nominal constants of what the model does not mention.
+        randomization: ranges of what the model does not mention.
+        joints: the hand's joints, in the order of the constants' vectors (12,).
+
+    Raises:
+        InputError: joints, effects or limits that the hand does not have.
+    """
+    nominal: dict[str, Any] = {key: np.array(getattr(constants, key)) for key in PER_JOINT}
+    ranges: dict[str, Distribution] = dict(randomization.values)
+    factors, shifts = dict(randomization.factors), dict(randomization.shifts)
+    for key in PER_JOINT:
+        if key not in model.values:
+            continue
+        low, nominal[key], high = _on_joints(model.values[key], nominal[key], joints)
+        if np.any(high > low):
+            ranges[key] = UniformPerJoint(tuple(low), tuple(high))
+            factors.pop(key, None)
+            shifts.pop(key, None)
+    limits = {estimate.value for estimate in model.values.get("torque_limit", {}).values()}
+    if len(limits) > 1:
+        raise InputError(f"model of {model.rig}: torque limits {sorted(limits)} N m differ; the hand has one for all")
+    limit = min(limits, default=constants.torque_limit)
+    placed = [(one, *place) for one in model.effects for place in resolve([one.effect], joints)]
+    changed = dataclasses.replace(
+        randomization,
+        values=ranges,
+        factors=factors,
+        shifts=shifts,
+        effects=[_range(effect, joint, one.parameters) for one, effect, joint in placed if _varies(effect)],
+        joint_offset=_offsets(model, randomization.joint_offset, joints),
+    )
+    effects = [effect(joint, **{k: e.value for k, e in one.parameters.items()}) for one, effect, joint in placed]
+    return dataclasses.replace(constants, torque_limit=limit, **nominal), changed, effects
+
+
+def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequence[str]) -> tuple[Array, Array, Array]:
+    """Low end, value and high end (joints,); nominal where nothing is stated."""
+    low, value, high = nominal.copy(), nominal.copy(), nominal.copy()
+    for name, estimate in estimates.items():
+        for joint in matching_joints(name, joints):
+            index = list(joints).index(joint)
+            low[index], value[index], high[index] = estimate.low, estimate.value, estimate.high
+    return low, value, high
+
+
+def _varies(effect: type[Effect]) -> bool:
+    """A changed mechanism is built into the world's bodies once and for all."""
+    return effect.stage is not Stage.MECHANISM
+
+
+def _range(effect: type[Effect], joint: str, parameters: Mapping[str, Estimate]) -> EffectRange:
+    drawn = {key: Uniform(e.low, e.high) if e.high > e.low else Constant(e.value) for key, e in parameters.items()}
+    return EffectRange(effect, joint, drawn)
+
+
+def _offsets(model: ModelFile, default: Distribution, joints: Sequence[str]) -> Distribution:
+    """The span of the offsets over the robot's initialisations, if there is one for every joint."""
+    low, _, high = _on_joints(model.offsets, np.full(len(joints), np.nan), joints)
+    return UniformPerJoint(tuple(low), tuple(high)) if np.all(high > low) else default

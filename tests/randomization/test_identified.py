@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
+from tactile_cube.errors import InputError
+from tactile_cube.hand import DLR_HAND2
+from tactile_cube.randomization import Randomization, Uniform, identified
+from tactile_cube.simulation import EpisodeConstants
+
+JOINTS = DLR_HAND2.joint_names
+WIDE = Randomization(factors={"kd": Uniform(0.8, 1.2), "kp": Uniform(0.9, 1.1)}, joint_offset=Uniform(-0.1, 0.1))
+
+
+def of_finger(**parts) -> ModelFile:
+    return ModelFile(joints=["q1", "q2", "q3"], **parts)
+
+
+def estimate(value: float, half: float = 0.0) -> Estimate:
+    return Estimate(value=value, low=value - half, high=value + half)
+
+
+def test_a_model_of_one_finger_stands_for_all_four() -> None:
+    model = of_finger(values={"kd": {"q2": estimate(0.3)}})
+    constants, _, _ = identified(model, EpisodeConstants(), WIDE, JOINTS)
+    expected = [0.3 if name.endswith("q2") else 0.25 for name in JOINTS]
+    np.testing.assert_array_equal(constants.kd, expected)
+
+
+def test_an_interval_replaces_the_range_and_a_bare_value_keeps_it() -> None:
+    values = {"kd": {name: estimate(0.3, 0.01) for name in ("q1", "q2", "q3")}, "kp": {"q1": estimate(4.0)}}
+    constants, randomization, _ = identified(of_finger(values=values), EpisodeConstants(), WIDE, JOINTS)
+    assert set(randomization.factors) == {"kp"}
+    rng = np.random.default_rng(0)
+    drawn = np.array([randomization.constants(constants, rng).kd for _ in range(200)])
+    assert 0.29 <= drawn.min() < 0.291 < 0.309 < drawn.max() <= 0.31
+
+
+def test_an_effect_draws_its_numbers_from_their_intervals() -> None:
+    effect = EffectEstimate(effect="torque_bias@q2", parameters={"bias": estimate(-0.2, 0.05)})
+    constants, randomization, effects = identified(of_finger(effects=[effect]), EpisodeConstants(), WIDE, JOINTS)
+    assert [(one.name, one.values["bias"]) for one in effects] == [("torque_bias", -0.2)] * 4
+    drawn = randomization.constants(constants, np.random.default_rng(0)).effects
+    assert [one.joint for one in drawn] == [name for name in JOINTS if name.endswith("q2")]
+    sizes = {one.values["bias"] for one in drawn}
+    assert len(sizes) == 4
+    assert all(-0.25 <= size <= -0.15 for size in sizes)
+
+
+def test_the_span_of_the_offsets_becomes_their_range() -> None:
+    offsets = {"q1": estimate(0.01, 0.02), "q2": estimate(0.0, 0.01), "q3": estimate(0.0, 0.03)}
+    _, randomization, _ = identified(of_finger(offsets=offsets), EpisodeConstants(), WIDE, JOINTS)
+    np.testing.assert_allclose(randomization.joint_offset.quantile(np.zeros(12)), [-0.01, -0.01, -0.03] * 4)
+
+
+def test_offsets_of_some_joints_only_change_nothing() -> None:
+    _, randomization, _ = identified(of_finger(offsets={"q1": estimate(0, 0.02)}), EpisodeConstants(), WIDE, JOINTS)
+    assert randomization.joint_offset == WIDE.joint_offset
+
+
+def test_different_torque_limits_are_refused() -> None:
+    model = of_finger(values={"torque_limit": {"q1": estimate(1.0), "q2": estimate(0.5)}})
+    with pytest.raises(InputError, match="torque limits"):
+        identified(model, EpisodeConstants(), WIDE, JOINTS)
