@@ -65,8 +65,13 @@ def without_bench(recording: Recording) -> Recording:
 
 
 def without_touches(recording: Recording) -> Recording:
-    """The recording without links that touch something, which no model of a free mechanism can follow."""
-    return recording.with_trials([trial for trial in recording.trials if trial.touch is None])
+    """The recording without links that touch or hold something, which no model of a free mechanism can follow."""
+    return recording.with_trials([trial for trial in recording.trials if trial.touch is None and trial.load is None])
+
+
+def with_object(recording: Recording) -> Recording:
+    """The trials in which the hand holds an object."""
+    return recording.with_trials([trial for trial in recording.trials if trial.load is not None])
 
 
 def _known_force(bench: Bench, number: int) -> list[BenchTrial]:

@@ -1,6 +1,6 @@
 """What recording.yaml may say: the rig, its controller, the values its owner believes, and the trials."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0)]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 PerJoint = float | list[float] | dict[str, float]
 
 
@@ -88,6 +89,50 @@ class Touch(_Strict):
     angle: float
 
 
+class HeldObject(_Strict):
+    """The object that fingers hold: a box, with everything that is fixed to it.
+
+    Attributes:
+        size: edge lengths of the box [m]; one number for a cube.
+        mass: of everything [kg].
+        com: centre of mass of everything from the box's centre, in the box's frame [m].
+    """
+
+    size: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
+    mass: Positive
+    com: Vector = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, data: Any) -> Any:
+        lacking = [key for key in ("size", "mass") if not isinstance(data, dict) or key not in data]
+        if lacking:
+            raise ValueError(f"an object needs size, its edge lengths [m], and mass [kg]; add {' and '.join(lacking)}")
+        return data
+
+
+class Grasp(_Strict):
+    """How a trial begins with the object, and what is different about the object in this trial.
+
+    Attributes:
+        position: of the box's centre in the rig's base frame when the trial starts [m].
+        quaternion: its orientation in the rig's base frame, xyzw.
+        released: until this time somebody or something bears the object's weight [s].
+        size: of the box where it differs from the recording's [m].
+        mass: likewise, as with known weights [kg].
+        com: likewise, as with a weight on a lever [m].
+    """
+
+    position: Vector
+    quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
+        default_factory=lambda: [0.0, 0.0, 0.0, 1.0]
+    )
+    released: NotNegative = 0.0
+    size: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
+    mass: Positive | None = None
+    com: Vector | None = None
+
+
 class TrialEntry(_Strict):
     """One trial: its file, the robot initialisation it belongs to and the kind of excitation.
 
@@ -99,6 +144,7 @@ class TrialEntry(_Strict):
         force: a known force on a static finger (bench test of kp).
         clamped: the links are held still (bench test of the drive stiffness).
         touch: a link ends at a known place (bench test of the joint offsets).
+        object: the hand holds the recording's object (bench test of friction at the fingertips).
         note: free text.
     """
 
@@ -109,6 +155,7 @@ class TrialEntry(_Strict):
     force: KnownForce | None = None
     clamped: bool = False
     touch: Touch | None = None
+    object: Grasp | None = None
     note: str = ""
 
 
@@ -122,6 +169,7 @@ class Description(_Strict):
         joints: actuated joints in column order.
         coupled: joints that follow another one.
         nominal: what the owner believes: stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2], ...
+        object: what is held in trials that say so.
         source: where the data come from, free text.
     """
 
@@ -134,6 +182,7 @@ class Description(_Strict):
     controller: Controller
     nominal: dict[str, PerJoint] = Field(default_factory=dict)
     sensors: Sensors = Field(default_factory=Sensors)
+    object: HeldObject | None = None
     trials: Annotated[list[TrialEntry], Field(min_length=1)]
     source: str = ""
 
@@ -142,6 +191,16 @@ class Description(_Strict):
         twice = {joint for joint in self.joints if self.joints.count(joint) > 1}
         if twice:
             raise ValueError(f"joints names {sorted(twice)} more than once")
+        return self
+
+    @model_validator(mode="after")
+    def _object_known(self) -> "Description":
+        for index, trial in enumerate(self.trials):
+            if trial.object is not None and self.object is None:
+                raise ValueError(
+                    f"trials.{index}.object: the recording does not say what is held; add a key 'object' at the "
+                    "top, with size [m] and mass [kg]"
+                )
         return self
 
 

@@ -17,7 +17,7 @@ from tactile_cube.measurement.rig import Rig, read_rig
 from tactile_cube.measurement.statics import swap_warning
 from tactile_cube.measurement.tables import read_table
 from tactile_cube.measurement.timing import check_time, on_grid
-from tactile_cube.measurement.trial import Gains, Trial
+from tactile_cube.measurement.trial import Gains, Trial, load_of
 
 Array = NDArray[np.float64]
 DESCRIPTION = "recording.yaml"
@@ -150,7 +150,7 @@ def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: R
     limits = [rig.joints[joint] for joint in joints]
     if description.controller.mode == "position":
         warnings += check_units(columns, limits, gains, path)
-        warnings += check_assignment(columns, limits, path)
+        warnings += check_assignment(columns, limits, path) if entry.object is None else []
     grid, valid = on_grid(columns, description.rate_hz)
     return Trial(
         path.stem,
@@ -167,6 +167,7 @@ def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: R
         entry.clamped,
         entry.touch,
         tuple(warnings + time_warnings),
+        load_of(description.object, entry.object) if description.object and entry.object else None,
     )
 
 

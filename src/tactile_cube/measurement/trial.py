@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.description import KnownForce, Touch
+from tactile_cube.measurement.description import Grasp, HeldObject, KnownForce, Touch
 
 Array = NDArray[np.float64]
 
@@ -17,6 +17,40 @@ class Gains:
     kp: Array
     kd: Array
     torque_limit: Array
+
+
+@dataclass(frozen=True)
+class Load:
+    """The object of a trial in which the hand holds one.
+
+    Attributes:
+        size: edge lengths (3,) [m].
+        mass: [kg].
+        com: centre of mass from the box's centre, in its frame (3,) [m].
+        position: of its centre in the rig's base frame at the start (3,) [m].
+        quaternion: of its orientation there (4,), xyzw.
+        released: until when its weight is borne by something else [s].
+    """
+
+    size: Array
+    mass: float
+    com: Array
+    position: Array
+    quaternion: Array
+    released: float
+
+
+def load_of(held: HeldObject, grasp: Grasp) -> Load:
+    """The recording's object as a trial has it."""
+    size = held.size if grasp.size is None else grasp.size
+    return Load(
+        size=np.broadcast_to(np.asarray(size, dtype=np.float64), (3,)).copy(),
+        mass=held.mass if grasp.mass is None else grasp.mass,
+        com=np.array(held.com if grasp.com is None else grasp.com, dtype=np.float64),
+        position=np.array(grasp.position, dtype=np.float64),
+        quaternion=np.array(grasp.quaternion, dtype=np.float64),
+        released=grasp.released,
+    )
 
 
 @dataclass(frozen=True)
@@ -37,6 +71,7 @@ class Trial:
         force: a known force on a link, or None.
         clamped: the links were held still.
         touch: the link ended at a known place, or None.
+        load: the object that the hand held, or None.
     """
 
     name: str
@@ -53,11 +88,12 @@ class Trial:
     clamped: bool = False
     touch: Touch | None = None
     warnings: tuple[str, ...] = field(default=(), repr=False)
+    load: Load | None = None
 
     @property
     def is_bench(self) -> bool:
         """Whether it is a bench test, and not free motion."""
-        return self.clamped or self.force is not None or self.touch is not None
+        return self.clamped or any(one is not None for one in (self.force, self.touch, self.load))
 
     @property
     def step(self) -> float:

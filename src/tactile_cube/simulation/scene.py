@@ -157,8 +157,8 @@ class Scene:
     def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
         """A new body each time: Bullet keeps the inertia in the world of a used one for a step after it is moved.
 
-        It is a plain rigid body; as a multibody without links it would make the solver 8 % slower. Its origin in Bullet is
-        its centre of mass. The skin of the fingertips is written on the cube, since Bullet cannot take it away again.
+        It is a plain rigid body; as a multibody without links it would make the solver 8 % slower. Its origin is its
+        centre of mass. The skin of the fingertips is written on the cube, since Bullet cannot take it away again.
         """
         if self.cube >= 0:
             pybullet.removeBody(self.cube, physicsClientId=self.client)
