@@ -170,6 +170,20 @@ def test_warm_start_takes_networks_from_checkpoint_and_policy(tmp_path: Path) ->
             assert torch.equal(mine, theirs)
 
 
+def test_a_frozen_actor_waits_for_its_critics(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path / "first", steps=80))
+    policy = str(tmp_path / "first" / "policy.safetensors")
+    given = [
+        parameter.clone()
+        for parameter in tiny_run(tmp_path / "x", init_from=policy).learner.agent.policy().parameters()
+    ]
+    for updates, still in ((1000, True), (3, False)):
+        run = tiny_run(tmp_path / f"next-{updates}", init_from=policy, actor_frozen=updates)
+        finish(run)
+        after = run.learner.agent.policy().parameters()
+        assert all(torch.equal(a, b) for a, b in zip(after, given, strict=True)) == still
+
+
 def test_warm_start_from_other_shape_is_refused(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path / "first", steps=80))
     for file in ("checkpoint.pt", "policy.safetensors"):

@@ -6,6 +6,7 @@ section III). At barriers all worlds are reset from a seed that follows from the
 the only place at which a run can be saved and resumed bit for bit, because the state of a simulator cannot be saved.
 """
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -79,8 +80,11 @@ class Learner:
 
     def _learn(self) -> None:
         weights = self.reward_weights(self.conditions)
+        frozen = copy.deepcopy(self.agent.policy()) if self.updates < (self.settings.actor_frozen or 0) else None
         for _ in range(self.settings.updates_per_iteration):
             self.metrics = self.agent.update(self.replay.sample(self.agent.settings.batch_size, weights))
+            if frozen is not None:
+                self.agent.load_actor(frozen)
         self.updates += self.settings.updates_per_iteration
 
     def _store(self, transitions: dict[str, Tensor]) -> None:

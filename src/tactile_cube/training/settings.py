@@ -72,6 +72,8 @@ class TrainingSettings(BaseModel):
         log_iterations: iterations from one row of metrics to the next.
         resume: "auto" goes on from the newest checkpoint of this run folder; "never" starts over.
         init_from: checkpoint (.pt) or policy (.safetensors) whose networks the run starts from.
+        actor_frozen: updates at the beginning that leave the actor as it is: after `init_from` a policy file, whose
+            critics are fresh, they would lead it astray before they know what it is worth.
         stop_if_no_regrasp_by: give up when the mean final angle is still below `regrasp_angle` after so many steps.
         regrasp_angle: angle [rad] no single twist reaches, so that beyond it the fingers must have regrasped.
         stop_when_angle_above: finish early at this mean final angle [rad].
@@ -94,6 +96,7 @@ class TrainingSettings(BaseModel):
     log_iterations: PositiveInt = 5
     resume: Literal["auto", "never"] = "auto"
     init_from: str | None = None
+    actor_frozen: PositiveInt | None = None
     stop_if_no_regrasp_by: PositiveInt | None = None
     regrasp_angle: PositiveFloat = 2.0
     stop_when_angle_above: PositiveFloat | None = None
