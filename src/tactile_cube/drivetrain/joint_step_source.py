@@ -42,14 +42,18 @@ def drive(x, c, dt, memory):
     for j in range(n):
         x[MEASURED_VELOCITY, j] = x[VELOCITY, j]
         x[DAMPING, j] = 1.0
+        x[MOTOR_POSITION, j] = x[POSITION, j]
     effects_velocity_sensor(x, c, dt, memory)
+    effects_position_sensor_ahead(x, c, dt, memory)
     for j in range(n):
         a = c * n + j
+        ahead = x[MOTOR_POSITION, j] - x[POSITION, j]  # of sensor laws without a memory: known now, not a step late
         x[CONTROLLER_TORQUE, j] = impedance_torque(
             x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j],
             memory[KP + a], memory[KD + a], memory[COMPLIANCE + a] + memory[EXTRA_COMPLIANCE + a],
-            memory[EXTRA + a], memory[TORQUE_LIMIT + a],
+            memory[EXTRA + a] + ahead, memory[TORQUE_LIMIT + a],
         )
+        memory[EXTRA + a] = -ahead
         x[TORQUE, j] = x[CONTROLLER_TORQUE, j]
         soft = memory[KP + a] * (memory[COMPLIANCE + a] + memory[EXTRA_COMPLIANCE + a])
         limited = abs(x[CONTROLLER_TORQUE, j]) >= memory[TORQUE_LIMIT + a]
@@ -68,7 +72,7 @@ def drive(x, c, dt, memory):
         more = x[DEFLECTION, j] - compliance * x[TORQUE, j]
         slope = max(more / x[TORQUE, j], 0.0) if abs(x[TORQUE, j]) > 1e-9 else 0.0
         memory[EXTRA_COMPLIANCE + c * n + j] = slope
-        memory[EXTRA + c * n + j] = (
+        memory[EXTRA + c * n + j] += (
             (x[MOTOR_POSITION, j] - (x[POSITION, j] + x[DEFLECTION, j]))
             + (more - slope * x[TORQUE, j])
             + (compliance + slope) * (x[TORQUE, j] - x[CONTROLLER_TORQUE, j])

@@ -83,7 +83,7 @@ def candidates(recording: Recording, effects: Sequence[EffectClass]) -> list[Can
         for j, joint in enumerate(recording.joints)
         if _possible(effect, recording, joint)
         for form in forms(effect)
-        if "harmonic" not in form  # those need to know the period: see periodicity
+        if "harmonic" not in form and "torque_0" not in form  # those start from the residual: see residual_starts
         for start in _starts(effect.name, form, seen[j])
     ]
 
@@ -129,5 +129,11 @@ def placed(candidate: Candidate, recording: Recording) -> dict[str, float]:
     """Values of parameters that the recording sets: the range of a position-dependent torque."""
     if candidate.effect.name != "position_torque":
         return {}
-    seen = _Seen(recording, recording.joints.index(candidate.joints[0]))
-    return {"first": float(seen.low), "last": float(seen.high)}
+    first, last = position_range(recording, candidate.joints[0])
+    return {"first": first, "last": last}
+
+
+def position_range(recording: Recording, joint: str) -> tuple[float, float]:
+    """Lowest and highest angle of a joint, but for a few samples [rad]."""
+    seen = _Seen(recording, recording.joints.index(joint))
+    return float(seen.low), float(seen.high)

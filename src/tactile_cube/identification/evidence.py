@@ -15,6 +15,10 @@ from tactile_cube.identification.problem import Problem
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
+CLEAR = 12.0  # difference of the squared errors in units of the sensor's variance: odds of 400 to 1
+IN_DETAIL = 0.25
+STANDS_OUT = 2.6  # standard deviations
+SIGNIFICANT = 0.01
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,20 @@ def _joint_errors(problem: Problem, residual: Array) -> Array:
 def gain(before: Judgement, after: Judgement) -> float:
     """Share of the squared error that the second model takes away."""
     return float(1.0 - after.costs.sum() / before.costs.sum())
+
+
+def worse(other: Judgement, best: Judgement) -> bool:
+    """Whether the held-out trials speak against `other`.
+
+    The difference has to stand out of its scatter from segment to segment, and to be more than a part of what the
+    better model leaves unexplained itself: that much a law may differ in detail from the real thing.
+    """
+    difference = (other.costs - best.costs)[best.samples > 0]
+    unexplained = max(float(best.costs.sum() - best.samples.sum()), 0.0)
+    if difference.sum() <= CLEAR + IN_DETAIL * unexplained:
+        return False
+    scatter = float(difference.std(ddof=1)) * np.sqrt(len(difference)) if len(difference) > 1 else np.inf
+    return bool(difference.sum() > STANDS_OUT * scatter or p_value(other, best) < SIGNIFICANT)
 
 
 def p_value(before: Judgement, after: Judgement) -> float:

@@ -19,8 +19,8 @@ from tactile_cube.identification.gauss_newton import Fit, fit
 from tactile_cube.identification.intervals import Fitted, final_fit
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.noise import sensor_noise
-from tactile_cube.identification.periodicity import periodic_candidates
 from tactile_cube.identification.problem import Problem
+from tactile_cube.identification.residual_starts import residual_candidates
 from tactile_cube.identification.search import Search
 from tactile_cube.measurement.error import ErrorSummary
 from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
@@ -108,7 +108,7 @@ def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str)
     """The fit with one more effect, in whichever of its forms and from whichever start it does best."""
     frozen = search.frozen(current)
     every = candidates(search.fitted, [effect])
-    every += periodic_candidates(search.problem, search.fitted, frozen.model, frozen.residual, [effect])
+    every += residual_candidates(search.problem, search.fitted, frozen, [effect])
     options = [c for c in every if c.joints == (joint,)]
     refitted = [search.refit(frozen, option)[1] for option in options]
     best = refitted[int(np.argmin([one.cost for one in refitted]))]

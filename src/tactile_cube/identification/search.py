@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.base import base_unknowns, nominal_model
 from tactile_cube.identification.candidates import Candidate, candidates, model_unknowns, placed
-from tactile_cube.identification.evidence import Judgement, gain, judge, p_value
+from tactile_cube.identification.evidence import Judgement, gain, judge, p_value, worse
 from tactile_cube.identification.explanation import FLOOR, Explanation
 from tactile_cube.identification.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.model import Model
-from tactile_cube.identification.periodicity import periodic_candidates
 from tactile_cube.identification.problem import Problem
+from tactile_cube.identification.residual_starts import residual_candidates
 from tactile_cube.identification.screening import Score, screen
 from tactile_cube.identification.shared_offset import shared_offset
 from tactile_cube.identification.shooting import Shooting
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
 SIGNIFICANT = 0.01  # after Holm's correction
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
-BRIEF = 3  # iterations of a brief refit
+BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
 COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
@@ -100,6 +100,7 @@ class Search:
             if not better:
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
+            better[0] = self.pruned(better[0])
             levels.append(tuple(better))
             beam = tuple(better[:BEAM])
         if not levels and base.error <= FLOOR and (shared := shared_offset(base, self.fitted, self.effects)):
@@ -124,8 +125,7 @@ class Search:
     def extend(self, parent: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
         frozen = self.frozen(parent.fit)
-        periodic = periodic_candidates(self.problem, self.fitted, frozen.model, frozen.residual, self.effects)
-        wanted = [*self.candidates, *periodic]
+        wanted = [*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)]
         self.last_scores = screen(self.problem, frozen, wanted, [placed(c, self.fitted) for c in wanted])
         chosen = with_groups(self.last_scores)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
@@ -143,7 +143,7 @@ class Search:
 
     def continued(self, frozen: Fit, fitted: Fit) -> Fit:
         """The same fit for longer."""
-        return fit(self.problem, fitted.model, fitted.unknowns[len(frozen.unknowns) :], iterations=5, frozen=frozen)
+        return fit(self.problem, fitted.model, fitted.unknowns[len(frozen.unknowns) :], LONG, frozen)
 
     def frozen(self, fitted: Fit) -> Fit:
         """A fit with its residual and columns taken anew on this problem, to build on."""
@@ -158,17 +158,32 @@ class Search:
 
     def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit) -> Explanation:
         """Fit everything and judge on the held-out trials."""
-        unknowns = (*base_unknowns(self.fitted), *model_unknowns(refitted.model))
-        self.problem.linearise_starts(refitted.model)
-        fitted = fit(self.problem, refitted.model, unknowns, iterations=4)
-        model = self.with_postures(fitted.model)
-        self.judges.linearise_starts(model)
-        judgement = judge(self.judges, self.held_out, model)
+        fitted, judgement = self.settled(refitted.model)
         corrected = min(1.0, p_value(parent.judgement, judgement) * len(self.candidates))
         explanation = Explanation(
             (*parent.effects, candidate), fitted, judgement, corrected, gain(parent.judgement, judgement)
         )
         self.say(f"  held-out error {explanation.error:.3f}  p {corrected:.1e}  {explanation.label}")
+        return explanation
+
+    def settled(self, model: Model) -> tuple[Fit, Judgement]:
+        """A model with everything refitted, and how it does on the held-out trials."""
+        unknowns = (*base_unknowns(self.fitted), *model_unknowns(model))
+        self.problem.linearise_starts(model)
+        fitted = fit(self.problem, model, unknowns, LONG)
+        found = self.with_postures(fitted.model)
+        self.judges.linearise_starts(found)
+        return fitted, judge(self.judges, self.held_out, found)
+
+    def pruned(self, explanation: Explanation) -> Explanation:
+        """Without the effects that it does not need: a later one may have done an earlier one's work."""
+        for place in range(len(explanation.effects) if len(explanation.effects) > 1 else 0):
+            model = without_effect(explanation, place)
+            fitted, judgement = self.settled(model)
+            if not worse(judgement, explanation.judgement):
+                left = explanation.effects[:place] + explanation.effects[place + 1 :]
+                self.say(f"  {explanation.effects[place].label} is not needed")
+                return self.pruned(replace(explanation, effects=left, fit=fitted, judgement=judgement))
         return explanation
 
 
@@ -183,6 +198,14 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation)
     if not parent.effects or explanation.error <= FLOOR:
         return True
     return parent.explained(base) < REAL_PART and explanation.explained(parent) > COMPLETED
+
+
+def without_effect(explanation: Explanation, place: int) -> Model:
+    """The fitted model without one of its effects."""
+    model = explanation.fit.model
+    first = sum(len(candidate.joints) for candidate in explanation.effects[:place])
+    last = first + len(explanation.effects[place].joints)
+    return replace(model, terms=(*model.terms[:first], *model.terms[last:]))
 
 
 def some(stretches: Stretches, count: int) -> Stretches:

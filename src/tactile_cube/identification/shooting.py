@@ -15,12 +15,12 @@ from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.stretches import Stretches, steps_per_row
+from tactile_cube.measurement.jump_ratio import jump_ratio
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.replay import CLAMPED
 
 Array = NDArray[np.float64]
-PROBE = 1e-4  # [rad] jump of the command by which its way to the sensor is probed
 POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] finite differences of a segment's start
 
 
@@ -64,7 +64,7 @@ class Shooting:
     def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
         memory = self._memory(model, stretches)
         count, fine = len(stretches), stretches.substeps
-        felt = self._jump_ratio(memory, stretches)
+        felt, _ = jump_ratio(self.plant, memory[0], stretches.commands[0, stretches.history * fine])
         signals = np.zeros((count, out.shape[1] * fine, 2, out.shape[2]))
         self.plant.kernel.segments_batch(
             stretches.commands,
@@ -84,24 +84,6 @@ class Shooting:
         )
         out[:] = signals[:, ::fine, 0] - felt * _jumps(signals[:, :, 1], stretches)
 
-    def _jump_ratio(self, memory: Array, stretches: Stretches) -> Array:
-        """How much of a jump of the command the position sensor shows at once (n,), whatever effects lie between.
-
-        Two steps of a copy from the first start, with and without a jump in the second one.
-        """
-        command = stretches.commands[0, stretches.history * stretches.substeps]
-        seen = []
-        for jump in (0.0, PROBE):
-            copy = memory[0].copy()
-            self.plant.kernel.step(command, copy)
-            self.plant.kernel.step(command + jump, copy)
-            seen.append(np.stack([self.plant.signal(copy, MOTOR_POSITION), self.plant.signal(copy, COMMAND)]))
-        position, acted = seen[1] - seen[0]
-        soft = self.plant.view(memory, "kp")[0] * self.plant.view(memory, "compliance")[0]
-        passed = np.abs(acted) > 0.5 * PROBE
-        ratio: Array = np.where(passed, position / np.where(passed, acted, 1.0), soft / (1.0 + soft))
-        return ratio
-
     def _memory(self, model: Model, stretches: Stretches) -> Array:
         """One block (S, size) for each stretch, at rest at its start."""
         single = self.memory(model)
@@ -115,7 +97,8 @@ class Shooting:
         self.plant.view(memory, "brake")[stretches.clamped] = CLAMPED
         for k, force in enumerate(stretches.forces):
             if force is not None:
-                self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, stretches.position[k, 0])
+                resting = np.average(stretches.measured[k], axis=0, weights=stretches.weight[k, :, 0])
+                self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
         return memory
 
     def memory(self, model: Model) -> Array:

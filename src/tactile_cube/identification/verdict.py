@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from tactile_cube.identification.evidence import p_value
-from tactile_cube.identification.explanation import FLOOR, Explanation
+from tactile_cube.identification.evidence import p_value, worse
+from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.search import Findings
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
-AS_GOOD = 1.05  # squared error of a rival over that of the best explanation that still counts as equal
-AS_GOOD_ABOVE_FLOOR = 1.3  # the same where the best explanation does not reach the floor
 TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete
 EXPLAINED, TOLERATED_IF_EXPLAINED = 0.98, 4.0  # share of the excess error, and the error, that a near miss may have
+LIKELY = 0.05  # p-value at which a richer explanation stays in the race
 ADEQUATE = 1.3  # error / sensor noise of a model to which nothing significant can be added
-SIGNIFICANT = 0.01
 
 
 @dataclass(frozen=True)
@@ -38,36 +37,32 @@ def decide(findings: Findings) -> Verdict:
     base = findings.base
     if not findings.levels:
         return Verdict("adequate" if base.error <= ADEQUATE else "unknown_effect", base)
-    level = next((level for level in findings.levels if level[0].complete(base)), findings.levels[-1])
-    chosen = simplest(level)
+    found = [one for level in findings.levels for one in level]
+    chosen = simplest(found)
     near = chosen.explained(base) > EXPLAINED and chosen.error < TOLERATED_IF_EXPLAINED
     if chosen.error > TOLERATED and not near:
         return Verdict("unknown_effect", chosen)
-    rivals = find_rivals(chosen, level)
+    rivals = find_rivals(chosen, found)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
 
 
-def simplest(level: tuple[Explanation, ...]) -> Explanation:
-    """The explanation with the fewest numbers among those that are as good as the best."""
-    best = min(level, key=lambda e: e.judgement.costs.sum())
-    equal = [e for e in level if not worse(e, best)]
-    return min(equal, key=lambda e: (e.size, e.judgement.costs.sum()))
+def simplest(found: Sequence[Explanation]) -> Explanation:
+    """The explanation with the fewest effects, then numbers, among those that are as good as the best."""
+    best = min(found, key=lambda e: e.judgement.costs.sum())
+    equal = [e for e in found if not worse(e.judgement, best.judgement)]
+    return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
 
 
-def find_rivals(chosen: Explanation, level: tuple[Explanation, ...]) -> tuple[Explanation, ...]:
-    """Explanations by other effects, no richer than the chosen one, that are as good."""
+def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:
+    """Explanations by as many other effects that are as good, and richer ones that are better."""
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
-    for other in level:
-        if named(other) != named(chosen) and other.size <= chosen.size and not worse(other, chosen):
+    for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
+        if len(named(other)) > len(named(chosen)) or named(other) == named(chosen):
+            continue
+        earned = other.size <= chosen.size or p_value(chosen.judgement, other.judgement) < LIKELY
+        if earned and not worse(other.judgement, chosen.judgement):
             rivals.setdefault(named(other), other)
     return tuple(rivals.values())
-
-
-def worse(other: Explanation, best: Explanation) -> bool:
-    """Whether held-out trials speak against `other`: significantly, and by more than a few per cent."""
-    margin = AS_GOOD if best.error <= FLOOR else AS_GOOD_ABOVE_FLOOR
-    ratio = other.judgement.costs.sum() / best.judgement.costs.sum()
-    return bool(ratio > margin and p_value(other.judgement, best.judgement) < SIGNIFICANT)
 
 
 def named(explanation: Explanation) -> frozenset[tuple[str, str]]:

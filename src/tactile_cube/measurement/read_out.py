@@ -28,7 +28,7 @@ def half_jumps(acting: Array, substeps: int) -> Array:
 
 
 def read_out(
-    position: Array, torque: Array, jump: Array, kp: Array, stiffness: Array, torque_limit: Array
+    position: Array, torque: Array, jump: Array, ratios: tuple[Array, Array], torque_limit: Array
 ) -> tuple[Array, Array]:
     """Position [rad] and torque [N m] under the command that a log's instant feels.
 
@@ -36,13 +36,11 @@ def read_out(
         position: (T, joints) simulated motor positions at the instants of reading [rad].
         torque: (T, joints) [N m].
         jump: (T, joints) the simulated command less the one that the log feels [rad].
-        kp: (joints,) [N m/rad].
-        stiffness: (joints,) of the drive [N m/rad], may be infinite.
+        ratios: (joints,) jump of position [1] and of torque [N m/rad] per jump of the command, see `jump_ratio`.
         torque_limit: (joints,) [N m]; a torque at its limit does not jump.
 
     Returns:
         position and torque, (T, joints): without the jump in torque and in the drive's deflection.
     """
-    free = np.abs(torque) < 0.999 * torque_limit
-    torque_jump = np.where(free, kp / (1 + kp / stiffness) * jump, 0.0)
-    return position - torque_jump / stiffness, torque - torque_jump
+    felt = np.where(np.abs(torque) < 0.999 * torque_limit, jump, 0.0)
+    return position - ratios[0] * felt, torque - ratios[1] * felt

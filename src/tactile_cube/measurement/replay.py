@@ -12,6 +12,7 @@ from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, cat
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.measurement.jump_ratio import jump_ratio
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN, Parameters
 from tactile_cube.measurement.read_out import half_jumps, impulses, read_out
@@ -105,8 +106,10 @@ class Replay:
         commands = np.stack([self._commands(trial, history, int(rows.max())) for trial in trials])
         out = np.zeros((len(trials), rows.max(), len(SIGNALS), commands.shape[2]))
         rollout_batch = (self._world or self.plant.kernel).rollout_batch
+        before = memory.copy()
         rollout_batch(commands, np.arange(len(trials)), rows, history, 1, memory, SIGNALS, out)
-        return [self._read(trial, out[b, : rows[b]], parameters) for b, trial in enumerate(trials)]
+        ratios = [jump_ratio(self.plant, before[b], commands[b, 0]) for b in range(len(trials))]
+        return [self._read(trial, out[b, : rows[b]], ratios[b], parameters) for b, trial in enumerate(trials)]
 
     def _commands(self, trial: Trial, history: int, rows: int) -> Array:
         """Commands of every step as positions [rad], the first one held before the trial and the last one after it."""
@@ -114,15 +117,14 @@ class Replay:
         fine = impulses(trial.command / scale, self.substeps)
         return np.pad(fine, ((history, rows - len(fine)), (0, 0)), mode="edge")
 
-    def _read(self, trial: Trial, signals: Array, parameters: Parameters) -> Simulated:
+    def _read(self, trial: Trial, signals: Array, ratios: tuple[Array, Array], parameters: Parameters) -> Simulated:
         """What the log would show of the signals of all steps ((n + 1) substeps, signals, joints)."""
         position, torque = np.moveaxis(signals[:: self.substeps, :2], 1, 0)
         jump = half_jumps(signals[:, 2], self.substeps)
         # Either way the drive still feels the old command: a loop reads first and commands then.
         shown = slice(None, -1) if self.recording.read == "before" else slice(1, None)
-        constants = self._constants(trial, parameters)
-        limits = (constants["kp"], constants["stiffness"], constants["torque_limit"])
-        return Simulated(*read_out(position[shown], torque[shown], jump[shown], *limits))
+        limit = self._constants(trial, parameters)["torque_limit"]
+        return Simulated(*read_out(position[shown], torque[shown], jump[shown], ratios, limit))
 
     def _memory(self, trial: Trial, parameters: Parameters) -> Array:
         own = self._constants(trial, parameters)

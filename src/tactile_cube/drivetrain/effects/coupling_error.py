@@ -18,6 +18,7 @@ class CouplingError(Effect):
     forms = (
         {"ratio": 0.1},
         {"offset": 0.05},
+        {"ratio": 0.1, "offset": 0.05},
     )
 
     @staticmethod

@@ -7,7 +7,7 @@ from tactile_cube.drivetrain.signals import FRICTION, TIME
 
 
 class FrictionDrift(Effect):
-    """F += change * (1 - exp(-t / time_constant)), t from the start of the trial.
+    """F += friction + change * (1 - exp(-t / time_constant)), t from the start of the trial.
 
     Source: Bittencourt and Axelsson, Modeling and experiment design for temperature effects of joint friction, 2014.
     """
@@ -25,11 +25,17 @@ class FrictionDrift(Effect):
             typical=5.0,
             source="seconds (lubricant) to minutes (housing)",
         ),
+        Parameter("friction", unit="N m", neutral=0.0, low=-0.1, high=0.5, typical=0.0, source="cold, beyond nominal"),
     )
 
-    forms = ({"change": 0.02, "time_constant": 5.0},)
+    forms = (
+        {"change": 0.02, "time_constant": 5.0},
+        {"change": -0.02, "time_constant": 5.0, "friction": 0.04},
+    )
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Friction limit [N m]."""
-        return max(x[FRICTION, j] + p[0] * (1.0 - exp(-x[TIME, 0] / p[1])), 0.0) if p[0] != 0.0 else x[FRICTION, j]
+        if p[0] == 0.0 and p[2] == 0.0:
+            return x[FRICTION, j]
+        return max(x[FRICTION, j] + p[2] + p[0] * (1.0 - exp(-x[TIME, 0] / p[1])), 0.0)

@@ -3,14 +3,14 @@
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
 from tactile_cube.drivetrain.signals import JOINT_TORQUE, POSITION
 
-KNOTS = 9
+KNOTS = 17
 SOURCE = "return springs, cables, detents"
 
 
 class PositionTorque(Effect):
     """Spring, cable or detent: tau += bias - stiffness * q + f(q).
 
-    f is piecewise linear between KNOTS equally spaced knots from `first` to `last` and constant beyond.
+    f is a cubic B-spline with KNOTS equally spaced control torques from `first` to `last`, constant beyond.
 
     Source: cable and tendon routing; any spring parallel to the joint.
     """
@@ -36,9 +36,11 @@ class PositionTorque(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
-        place = (x[POSITION, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1)
-        place = min(max(place, 0.0), KNOTS - 1.000001)
+        place = min(max((x[POSITION, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1), 0.0), KNOTS - 1.000001)
         knot = int(place)
-        share = place - knot
-        shape = (1.0 - share) * p[4 + knot] + share * p[5 + knot]
-        return x[JOINT_TORQUE, j] + p[1] - p[0] * x[POSITION, j] + shape
+        u = place - knot
+        shape = p[4 + max(knot - 1, 0)] * (1.0 - u) ** 3
+        shape += p[4 + knot] * (4.0 - 6.0 * u**2 + 3.0 * u**3)
+        shape += p[5 + knot] * (1.0 + 3.0 * u + 3.0 * u**2 - 3.0 * u**3)
+        shape += p[4 + min(knot + 2, KNOTS - 1)] * u**3
+        return x[JOINT_TORQUE, j] + p[1] - p[0] * x[POSITION, j] + shape / 6.0

@@ -3,7 +3,7 @@
 from math import exp
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import DAMPING, MEASURED_VELOCITY
+from tactile_cube.drivetrain.signals import ACCELERATION, DAMPING, MEASURED_VELOCITY
 
 
 class VelocityFilterLag(Effect):
@@ -20,18 +20,29 @@ class VelocityFilterLag(Effect):
 
     @classmethod
     def state_size(cls, dt: float) -> int:
-        """Filtered velocity, first-call flag."""
-        return 2
+        """Filtered velocity, first-call flag, velocity of the last step, its own share in what was filtered."""
+        return 4
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Measured velocity [rad/s]."""
+        """Measured velocity [rad/s], exact for an input that is a straight line from step to step.
+
+        The speed of a step is that of its middle; what was remembered of the last step is carried on to its end.
+        """
+        asked = x[MEASURED_VELOCITY, j]
         if p[0] <= 0.0:
-            return x[MEASURED_VELOCITY, j]
+            return asked
         if s[1] == 0.0:
-            s[0] = x[MEASURED_VELOCITY, j]
+            s[0] = asked
             s[1] = 1.0
-        share = 1.0 - exp(-dt / p[0])
-        x[DAMPING, j] *= share
-        s[0] += (x[MEASURED_VELOCITY, j] - s[0]) * share
+            s[2] = asked
+        later = 0.5 * dt * x[ACCELERATION, j]
+        s[0] += s[3] * later
+        s[2] += later
+        kept = exp(-dt / p[0])
+        mean = (1.0 - kept) * p[0] / dt
+        x[DAMPING, j] *= 1.0 - mean
+        s[0] = kept * s[0] + (mean - kept) * s[2] + (1.0 - mean) * asked
+        s[2] = asked
+        s[3] = 1.0 - mean
         return s[0]

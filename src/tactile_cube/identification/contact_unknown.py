@@ -1,0 +1,73 @@
+"""A parameter of a contact effect that is to be found, and where to look for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects import Parameter
+from tactile_cube.measurement.hand_replay import Contact
+from tactile_cube.simulation.contact_effects import ContactEffect
+
+Array = NDArray[np.float64]
+COARSE, RATIO = 7, 1.8  # values of a first grid; a ratio of neighbours that is fine enough
+NEAR = 1.6  # factor around a known value, or its inverse times the range
+REFINEMENTS = 6
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One parameter of one effect.
+
+    Attributes:
+        effect: class of the effect.
+        parameter: which of its numbers.
+    """
+
+    effect: type[ContactEffect]
+    parameter: Parameter
+
+    @property
+    def label(self) -> str:
+        """For people."""
+        one = len(self.effect.parameters) == 1
+        return self.effect.name if one else f"{self.effect.name} {self.parameter.name}"
+
+    @property
+    def by_factors(self) -> bool:
+        """Whether equal factors matter, and not equal differences."""
+        return self.parameter.low > 0
+
+    def grid(self, around: float | None = None) -> Array:
+        """Values to try, over all its range or around one value."""
+        low, high = self.parameter.low, self.parameter.high
+        if around is not None and self.by_factors:
+            low, high = max(low, around / NEAR), min(high, around * NEAR)
+        elif around is not None:
+            reach = (high - low) / 6
+            low, high = max(low, around - reach), min(high, around + reach)
+        count = COARSE if around is None else 5
+        if not self.by_factors:
+            return np.linspace(low, high, count)
+        count = max(count, int(np.ceil(np.log(high / low) / np.log(RATIO))) + 1)
+        return np.asarray(np.geomspace(low, high, count))
+
+    def scaled(self, value: float) -> float:
+        """The value on the scale in which it is averaged."""
+        return float(np.log(value)) if self.by_factors else value
+
+    def unscaled(self, value: float) -> float:
+        """The inverse of `scaled`, within the bounds."""
+        plain = float(np.exp(value)) if self.by_factors else value
+        return float(np.clip(plain, self.parameter.low, self.parameter.high))
+
+    def put(self, contact: Contact, value: float) -> Contact:
+        """The contact with this parameter at a value."""
+        return contact.changed(self.effect.name, **{self.parameter.name: value})
+
+
+def unknowns(effects: list[type[ContactEffect]]) -> list[Unknown]:
+    """Every parameter of some effects."""
+    return [Unknown(effect, parameter) for effect in effects for parameter in effect.parameters]
