@@ -61,7 +61,7 @@ def test_early_reward_makes_motion_cheap_and_twisted_fingers_dear() -> None:
     early, paper = configured(reward="early").reward, Reward()
     for term in ("height", "plane", "tilt"):
         assert getattr(early, term) == pytest.approx(0.2 * getattr(paper, term))
-    assert (early.spin, early.proximal, early.leaving) == (16, 40, 10)
+    assert (early.spin, early.proximal, early.leaving) == (16, 8, 20)
 
 
 def test_followup_has_the_published_spinning_friction_and_forces() -> None:
