@@ -61,3 +61,34 @@ def test_different_torque_limits_are_refused() -> None:
     model = of_finger(values={"torque_limit": {"q1": estimate(1.0), "q2": estimate(0.5)}})
     with pytest.raises(InputError, match="torque limits"):
         identified(model, EpisodeConstants(), WIDE, JOINTS)
+
+
+def test_friction_of_the_fingertips_replaces_nominal_value_and_range() -> None:
+    friction = EffectEstimate(effect="lateral_friction", parameters={"coefficient": estimate(0.6, 0.05)})
+    wide = Randomization(shifts={"tip_friction": Uniform(-0.1, 0.1), "cube_mass": Uniform(-0.005, 0.005)})
+    constants, randomization, effects = identified(of_finger(effects=[friction]), EpisodeConstants(), wide, JOINTS)
+    assert (constants.tip_friction, effects) == (0.6, [])
+    rng = np.random.default_rng(0)
+    drawn = [randomization.constants(constants, rng) for _ in range(100)]
+    assert 0.55 <= min(one.tip_friction for one in drawn) < 0.56 < 0.64 < max(one.tip_friction for one in drawn) <= 0.65
+    assert set(randomization.shifts) == {"cube_mass"}
+
+
+def test_a_heavier_object_shifts_the_cube_and_its_interval_is_about_the_shift() -> None:
+    mass = EffectEstimate(effect="object_mass", parameters={"excess": estimate(0.02, 0.001)})
+    com = {axis: estimate(value, 0.001) for axis, value in zip("xyz", (0.01, 0.0, -0.01), strict=True)}
+    model = of_finger(effects=[mass, EffectEstimate(effect="object_com", parameters=com)])
+    constants, randomization, _ = identified(model, EpisodeConstants(), Randomization(), JOINTS)
+    assert constants.cube_mass == pytest.approx(0.07)
+    rng = np.random.default_rng(0)
+    drawn = [randomization.constants(constants, rng) for _ in range(50)]
+    assert all(0.069 <= one.cube_mass <= 0.071 for one in drawn)
+    np.testing.assert_allclose(np.mean([one.cube_com for one in drawn], axis=0), [0.01, 0.0, -0.01], atol=5e-4)
+
+
+def test_a_contact_effect_without_an_interval_keeps_the_range() -> None:
+    friction = EffectEstimate(effect="lateral_friction", parameters={"coefficient": estimate(0.6)})
+    wide = Randomization(shifts={"tip_friction": Uniform(-0.1, 0.1)})
+    constants, randomization, _ = identified(of_finger(effects=[friction]), EpisodeConstants(), wide, JOINTS)
+    assert constants.tip_friction == 0.6
+    assert randomization.shifts == wide.shifts

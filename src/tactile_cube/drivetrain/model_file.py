@@ -11,6 +11,17 @@ from tactile_cube.drivetrain.plain_yaml import describe, read_schema
 from tactile_cube.errors import InputError
 
 
+OBJECT_EFFECTS = (
+    "lateral_friction",
+    "spinning_friction",
+    "tip_compliance",
+    "object_mass",
+    "object_com",
+    "object_size",
+)
+"""Effects of fingertips and object, which `simulation.contact_effects` describes; no joint has them."""
+
+
 class _Strict(BaseModel):
     """Unknown keys are refused: a misspelt key must not silently change nothing."""
 
@@ -54,6 +65,11 @@ class EffectEstimate(_Strict):
     def joint(self) -> str | None:
         """The joint it acts on; None for an effect of the object."""
         return self.effect.partition("@")[2] or None
+
+    @property
+    def of_object(self) -> bool:
+        """Whether it is one of the contact, and not of the drivetrain."""
+        return self.name in OBJECT_EFFECTS
 
 
 class Provenance(_Strict):
@@ -100,6 +116,16 @@ class ModelFile(_Strict):
     offsets: dict[str, Estimate] = Field(default_factory=dict)
     provenance: Provenance = Field(default_factory=Provenance)
     errors: ModelErrors = Field(default_factory=ModelErrors)
+
+    @property
+    def drive_effects(self) -> list[EffectEstimate]:
+        """The effects of the drivetrain."""
+        return [one for one in self.effects if not one.of_object]
+
+    @property
+    def object_effects(self) -> list[EffectEstimate]:
+        """The effects of fingertips and object."""
+        return [one for one in self.effects if one.of_object]
 
     @model_validator(mode="after")
     def _known_joints(self) -> "ModelFile":

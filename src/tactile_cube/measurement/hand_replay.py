@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel
 from tactile_cube.measurement.parameters import Parameters
@@ -16,7 +17,7 @@ from tactile_cube.measurement.recording import DESCRIPTION, Recording
 from tactile_cube.measurement.replay import Simulated
 from tactile_cube.measurement.trial import Load, Trial
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
-from tactile_cube.simulation.contact_effects import contact_catalogue, is_contact_effect
+from tactile_cube.simulation.contact_effects import contact_catalogue
 from tactile_cube.simulation.pose import to_world
 
 Array = NDArray[np.float64]
@@ -43,11 +44,10 @@ class Contact:
         return Contact({**self.values, effect: {**self.values.get(effect, {}), **values}})
 
 
-def split_effects(parameters: Parameters) -> tuple[Parameters, Contact]:
-    """The numbers of the drivetrain and those of the contact."""
-    contact = {name: values for name, values in parameters.effects if is_contact_effect(name)}
-    drive = tuple(one for one in parameters.effects if not is_contact_effect(one[0]))
-    return replace(parameters, effects=drive), Contact(contact)
+def contact_of(model: ModelFile | None) -> Contact:
+    """What a model file says about fingertips and object."""
+    effects = model.object_effects if model is not None else []
+    return Contact({one.name: {key: e.value for key, e in one.parameters.items()} for one in effects})
 
 
 class HandReplay:
@@ -77,7 +77,7 @@ class HandReplay:
         self.recording, self.hand = recording, hand
         self._order = [recording.joints.index(name) for name in hand.joint_names]
         self._back = np.argsort(self._order)
-        self._parameters, _ = split_effects(parameters)
+        self._parameters = parameters
         substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
         options = SimulationOptions(dt=recording.step / substeps, substeps=substeps, solver_iterations=iterations)
         effects = [

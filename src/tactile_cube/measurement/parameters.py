@@ -36,7 +36,7 @@ def nominal_parameters(recording: Recording, model: ModelFile | None) -> Paramet
     """What the owner believes, or what the model file says where it says anything."""
     estimates = _estimates(recording, model)
     constants = {key: np.array([one.value for one in row]) for key, row in estimates.items()}
-    effects = model.effects if model is not None else []
+    effects = model.drive_effects if model is not None else []
     values = tuple((one.effect, {key: e.value for key, e in one.parameters.items()}) for one in effects)
     return Parameters(constants, values, np.zeros(len(recording.joints)))
 
@@ -59,7 +59,7 @@ def draw_parameters(
     }
     effects = tuple(
         (one.effect, {key: _drawn(value, 0.0, rng) for key, value in one.parameters.items()})
-        for one in (model.effects if model is not None else [])
+        for one in (model.drive_effects if model is not None else [])
     )
     return Parameters(constants, effects, _posture(recording, model, spread.get("offset", 0.0), rng))
 

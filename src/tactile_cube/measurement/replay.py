@@ -55,8 +55,8 @@ def replay(recording: Recording, parameters: Parameters, engine: Engine, step: f
 
 
 def effect_names(model: ModelFile | None) -> list[str]:
-    """`NAME@JOINT` of every effect of a model."""
-    return [one.effect for one in model.effects] if model is not None else []
+    """`NAME@JOINT` of every effect of a model on the drivetrain."""
+    return [one.effect for one in model.drive_effects] if model is not None else []
 
 
 class Replay:
@@ -142,6 +142,7 @@ class Replay:
         memory: Array = self.plant.memory(constants, gravity=self.recording.gravity, effects=effects)
         self.plant.view(memory, "friction_creep")[:] = own.get("friction_creep", 0.0)
         self.plant.view(memory, "offset")[0] += self.tree.ratio * parameters.posture[self.tree.follow]
+        self.plant.view(memory, "angle_offset")[:] = parameters.posture
         position, velocity, torque = self.start(trial)
         self.plant.reset(memory, position - torque / parameters.constants["stiffness"], velocity)
         self.plant.view(memory, "reading")[:] = 0  # at the beginning of each period; read_out looks at its end

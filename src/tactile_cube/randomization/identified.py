@@ -17,6 +17,7 @@ from tactile_cube.randomization.distributions import Constant, Distribution, Uni
 from tactile_cube.randomization.effect_range import EffectRange
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants
+from tactile_cube.simulation.contact_effects import contact_catalogue
 
 Array = NDArray[np.float64]
 PER_JOINT = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "friction_creep")
@@ -54,7 +55,7 @@ def identified(
     if len(limits) > 1:
         raise InputError(f"model of {model.rig}: torque limits {sorted(limits)} N m differ; the hand has one for all")
     limit = min(limits, default=constants.torque_limit)
-    placed = [(one, *place) for one in model.effects for place in resolve([one.effect], joints)]
+    placed = [(one, *place) for one in model.drive_effects for place in resolve([one.effect], joints)]
     changed = dataclasses.replace(
         randomization,
         values=ranges,
@@ -64,7 +65,32 @@ def identified(
         joint_offset=_offsets(model, randomization.joint_offset, joints),
     )
     effects = [effect(joint, **{k: e.value for k, e in one.parameters.items()}) for one, effect, joint in placed]
-    return dataclasses.replace(constants, torque_limit=limit, **nominal), changed, effects
+    known = dataclasses.replace(constants, torque_limit=limit, **nominal)
+    return *identified_contact(model, known, changed), effects
+
+
+def identified_contact(
+    model: ModelFile, constants: EpisodeConstants, randomization: Randomization
+) -> tuple[EpisodeConstants, Randomization]:
+    """Fingertips and object that were identified: values in place of nominal ones, intervals in place of ranges.
+
+    What a model says of an object is how it differs from what was stated of it; the same is put on the world's object.
+    """
+    values, shifts, factors = dict(randomization.values), dict(randomization.shifts), dict(randomization.factors)
+    for one in model.object_effects:
+        effect = contact_catalogue()[one.name]
+        constants = effect.apply(constants, {key: estimate.value for key, estimate in one.parameters.items()})
+        estimates = [one.parameters[p.name] for p in effect.parameters if p.name in one.parameters]
+        if len(estimates) < len(effect.parameters) or not any(e.high > e.low for e in estimates):
+            continue
+        for group in (values, shifts, factors):
+            group.pop(effect.constant, None)
+        centre = [e.value if effect.added else 0.0 for e in estimates]
+        low = tuple(e.low - c for e, c in zip(estimates, centre, strict=True))
+        high = tuple(e.high - c for e, c in zip(estimates, centre, strict=True))
+        interval: Distribution = Uniform(low[0], high[0]) if len(low) == 1 else UniformPerJoint(low, high)
+        (shifts if effect.added else values)[effect.constant] = interval
+    return constants, dataclasses.replace(randomization, values=values, shifts=shifts, factors=factors)
 
 
 def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequence[str]) -> tuple[Array, Array, Array]:
