@@ -52,9 +52,10 @@ def test_the_span_of_the_offsets_becomes_their_range() -> None:
     np.testing.assert_allclose(randomization.joint_offset.quantile(np.zeros(12)), [-0.01, -0.01, -0.03] * 4)
 
 
-def test_offsets_of_some_joints_only_change_nothing() -> None:
-    _, randomization, _ = identified(of_finger(offsets={"q1": estimate(0, 0.02)}), EpisodeConstants(), WIDE, JOINTS)
-    assert randomization.joint_offset == WIDE.joint_offset
+def test_an_offset_that_no_recording_shows_keeps_its_range() -> None:
+    offsets = {"q1": estimate(0, 1e-13), "q2": estimate(0, 0.02)}  # q1 turns about the vertical, q3 was not recorded
+    _, randomization, _ = identified(of_finger(offsets=offsets), EpisodeConstants(), WIDE, JOINTS)
+    np.testing.assert_allclose(randomization.joint_offset.quantile(np.zeros(12)), [-0.095, -0.02, -0.095] * 4)
 
 
 def test_different_torque_limits_are_refused() -> None:

@@ -20,6 +20,7 @@ from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.simulation.contact_effects import contact_catalogue
 
 Array = NDArray[np.float64]
+UNSEEN = 1e-4  # [rad] span of the offsets below which they were not observed: an axis along gravity shows none
 PER_JOINT = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "friction_creep")
 
 
@@ -114,6 +115,10 @@ def _range(effect: type[Effect], joint: str, parameters: Mapping[str, Estimate])
 
 
 def _offsets(model: ModelFile, default: Distribution, joints: Sequence[str]) -> Distribution:
-    """The span of the offsets over the robot's initialisations, if there is one for every joint."""
-    low, _, high = _on_joints(model.offsets, np.full(len(joints), np.nan), joints)
-    return UniformPerJoint(tuple(low), tuple(high)) if np.all(high > low) else default
+    """The span of the offsets over the robot's initialisations; `default` for joints whose recording shows none."""
+    low, _, high = _on_joints(model.offsets, np.zeros(len(joints)), joints)
+    seen = high - low > UNSEEN
+    if not seen.any():
+        return default
+    usual = [default.quantile(np.full(len(joints), share)) for share in (0.025, 0.975)]
+    return UniformPerJoint(tuple(np.where(seen, low, usual[0])), tuple(np.where(seen, high, usual[1])))
