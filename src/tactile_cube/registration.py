@@ -37,6 +37,7 @@ def make_rotation(
         render_mode: None; pictures come from `evaluate`.
     """
     from hydra import compose, initialize_config_dir
+    from hydra.core.global_hydra import GlobalHydra
     from hydra.utils import instantiate
 
     from tactile_cube.cli import CONFIG
@@ -44,6 +45,13 @@ def make_rotation(
 
     groups = {"task": task, "reward": reward, "randomization": randomization, "start": start}
     groups |= {"exploration": "none", "curriculum": "none", "env": "rotation"}
-    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
-        config = compose(overrides=[*(f"+{group}={option}" for group, option in groups.items()), *overrides])
+    # a Hydra application that makes the environment has a configuration of its own, which comes back afterwards
+    application = GlobalHydra.instance().hydra
+    GlobalHydra.instance().hydra = None
+    try:
+        with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+            chosen = [f"+{group}={option}" for group, option in groups.items()]
+            config = compose(overrides=[*chosen, "+model=null", *overrides])
+    finally:
+        GlobalHydra.instance().hydra = application
     return GymnasiumRotation(instantiate(config.env), render_mode)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.utils.env_checker import check_env
+from hydra import initialize
+from hydra.core.global_hydra import GlobalHydra
 
 from tactile_cube.env import REWARD_TERMS, Task
 from tactile_cube.randomization import Randomization
@@ -55,3 +57,9 @@ def test_torchs_global_generator_is_neither_used_nor_changed(env: GymnasiumRotat
     second, _ = env.reset(seed=1)
     assert np.array_equal(first, second)
     assert torch.equal(torch.get_rng_state(), before)
+
+
+def test_can_be_made_inside_a_hydra_application() -> None:
+    with initialize(version_base=None):
+        gymnasium.make("tactile_cube/Rotation-v0").close()
+        assert GlobalHydra.instance().is_initialized()
