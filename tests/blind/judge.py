@@ -44,7 +44,8 @@ def validation_error(recording: Path, model: Path, out: Path) -> float | None:
     """Overall RMS of the recommended model on trials that the diagnosis never saw [rad]."""
     if not model.is_file():
         return None
-    answer = run_verb("compare", out, f"recording={recording / 'validation'}", f"model={model}")
+    words = (f"recording={recording / 'validation'}", f"model={model}", "band.simulations=0", "rerun=false")
+    answer = run_verb("compare", out, *words)
     return None if answer is None else float(answer["error"]["overall"])
 
 
@@ -53,7 +54,9 @@ def judge(seed: int, folder: Path, seconds: float | None, keep: bool) -> dict[st
     place = folder / f"draw_{seed}"
     truth = write(seed, place, seconds)
     started = time.perf_counter()
-    diagnosis = run_verb("diagnose", place / "diagnose", f"recording={place / 'recording'}")
+    diagnosis = run_verb(
+        "diagnose", place / "diagnose", f"recording={place / 'recording'}", "engine=fast", "rerun=false"
+    )
     wall = time.perf_counter() - started
     line: dict[str, Any] = {"seed": seed, "truth": truth, "diagnosis": diagnosis, "wall_seconds": round(wall, 1)}
     if diagnosis is None:

@@ -10,6 +10,6 @@ def test_the_strongest_peak_is_the_harmonic_that_was_put_in(harmonic: float) -> 
     position = 0.9 * np.sin(np.linspace(0.0, 40.0, 6000)) + 0.2
     torque = 0.02 * np.sin(harmonic * position) - 0.01 * np.cos(harmonic * position)
     noisy = torque + 0.01 * rng.normal(size=len(position)) + 0.05 * position
-    found, sine, cosine = peaks(position, noisy, np.ones_like(position))[0]
+    found, sine, cosine = peaks(position, noisy, np.ones_like(position), np.zeros(6000, dtype=np.int64))[0]
     assert found == pytest.approx(harmonic, abs=0.6)
     assert np.hypot(sine, cosine) == pytest.approx(np.hypot(0.02, 0.01), rel=0.35)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.effects import JOINT_TORQUE, POSITION, find_effect
+from tactile_cube.drivetrain.effects import ANGLE, JOINT_TORQUE, find_effect
 from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.identification import position_profile
 from tactile_cube.identification.candidates import forms
@@ -23,10 +23,11 @@ def test_a_profile_starts_at_the_torque_that_is_missing(monkeypatch: pytest.Monk
     rng = np.random.default_rng(3)
     position = rng.uniform(-0.8, 1.0, 20_000)
     torque = detent(position) + 0.02 * rng.normal(size=len(position))
-    missing = Missing("q1", torque, {"position of q1 [rad]": position}, np.zeros(len(position), dtype=np.int64))
+    none = np.zeros(len(position), dtype=np.int64)
+    missing = Missing("q1", torque, {"position of q1 [rad]": position}, none, none)
     start = start_of(EFFECT, FORM, missing, recording=None)  # type: ignore[arg-type]
     values = np.array([({"first": -0.8, "last": 1.0} | start).get(p.name, p.neutral) for p in EFFECT.parameters])
     x = np.zeros((ROWS, 1))
     for angle in np.linspace(-0.7, 0.9, 30):
-        x[POSITION, 0], x[JOINT_TORQUE, 0] = angle, 0.0
+        x[ANGLE, 0], x[JOINT_TORQUE, 0] = angle, 0.0
         assert EFFECT.law(x, 0, values, np.zeros(0), 0.002) == pytest.approx(detent(angle), abs=0.006)

@@ -9,7 +9,7 @@ SEGMENT = np.repeat(np.arange(80), 100)
 
 
 def missing(torque: np.ndarray) -> Missing:
-    return Missing("q1", torque, {"position of q1 [rad]": POSITION, "velocity of q1 [rad/s]": SPEED}, SEGMENT)
+    return Missing("q1", torque, {"position of q1 [rad]": POSITION, "velocity of q1 [rad/s]": SPEED}, SEGMENT, SEGMENT)
 
 
 def test_the_signal_that_the_torque_depends_on_comes_first() -> None:

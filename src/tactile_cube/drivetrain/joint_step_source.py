@@ -43,6 +43,7 @@ def drive(x, c, dt, memory):
         x[MEASURED_VELOCITY, j] = x[VELOCITY, j]
         x[DAMPING, j] = 1.0
         x[MOTOR_POSITION, j] = x[POSITION, j]
+        x[ANGLE, j] = x[POSITION, j] + memory[ANGLE_OFFSET + c * n + j]
     effects_velocity_sensor(x, c, dt, memory)
     effects_position_sensor_ahead(x, c, dt, memory)
     for j in range(n):

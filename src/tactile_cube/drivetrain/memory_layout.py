@@ -101,6 +101,7 @@ def _joint_constants(joints: int) -> dict[str, Shape]:
         "brake",
         "friction_creep",
         "external_torque",
+        "angle_offset",
         "goal",
     )
     single = ("time_constant", "tendon_stiffness", "tendon_damping", "contact_torque_limit")

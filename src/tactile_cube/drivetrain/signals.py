@@ -35,4 +35,6 @@ FRICTION = 14
 """Largest dry-friction torque against DIRECTION, zero or more [N m]."""
 DAMPING = 15
 """Slope of the torque on the joint against its present speed: what acts at the middle of a step [N m s/rad]."""
-ROWS = 16
+ANGLE = 16
+"""Angle of the mechanism [rad]: POSITION and what the joint's initialisation read too little."""
+ROWS = 17

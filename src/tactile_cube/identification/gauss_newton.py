@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,30 +52,43 @@ def fit(
         problem: the stretches to fit.
         model: where to start.
         unknowns: what to fit; with `frozen`, beside its unknowns.
-        iterations: most accepted or refused steps.
+        iterations: most steps that are tried.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
     """
-    kept = frozen.unknowns if frozen else ()
-    everything = (*kept, *unknowns)
-    damping, best = 1e-4, None
+    everything = (*(frozen.unknowns if frozen else ()), *unknowns)
+    best = _linearised(problem, model, unknowns, everything, frozen)
+    damping = 1e-4
     for _ in range(iterations):
-        prediction, fresh = problem.columns(model, unknowns)
-        residual = problem.residual(prediction)
-        columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
-        cost = float(problem.cost(residual).sum())
-        weight = temper(problem, cost if best is None else min(cost, best.cost))
-        if best is not None and cost + weight * surprise(model, everything) >= best.cost + weight * best.surprise:
+        weight = temper(problem, best.cost)
+        tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
+        if tried.cost + weight * tried.surprise >= best.cost + weight * best.surprise:
             damping *= 10.0
-        else:
-            gain = np.inf if best is None else (best.cost - cost) / max(best.cost, 1e-9)
-            information = _information(problem, columns)
-            best = Fit(model, everything, cost, surprise(model, everything), residual, columns, information)
-            damping *= 0.3
-            if gain < CONVERGED:
-                break
-        model = _stepped(problem, best, weight, damping)
-    assert best is not None
-    return _finish(problem, best, model)
+            continue
+        gain = (best.cost - tried.cost) / max(best.cost, 1e-9)
+        damping *= 0.3
+        best = tried
+        if gain < CONVERGED:
+            break
+        best = _linearised(problem, best.model, unknowns, everything, frozen)
+    return best
+
+
+def _linearised(
+    problem: Problem, model: Model, unknowns: Sequence[Unknown], everything: tuple[Unknown, ...], frozen: Fit | None
+) -> Fit:
+    """A model with its derivatives: one simulation for each unknown."""
+    prediction, fresh = problem.columns(model, unknowns)
+    residual = problem.residual(prediction)
+    columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
+    cost = float(problem.cost(residual).sum())
+    return Fit(model, everything, cost, surprise(model, everything), residual, columns, _information(problem, columns))
+
+
+def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
+    """A model with the derivatives of one close to it: one simulation."""
+    residual = problem.residual(problem.predictions([model])[0])
+    cost = float(problem.cost(residual).sum())
+    return replace(near, model=model, cost=cost, surprise=surprise(model, near.unknowns), residual=residual)
 
 
 def temper(problem: Problem, cost: float) -> float:
@@ -93,16 +106,6 @@ def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) ->
     residual, information = problem.residual(prediction), _information(problem, columns)
     cost = float(problem.cost(residual).sum())
     return Fit(fitted.model, fitted.unknowns, cost, fitted.surprise, residual, columns, information)
-
-
-def _finish(problem: Problem, best: Fit, last: Model) -> Fit:
-    """The last step is taken too if it helps."""
-    residual = problem.residual(problem.predictions([last])[0])
-    cost, odd = float(problem.cost(residual).sum()), surprise(last, best.unknowns)
-    weight = temper(problem, min(cost, best.cost))
-    if cost + weight * odd >= best.cost + weight * best.surprise:
-        return best
-    return Fit(last, best.unknowns, cost, odd, residual, best.columns, best.information)
 
 
 def surprise(model: Model, unknowns: Sequence[Unknown]) -> float:

@@ -51,7 +51,7 @@ def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) 
     speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
     weight = np.ones_like(position) if damping is None else speed
     starts: list[Mapping[str, float]] = []
-    for harmonic, sine, cosine in peaks(position, missing.torque, weight):
+    for harmonic, sine, cosine in peaks(position, missing.torque, weight, missing.initialisation):
         if damping is not None:  # damping * d/dt (a sin + b cos) = damping * n v (a cos - b sin)
             sine, cosine = cosine / (damping * harmonic), -sine / (damping * harmonic)
         size = max(abs(form["sine"]), 1e-9)
@@ -61,15 +61,21 @@ def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) 
     return starts
 
 
-def peaks(position: Array, torque: Array, weight: Array) -> list[tuple[float, float, float]]:
-    """Strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first."""
+def peaks(
+    position: Array, torque: Array, weight: Array, initialisation: NDArray[np.int64]
+) -> list[tuple[float, float, float]]:
+    """Strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first.
+
+    Each robot initialisation brings joint offsets that are not known well, so phases are compared within one only.
+    """
     every = max(1, len(position) // MOST_SAMPLES)
-    q, t, w = position[::every], torque[::every], weight[::every]
+    q, t, w, group = position[::every], torque[::every], weight[::every], initialisation[::every]
     slow = np.vander((q - q.mean()) / max(np.ptp(q), 1e-9), 4)
     t = t - slow @ np.linalg.lstsq(slow, t, rcond=None)[0]
     grid = np.arange(LOWEST, HIGHEST, RESOLUTION / max(np.ptp(q), 0.05))
-    spectrum = np.array([np.dot(w * t, np.exp(1j * n * q)) for n in grid])
-    power = np.abs(spectrum) ** 2
+    parts = [group == k for k in np.unique(group)]
+    spectrum = np.array([[np.dot((w * t)[part], np.exp(1j * n * q[part])) for part in parts] for n in grid])
+    power = np.sum(np.abs(spectrum) ** 2, axis=1)
     inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
     strongest = inner[np.argsort(-power[inner])][:PEAKS]
     found = []

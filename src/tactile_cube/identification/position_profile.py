@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.signals import JOINT_TORQUE, POSITION, ROWS
+from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, ROWS
 from tactile_cube.identification.candidates import Candidate, forms, position_range
 from tactile_cube.identification.residual_shape import Missing
 from tactile_cube.measurement.recording import Recording
@@ -56,6 +56,6 @@ def _profile(effect: type[Effect], values: Mapping[str, float], edges: Array) ->
     x = np.zeros((ROWS, 1))
     torques = []
     for angle in 0.5 * (edges[1:] + edges[:-1]):
-        x[POSITION, 0], x[JOINT_TORQUE, 0] = angle, 0.0
+        x[ANGLE, 0], x[JOINT_TORQUE, 0] = angle, 0.0
         torques.append(effect.law(x, 0, known, np.zeros(0), 1.0))
     return np.array(torques)

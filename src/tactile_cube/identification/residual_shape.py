@@ -47,6 +47,7 @@ class Missing:
     torque: Array
     signals: dict[str, Array]
     segment: NDArray[np.int64]
+    initialisation: NDArray[np.int64]
 
 
 def missing_torques(problem: Problem, recording: Recording, model: Model, residual: Array) -> list[Missing]:
@@ -79,16 +80,18 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
     inside = np.all(weight[:, inner] > 0, axis=2)
     number = np.broadcast_to(np.arange(len(weight))[:, None], weight.shape[:2])[:, inner][inside]
     clock = (time[:, None] + np.arange(segment) * step)[:, inner][inside]
+    angle = position + np.array([model.posture[int(k)] for k in problem.segment_initialisation])[:, None]
     found = []
     for j, joint in enumerate(recording.joints):
         signals = {}
         for k, other in enumerate(recording.joints):
-            signals[f"position of {other} [rad]"] = position[:, inner, k][inside]
+            signals[f"position of {other} [rad]"] = angle[:, inner, k][inside]
             signals[f"velocity of {other} [rad/s]"] = velocity[:, inner, k][inside]
         signals[f"acceleration of {joint} [rad/s^2]"] = acceleration[:, inner, j][inside]
         signals[f"torque of {joint} [N m]"] = drive[:, inner, j][inside]
         signals["time [s]"] = clock
-        found.append(Missing(joint, torque[:, inner, j][inside], signals, number))
+        initialisation = problem.segment_initialisation[number]
+        found.append(Missing(joint, torque[:, inner, j][inside], signals, number, initialisation))
     return found
 
 

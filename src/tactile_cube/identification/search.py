@@ -12,7 +12,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.base import base_unknowns, nominal_model
 from tactile_cube.identification.candidates import Candidate, candidates, model_unknowns, placed
 from tactile_cube.identification.evidence import Judgement, gain, judge, p_value, worse
-from tactile_cube.identification.explanation import FLOOR, Explanation
+from tactile_cube.identification.explanation import FLOOR, NEARLY, Explanation
 from tactile_cube.identification.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.problem import Problem
@@ -29,12 +29,13 @@ SIGNIFICANT = 0.01  # after Holm's correction
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
 BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
+FAR_BEHIND_AT_FLOOR = 1.5  # the same where the best one explains nearly everything
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
 COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 STRETCHES = 12  # enough data to search on; the final fit takes all
 DEEPEST = 3  # effects in combination
-BEAM = 2  # alternatives that are pursued at each depth
+BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,7 @@ class Search:
         self.candidates = candidates(fitted, effects)
         self.start = nominal_model(fitted)
         self.start_held_out = nominal_model(held_out)
+        self.postures = dict(self.start_held_out.posture)
 
     def run(self) -> Findings:
         """The whole search."""
@@ -102,7 +104,7 @@ class Search:
             better.sort(key=lambda e: e.judgement.costs.sum())
             better[0] = self.pruned(better[0])
             levels.append(tuple(better))
-            beam = tuple(better[:BEAM])
+            beam = tuple(e for e in better[:BEAM] if e.judgement.costs.sum() < CLOSE * better[0].judgement.costs.sum())
         if not levels and base.error <= FLOOR and (shared := shared_offset(base, self.fitted, self.effects)):
             levels.append((shared,))
         return Findings(base, nominal, tuple(levels), scores)
@@ -115,12 +117,13 @@ class Search:
         second = fit(self.problem, first.model, first.unknowns, iterations=3)
         self.judges.linearise_starts(self.with_postures(second.model))
         judgement = judge(self.judges, self.held_out, self.with_postures(second.model))
+        self.postures = dict(judgement.model.posture)
         self.say(f"base refitted: held-out error {judgement.error:.2f} x sensor noise")
         return Explanation((), second, judgement, 1.0, 0.0)
 
     def with_postures(self, model: Model) -> Model:
         """The model with joint offsets for the held-out initialisations too."""
-        return Model(model.constants, model.terms, {**self.start_held_out.posture, **model.posture})
+        return Model(model.constants, model.terms, {**self.postures, **model.posture})
 
     def extend(self, parent: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
@@ -139,7 +142,11 @@ class Search:
         leaders.sort(key=lambda pair: pair[1].cost)
         for candidate, fitted in leaders:
             self.say(f"  {np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)):8.3f}  {candidate.label}")
-        return [pair for pair in leaders if pair[1].cost <= FAR_BEHIND * leaders[0][1].cost]
+        if not leaders:
+            return []
+        best = leaders[0][1].cost
+        at_floor = best < NEARLY**2 * np.count_nonzero(self.problem.weight)
+        return [pair for pair in leaders if pair[1].cost <= (FAR_BEHIND_AT_FLOOR if at_floor else FAR_BEHIND) * best]
 
     def continued(self, frozen: Fit, fitted: Fit) -> Fit:
         """The same fit for longer."""

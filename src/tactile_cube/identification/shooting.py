@@ -90,6 +90,7 @@ class Shooting:
         memory = np.tile(single, (len(stretches), 1))
         posture = np.array([model.posture[int(k)] for k in stretches.initialisation])
         self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * posture[:, self.tree.follow]
+        self.plant.view(memory, "angle_offset")[:] = posture
         self.plant.reset(memory, self._links(model, stretches), stretches.speed[:, 0])
         self.plant.view(memory, "step")[:, 0] = stretches.time / self.plant.dt
         for k, key in enumerate(("kp", "kd", "torque_limit")):

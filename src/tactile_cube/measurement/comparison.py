@@ -13,9 +13,10 @@ from tactile_cube.measurement.error import ErrorSummary, residuals, summarise
 from tactile_cube.measurement.in_words import where_it_fails
 from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
 from tactile_cube.measurement.parameters import Parameters, nominal_parameters, require_same_joints
+from tactile_cube.measurement.postures import fitted_postures, no_postures, replay_each
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.regimes import Regime, regimes
-from tactile_cube.measurement.replay import Engine, Simulated, replay
+from tactile_cube.measurement.replay import Engine, Simulated
 from tactile_cube.measurement.stretches import Stretch, failing_stretches
 from tactile_cube.measurement.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
 
@@ -77,7 +78,8 @@ def compare(
 
     Args:
         recording: what was measured.
-        model: the model file; None for the values in recording.yaml.
+        model: the model file, simulated with the joint offsets of each initialisation that suit it best; None for the
+            values in recording.yaml and no offsets.
         engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
         step: simulation step [s].
         simulations: how many randomised simulations make the band; 0 for none.
@@ -88,12 +90,13 @@ def compare(
     if model is not None:
         require_same_joints(recording, model)
     parameters = nominal_parameters(recording, model)
-    simulated = replay(recording, parameters, engine, step)
+    postures = fitted_postures(recording, parameters, step) if model is not None else no_postures(recording)
+    simulated = replay_each(recording, parameters, postures, engine, step)
     trials, joints = recording.trials, recording.joints
     errors = residuals(trials, [one.position for one in simulated])
     summary = summarise(errors, joints)
     if floor is None:
-        floor = noise_floor(recording, step_size_error(recording, parameters, simulated, step))
+        floor = noise_floor(recording, step_size_error(recording, parameters, postures, simulated, step))
     table = regimes(trials, errors, joints)
     return Comparison(
         recording=recording,
@@ -113,10 +116,14 @@ def compare(
 
 
 def step_size_error(
-    recording: Recording, parameters: Parameters, simulated: list[Simulated], step: float
+    recording: Recording,
+    parameters: Parameters,
+    postures: Mapping[int, Array],
+    simulated: list[Simulated],
+    step: float,
 ) -> ErrorSummary:
     """Difference between a simulation and the same one in much smaller steps."""
-    fine = replay(recording, parameters, "fast", step / FINER)
+    fine = replay_each(recording, parameters, postures, "fast", step / FINER)
     return summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
 
 

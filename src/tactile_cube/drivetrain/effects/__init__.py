@@ -5,6 +5,7 @@ from tactile_cube.drivetrain.effects.effect import Effect, Parameter, Place, Sta
 from tactile_cube.drivetrain.effects.effect_text import parse_effect
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
+    ANGLE,
     COMMAND,
     CONTACT,
     CONTROLLER_TORQUE,
@@ -23,6 +24,7 @@ from tactile_cube.drivetrain.signals import (
 
 __all__ = [
     "ACCELERATION",
+    "ANGLE",
     "COMMAND",
     "CONTACT",
     "CONTROLLER_TORQUE",

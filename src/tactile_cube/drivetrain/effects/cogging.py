@@ -3,7 +3,7 @@
 from math import cos, sin
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import POSITION, TORQUE
+from tactile_cube.drivetrain.signals import ANGLE, TORQUE
 
 
 class Cogging(Effect):
@@ -27,5 +27,5 @@ class Cogging(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Motor torque [N m]."""
-        angle = p[2] * x[POSITION, j]
+        angle = p[2] * x[ANGLE, j]
         return x[TORQUE, j] + p[0] * sin(angle) + p[1] * cos(angle)

@@ -1,7 +1,7 @@
 """An end stop inside the range of motion."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import JOINT_TORQUE, POSITION, VELOCITY
+from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, VELOCITY
 
 
 class JointStop(Effect):
@@ -43,10 +43,10 @@ class JointStop(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
-        over = x[POSITION, j] - p[0]
+        over = x[ANGLE, j] - p[0]
         if over > 0.0:
             return x[JOINT_TORQUE, j] - max(p[2] * over + p[3] * x[VELOCITY, j], 0.0)
-        under = p[1] - x[POSITION, j]
+        under = p[1] - x[ANGLE, j]
         if under > 0.0:
             return x[JOINT_TORQUE, j] + max(p[2] * under - p[3] * x[VELOCITY, j], 0.0)
         return x[JOINT_TORQUE, j]

@@ -1,7 +1,7 @@
 """A torque that depends on the position alone."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import JOINT_TORQUE, POSITION
+from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE
 
 KNOTS = 17
 SOURCE = "return springs, cables, detents"
@@ -36,11 +36,11 @@ class PositionTorque(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
-        place = min(max((x[POSITION, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1), 0.0), KNOTS - 1.000001)
+        place = min(max((x[ANGLE, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1), 0.0), KNOTS - 1.000001)
         knot = int(place)
         u = place - knot
         shape = p[4 + max(knot - 1, 0)] * (1.0 - u) ** 3
         shape += p[4 + knot] * (4.0 - 6.0 * u**2 + 3.0 * u**3)
         shape += p[5 + knot] * (1.0 + 3.0 * u + 3.0 * u**2 - 3.0 * u**3)
         shape += p[4 + min(knot + 2, KNOTS - 1)] * u**3
-        return x[JOINT_TORQUE, j] + p[1] - p[0] * x[POSITION, j] + shape / 6.0
+        return x[JOINT_TORQUE, j] + p[1] - p[0] * x[ANGLE, j] + shape / 6.0

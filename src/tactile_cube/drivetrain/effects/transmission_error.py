@@ -3,7 +3,7 @@
 from math import cos, sin
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import MOTOR_POSITION, POSITION
+from tactile_cube.drivetrain.signals import ANGLE, MOTOR_POSITION
 
 
 class TransmissionError(Effect):
@@ -33,5 +33,5 @@ class TransmissionError(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Motor position [rad]."""
-        angle = p[2] * x[POSITION, j]
+        angle = p[2] * x[ANGLE, j]
         return x[MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)

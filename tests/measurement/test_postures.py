@@ -1,0 +1,27 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.measurement.parameters import nominal_parameters
+from tactile_cube.measurement.postures import fitted_postures, no_postures, replay_each
+from tactile_cube.measurement.recording import Recording, read_recording
+from tests.measurement.small_rig import write
+
+STEP = 0.005
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Trials that the nominal model itself "measured", each initialisation with an offset of its own."""
+    read = read_recording(write(tmp_path_factory.mktemp("recording")))
+    true = {k: np.array([0.04, -0.03]) for k in no_postures(read)}
+    made = replay_each(read, nominal_parameters(read, None), true, "fast", STEP)
+    return read.with_trials([replace(t, position=s.position) for t, s in zip(read.trials, made, strict=True)])
+
+
+def test_offsets_are_found_by_what_gravity_does_with_them(recording: Recording) -> None:
+    found = fitted_postures(recording, nominal_parameters(recording, None), STEP)
+    for posture in found.values():
+        assert posture == pytest.approx([0.04, -0.03], abs=0.01)
