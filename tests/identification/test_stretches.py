@@ -60,3 +60,11 @@ def test_taking_stretches_keeps_rows_together(recording: Recording) -> None:
     last = stretches.take(np.array([len(stretches) - 1]))
     assert last.trial.tolist() == [1]
     assert np.array_equal(last.measured[0], stretches.measured[-1])
+
+
+def test_a_later_stretch_wakes_the_memories_of_effects_before_its_samples_count(recording: Recording) -> None:
+    stretches = cut(recording, np.array([2e-4, 2e-4]), segment=10)
+    later = stretches.time > 0.0
+    assert later.any()
+    assert not stretches.weight[later, :10].any()
+    assert stretches.weight[later, 10:11].all()

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 SEGMENT = (
     0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
 )
-STRETCH = 10  # segments simulated without a break, so that effects with a memory keep it
+STRETCH = 11  # segments simulated without a break, so that effects with a memory keep it
+LEAD = 1  # segments at the beginning of a stretch that only wake such memories, unless a trial begins there
 HISTORY = 8.0  # [s] of commands before a stretch at most, for effects that remember them, such as a rate limit
 LONGEST_STEP = 0.0021  # [s] of the simulation
 FEWEST = 4  # samples that a stretch needs
@@ -116,9 +117,12 @@ def cut(
     longest = max(len(trial.time) for trial in trials)
     segment = min(segment or max(8, round(SEGMENT / recording.step)), longest)
     rows = segment * min(STRETCH, -(-longest // segment))
-    history = min(round(HISTORY / recording.step), (longest - 1) // rows * rows)
+    forward = max(rows - LEAD * segment, segment)  # from the start of a stretch to that of the next one
+    history = min(round(HISTORY / recording.step), (longest - 1) // forward * forward)
     pieces = [
-        piece for k, trial in enumerate(trials) for piece in _pieces(recording, trial, k, rows, segment, history, noise)
+        piece
+        for k, trial in enumerate(trials)
+        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise)
     ]
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces = tuple(piece["force"] for piece in pieces)
@@ -133,16 +137,17 @@ def cut(
 
 
 def _pieces(
-    recording: Recording, trial: Trial, index: int, rows: int, segment: int, history: int, noise: Array
+    recording: Recording, trial: Trial, index: int, rows: int, forward: int, segment: int, history: int, noise: Array
 ) -> Iterator[dict[str, object]]:
     command = trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
     substeps = steps_per_row(recording)
     fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
     jump = _half_jump(command, recording.read)
-    for first in range(0, len(trial.time), rows):
+    for first in range(0, len(trial.time), forward):
         span = np.arange(first, first + rows)
         usable = np.minimum(span, len(trial.time) - 1)
-        present = (span < len(trial.time)) & trial.valid[usable]
+        counted = span >= (first + rows - forward if first > 0 else 0)
+        present = (span < len(trial.time)) & trial.valid[usable] & counted
         if np.count_nonzero(present) < FEWEST:
             continue
         starts = np.minimum(span[::segment], len(trial.time) - 1)
