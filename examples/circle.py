@@ -54,9 +54,11 @@ FULL = Sizes(
     evaluation=(),
     bench=(),
     training=(
-        "training.steps=30000",
+        "training.steps=15000",
+        "training.barrier_iterations=10",
+        "training.checkpoint_barriers=1",
         "training.learning_starts=3000",
-        "training.actor_frozen=2000",  # the policy file brings no critics: they learn first what the policy is worth
+        "training.actor_frozen=1000",  # the policy file brings no critics: they learn first what the policy is worth
         "agent.learning_rate=3e-4",
     ),
 )

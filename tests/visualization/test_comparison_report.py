@@ -120,11 +120,16 @@ def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison
 
 def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Comparison, tmp_path: Path) -> None:
     unknown = DIAGNOSIS | {"verdict": "unknown_effect", "effects": [], "unexplained_joints": ["b"]}
+    unknown |= {"partial_effects": DIAGNOSIS["effects"], "unexplained": [{"joint": "b", "black_box": 0.93}]}
+    unknown |= {"noise_floor_source": "guess"}
     x = np.linspace(-1, 1, 12)
     shape = Shape("b", "position of b [rad]", x, 0.01 * x, np.full(12, 0.002), 0.83)
     text = page(diagnosis_report(unknown, comparison, None, "cmd", shapes=[shape]), tmp_path / "d.html")
     assert "explains 83 % of it" in text
-    assert "not explained: b" in text
+    assert "not explained: b; a black box" in text
+    assert "93 %" in text
+    assert "helps, but is not the whole of it: command_delay at a" in text
+    assert "a guess: no repeats" in text
     assert "my_rig.MyEffect@b" in text
 
 

@@ -10,6 +10,7 @@ from tactile_cube.identification.candidates import Candidate
 from tactile_cube.identification.diagnosis import Diagnosis
 from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.intervals import Fitted, bounds
+from tactile_cube.identification.model import effect_path
 from tactile_cube.identification.recommended import effect_estimate
 from tactile_cube.identification.verdict import unexplained_joints
 
@@ -70,7 +71,7 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _label(candidate: Candidate) -> list[str]:
-    return [f"{candidate.effect.name}@{joint}" for joint in candidate.joints]
+    return [f"{effect_path(candidate.effect)}@{joint}" for joint in candidate.joints]
 
 
 def _names(explanation: Explanation) -> list[str]:
@@ -82,15 +83,14 @@ def _effects(explanation: Explanation, fitted: Fitted, rivals: list[str]) -> lis
     entries = []
     for place, term in enumerate(fitted.model.terms):
         estimate: EffectEstimate = effect_estimate(term, place, known)
-        own = f"{term.effect.name}@{term.joint}"
         entries.append(
             {
-                "name": term.effect.name,
+                "name": effect_path(term.effect),
                 "joints": [term.joint],
                 "parameters": {key: estimate.parameters[key].model_dump() for key in term.fitted},
                 "heldout_gain": round(explanation.gain, 6),
                 "p_value": explanation.p_value,
-                "rivals": [name for name in rivals if name != own],
+                "rivals": [name for name in rivals if name != term.label],
             }
         )
     return entries

@@ -20,6 +20,9 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     """A few lines for the terminal, from the content of diagnosis.json."""
     lines = [OPENING[result["verdict"]]]
     lines += [_effect(entry) for entry in result["effects"]]
+    if partial := result.get("partial_effects"):
+        lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
+        lines += [_effect(entry) for entry in partial]
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     error = result["error"]
     lines.append(

@@ -119,22 +119,37 @@ def identification_report(
 
 
 def _verdict_section(diagnosis: Mapping[str, Any]) -> Section:
-    lines = []
-    for effect in diagnosis["effects"]:
-        values = [f"{name} {short(p['value'])} {p['unit']}" for name, p in effect["parameters"].items()]
-        lines.append(f"{effect['name']} at {', '.join(effect['joints'])}: {', '.join(values)}")
-    if diagnosis["unexplained_joints"]:
-        lines.append(f"not explained: {', '.join(diagnosis['unexplained_joints'])}")
+    lines = [_in_a_line(effect) for effect in diagnosis["effects"]]
+    lines += [f"helps, but is not the whole of it: {_in_a_line(one)}" for one in diagnosis.get("partial_effects", [])]
+    for joint in diagnosis["unexplained_joints"]:
+        lines.append(f"not explained: {joint}{_ceiling(diagnosis, joint)}")
     return Section("The answer", (), [Listing(lines or ["no effect has to be added"])])
+
+
+def _in_a_line(effect: Mapping[str, Any]) -> str:
+    values = [f"{name} {short(p['value'])} {p['unit']}" for name, p in effect["parameters"].items()]
+    return f"{effect['name']} at {', '.join(effect['joints'])}: {', '.join(values)}"
+
+
+def _ceiling(diagnosis: Mapping[str, Any], joint: str) -> str:
+    """How much there is to be found at all."""
+    shares = [one["black_box"] for one in diagnosis.get("unexplained", []) if one["joint"] == joint]
+    if not shares:
+        return ""
+    return (
+        f"; a black box of position, velocity, torque, neighbours and time could still explain {100 * shares[0]:.0f} % "
+        "of the missing torque"
+    )
 
 
 def _tiles(diagnosis: Mapping[str, Any]) -> list[Tile]:
     errors = diagnosis["error"]
     tiles = [Tile(diagnosis["verdict"].replace("_", " "), "verdict", VERDICTS[diagnosis["verdict"]][0])]
+    guessed = diagnosis.get("noise_floor_source") == "guess"
     for key, label in (
-        ("nominal", "error as stated"),
-        ("with_effects", "error with what was found"),
-        ("noise_floor", "noise floor"),
+        ("nominal", "held-out error as stated by the owner"),
+        ("with_effects", "held-out error with the recommended model"),
+        ("noise_floor", "noise floor (a guess: no repeats)" if guessed else "noise floor"),
     ):
         if errors.get(key) is not None:
             tiles.append(Tile(mrad(errors[key]), label))

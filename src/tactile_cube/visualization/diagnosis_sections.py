@@ -17,6 +17,11 @@ STAGES = {
     "with_effects": "with what was found",
 }
 MOST_RANKED = 15
+COLUMNS = {
+    "held_out_error_over_noise": "held-out error / sensor noise",
+    "gain": "share of the squared error it takes off",
+    "p_value": "p (no better than without)",
+}
 
 
 def staircase_section(stages: Mapping[str, float | None], joints: Mapping[str, Mapping[str, float]]) -> Section:
@@ -84,8 +89,9 @@ def ranking_section(ranking: Sequence[Any]) -> list[Section]:
     if not rows:
         return []
     keys = [key for key, value in rows[0].items() if isinstance(value, str | int | float)]
-    table = Table([key.replace("_", " ") for key in keys], [[_cell(row.get(key)) for key in keys] for row in rows])
-    return [Section("What else was weighed", (), [table], folded=True)]
+    table = Table([COLUMNS.get(key, key) for key in keys], [[_cell(row.get(key)) for key in keys] for row in rows])
+    text = ["Rows without numbers were given up after a first look: others explained more."]
+    return [Section("What else was weighed", text, [table], folded=True)]
 
 
 def value_section(comparison: Comparison) -> Section:
