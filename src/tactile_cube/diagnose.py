@@ -22,21 +22,24 @@ def main(config: DictConfig) -> None:
 
     from tactile_cube.drivetrain.effects import catalogue, find_effect
     from tactile_cube.drivetrain.model_file import write_model
+    from tactile_cube.identification.contact_diagnosis import diagnose_contact, with_contact
+    from tactile_cube.identification.contact_identification import stated_model
     from tactile_cube.identification.diagnosis import diagnose, write_experiment
     from tactile_cube.identification.diagnosis_json import as_json
     from tactile_cube.identification.in_words import answer
     from tactile_cube.identification.recommended import model_file
-    from tactile_cube.measurement.bench import without_touches
+    from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
     from tactile_cube.measurement.comparison import compare
     from tactile_cube.measurement.recording import read_recording
     from tactile_cube.visualization.comparison_episode import write_comparison
     from tactile_cube.visualization.comparison_summary import markdown
+    from tactile_cube.visualization.contact_results import write_contact_diagnosis
     from tactile_cube.visualization.diagnosis_report import diagnosis_report
     from tactile_cube.visualization.report import write_report
 
     begin = time.perf_counter()
     folder = Path(HydraConfig.get().runtime.output_dir)
-    recording = without_touches(read_recording(config.recording))
+    everything = recording = read_recording(config.recording)
     for line in recording.warnings:
         print(f"warning: {line}", file=sys.stderr)
     effects = dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)])
@@ -44,11 +47,21 @@ def main(config: DictConfig) -> None:
     def say(line: str) -> None:
         print(f"[{time.perf_counter() - begin:5.1f} s] {line}", file=sys.stderr, flush=True)
 
-    diagnosis = diagnose(recording, tuple(effects), config.engine, config.step, config.seed, say)
     command = shlex.join(["python", "-m", "tactile_cube.diagnose", *sys.argv[1:]])
+    if with_object(everything).trials and not has_free_motion(everything):
+        grip = diagnose_contact(everything, None, config.step, config.seed, say)
+        model = grip.into(stated_model(everything, command, config.seed), alone=True)
+        write_contact_diagnosis(grip, model, folder, time.perf_counter() - begin)
+        return
+    recording = without_touches(everything)
+    diagnosis = diagnose(recording, tuple(effects), config.engine, config.step, config.seed, say)
     model = model_file(recording, diagnosis.fitted, diagnosis.errors(), diagnosis.held_out, command, config.seed)
-    write_model(model, folder / "model.yaml")
     result = as_json(diagnosis, write_experiment(diagnosis, folder), time.perf_counter() - begin)
+    if with_object(everything).trials:
+        grip = diagnose_contact(everything, model, config.step, config.seed, say)
+        model, result = grip.into(model, alone=False), with_contact(result, grip)
+        result["seconds"] = round(time.perf_counter() - begin, 2)
+    write_model(model, folder / "model.yaml")
     (folder / "diagnosis.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
     before = compare(recording, None, "fast", config.step, floor=diagnosis.floor)
     after = compare(recording, model, config.engine, config.step, floor=diagnosis.floor)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import Estimate
-from tactile_cube.identification.contact_search import TrialEstimate, best_value
+from tactile_cube.identification.contact_search import TrialEstimate, best_value, first_value
 from tactile_cube.identification.contact_trial import ContactTrial
 from tactile_cube.identification.contact_unknown import Unknown, unknowns
 from tactile_cube.measurement.hand_replay import Contact
@@ -17,7 +17,6 @@ from tactile_cube.simulation.contact_effects import ContactEffect
 
 CONFIDENCE = 0.95
 SOLVER = 0.03  # relative error of a friction found at 2 ms and 30 iterations, against half the step
-SWEEPS = 2  # through several unknowns, each with the others as they were found
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ def fit_contact(
     start: Contact,
     say: Callable[[str], None] = print,
 ) -> ContactFit:
-    """Fit the parameters of some effects, one after another, twice where there are several.
+    """Fit the parameters of some effects: all of them coarsely, then each with the others as they were found.
 
     Args:
         trials: with an object.
@@ -54,23 +53,22 @@ def fit_contact(
         say: takes progress lines.
     """
     contact, wanted = start, unknowns(list(effects))
-    known: dict[Unknown, float] = {}
+    for unknown in wanted:
+        value = first_value(shown_by(trials, unknown.effect), contact, unknown)
+        contact = unknown.put(contact, _neutral(unknown) if value is None else value)
     opinions: dict[tuple[str, str], list[TrialEstimate]] = {}
     estimates: dict[tuple[str, str], Estimate] = {}
-    for _ in range(SWEEPS if len(wanted) > 1 else 1):
-        for unknown in wanted:
-            key = (unknown.effect.name, unknown.parameter.name)
-            chosen = telling_trials(trials, unknown.effect)
-            opinions[key] = [best_value(trial, contact, unknown, known.get(unknown)) for trial in chosen]
-            estimates[key] = summarise(unknown, opinions[key])
-            if any(one.telling for one in opinions[key]):
-                known[unknown] = estimates[key].value
-            contact = unknown.put(contact, estimates[key].value)
-            say(f"{unknown.label}: {_in_words(estimates[key])}")
+    for unknown in wanted:
+        key = (unknown.effect.name, unknown.parameter.name)
+        around = contact.values[key[0]][key[1]]
+        opinions[key] = [best_value(one, contact, unknown, around) for one in shown_by(trials, unknown.effect)]
+        estimates[key] = summarise(unknown, opinions[key])
+        contact = unknown.put(contact, estimates[key].value)
+        say(f"{unknown.label}: {in_words(estimates[key])}")
     return ContactFit(contact, estimates, opinions)
 
 
-def telling_trials(trials: Sequence[ContactTrial], effect: type[ContactEffect]) -> list[ContactTrial]:
+def shown_by(trials: Sequence[ContactTrial], effect: type[ContactEffect]) -> list[ContactTrial]:
     """The trials of the kinds that show an effect best, or all where there is none."""
     chosen = [one for one in trials if one.trial.kind in effect.shown_by]
     return chosen or list(trials)
@@ -85,8 +83,7 @@ def summarise(unknown: Unknown, opinions: Sequence[TrialEstimate]) -> Estimate:
     parameter = unknown.parameter
     values = _independent([one for one in opinions if one.telling], unknown)
     if not values:
-        neutral = float(np.clip(parameter.neutral, parameter.low, parameter.high))
-        return Estimate(value=neutral, low=parameter.low, high=parameter.high, unit=parameter.unit)
+        return Estimate(value=_neutral(unknown), low=parameter.low, high=parameter.high, unit=parameter.unit)
     mean = float(np.mean(values))
     if len(values) == 1:
         grid = np.array([unknown.scaled(float(value)) for value in unknown.grid()])
@@ -108,6 +105,11 @@ def _independent(opinions: Sequence[TrialEstimate], unknown: Unknown) -> list[fl
     return [value for values in groups.values() for value in values]
 
 
-def _in_words(estimate: Estimate) -> str:
+def _neutral(unknown: Unknown) -> float:
+    return float(np.clip(unknown.parameter.neutral, unknown.parameter.low, unknown.parameter.high))
+
+
+def in_words(estimate: Estimate) -> str:
+    """Value and interval for people."""
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     return f"{estimate.value:.3g}{unit} [{estimate.low:.3g}, {estimate.high:.3g}]"

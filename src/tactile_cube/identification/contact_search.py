@@ -1,18 +1,22 @@
-"""What one trial says of one parameter: the value at which the simulation follows it best."""
+"""The value of one parameter with which the simulation follows trials best: on a grid for all, then for each trial.
+
+How far two slips are apart in time has a corner where they coincide, so slopes of the error are of no use here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tactile_cube.identification.contact_trial import ContactTrial
-from tactile_cube.identification.contact_unknown import REFINEMENTS, Unknown
+from tactile_cube.identification.contact_unknown import Unknown
 from tactile_cube.measurement.hand_replay import Contact
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-TELLING = 1.5  # the cost must rise by this factor on both sides of its minimum
+REFINEMENTS = 5
+TELLING = 1.25  # the cost must rise by this factor on both sides of its minimum
 
 
 @dataclass(frozen=True)
@@ -20,24 +24,32 @@ class TrialEstimate:
     """One trial's opinion.
 
     Attributes:
+        trial: its name.
         initialisation: of the trial.
         value: the best.
         telling: whether the trial becomes worse on both sides of it; otherwise it does not know.
         cost: at the best.
     """
 
+    trial: str
     initialisation: int
     value: float
     telling: bool
     cost: float
 
 
-def best_value(trial: ContactTrial, contact: Contact, unknown: Unknown, around: float | None = None) -> TrialEstimate:
-    """The value of one parameter that suits one trial best: a grid, then the golden section about its best.
+def first_value(trials: Sequence[ContactTrial], contact: Contact, unknown: Unknown) -> float | None:
+    """The value of a coarse grid that suits all trials best, or None where no value is better than another."""
+    grid = unknown.grid()
+    total = np.zeros(len(grid))
+    for trial in trials:
+        trial.settle(contact, rounds=1)
+        total += np.log([trial.cost(unknown.put(contact, float(value))) for value in grid])
+    return float(grid[np.argmin(total)]) if np.ptp(total) > np.log(TELLING) else None
 
-    When a load slips is a function of friction without corners, but how far two slips are apart has one at its minimum;
-    so slopes are of no use here.
-    """
+
+def best_value(trial: ContactTrial, contact: Contact, unknown: Unknown, around: float) -> TrialEstimate:
+    """The value near another one that suits one trial best: a grid, then the golden section about its best."""
     costs: dict[float, float] = {}
 
     def cost(scaled: float) -> float:
@@ -45,19 +57,15 @@ def best_value(trial: ContactTrial, contact: Contact, unknown: Unknown, around: 
             costs[scaled] = trial.cost(unknown.put(contact, unknown.unscaled(scaled)))
         return costs[scaled]
 
-    trial.settle(contact if around is None else unknown.put(contact, around))
+    trial.settle(unknown.put(contact, around))
     grid = sorted(unknown.scaled(float(value)) for value in unknown.grid(around))
     best = int(np.argmin([cost(value) for value in grid]))
-    coarse = dict(costs)
-    trial.settle(unknown.put(contact, unknown.unscaled(grid[best])))
-    costs.clear()
-    cost(grid[best])
     _golden_section(cost, grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
     found = min(costs, key=lambda value: costs[value])
-    costs |= {value: one for value, one in coarse.items() if value not in costs}
     least = costs[found]
     sides = [max((c for v, c in costs.items() if (v - found) * side > 0), default=least) for side in (-1, 1)]
-    return TrialEstimate(trial.trial.initialisation, unknown.unscaled(found), min(sides) > TELLING * least, least)
+    name, initialisation = trial.trial.name, trial.trial.initialisation
+    return TrialEstimate(name, initialisation, unknown.unscaled(found), min(sides) > TELLING * least, least)
 
 
 def _golden_section(cost: Callable[[float], float], low: float, high: float) -> None:

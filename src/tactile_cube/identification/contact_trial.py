@@ -1,4 +1,4 @@
-"""One trial with an object beside its simulation, with what nobody knows of it fitted: joint offsets and the box's place.
+"""One trial with an object beside its simulation, with what nobody knows of it fitted: offsets and the box's place.
 
 Where a fingertip first touches decides how hard it presses later, and joint offsets of a degree move it by millimetres.
 So every value of a contact effect is judged with the offsets and the place that suit it best.
@@ -20,7 +20,7 @@ PLACING = 1e-3  # [m] with which somebody puts the box in its place
 SIGMA = 1e-3  # [rad] error that the world leaves in contact: drives known to 10 %, a solver that stops early
 WIDTHS = (4e-3, 4e-4)  # [rad], [m] finite steps, wide against the roughness of contact
 EVERY = 3  # rows of a trial that are compared; neighbours say the same
-ITERATIONS, ROUNDS = 2, 2  # steps with the same slopes; how often slopes are computed
+ITERATIONS = 2  # steps with the same slopes
 HALVINGS = (1.0, 0.5, 0.25)
 
 
@@ -44,9 +44,9 @@ class ContactTrial:
         released = round(trial.load.released / trial.step)
         self._grip = released if released >= EVERY else len(trial.time)
 
-    def settle(self, contact: Contact) -> None:
+    def settle(self, contact: Contact, rounds: int = 2) -> None:
         """Fit the nuisance under some values of the contact; later costs start from it and use its slopes."""
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             self._slopes = self._gradients(contact, self._target(contact, self.nuisance))
             self.nuisance = self._fitted_nuisance(contact)
 

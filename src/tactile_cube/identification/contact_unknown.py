@@ -12,9 +12,8 @@ from tactile_cube.measurement.hand_replay import Contact
 from tactile_cube.simulation.contact_effects import ContactEffect
 
 Array = NDArray[np.float64]
-COARSE, RATIO = 7, 1.8  # values of a first grid; a ratio of neighbours that is fine enough
-NEAR = 1.6  # factor around a known value, or its inverse times the range
-REFINEMENTS = 6
+COARSE, FINE, RATIO = 7, 5, 1.8  # values of a first and of a second grid; the largest ratio of neighbours
+NEAR = 2.0  # factor around a known value
 
 
 @dataclass(frozen=True)
@@ -46,9 +45,9 @@ class Unknown:
         if around is not None and self.by_factors:
             low, high = max(low, around / NEAR), min(high, around * NEAR)
         elif around is not None:
-            reach = (high - low) / 6
+            reach = (high - low) / (COARSE - 1)
             low, high = max(low, around - reach), min(high, around + reach)
-        count = COARSE if around is None else 5
+        count = COARSE if around is None else FINE
         if not self.by_factors:
             return np.linspace(low, high, count)
         count = max(count, int(np.ceil(np.log(high / low) / np.log(RATIO))) + 1)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.measurement.description import Description, KnownForce, Touch, TrialEntry
 from tactile_cube.measurement.excitation import safe_range
@@ -65,8 +66,23 @@ def without_bench(recording: Recording) -> Recording:
 
 
 def without_touches(recording: Recording) -> Recording:
-    """The recording without links that touch or hold something, which no model of a free mechanism can follow."""
-    return recording.with_trials([trial for trial in recording.trials if trial.touch is None and trial.load is None])
+    """The recording without links that touch or hold something, which no model of a free mechanism can follow.
+
+    Raises:
+        InputError: nothing is left.
+    """
+    free = [trial for trial in recording.trials if trial.touch is None and trial.load is None]
+    if not free:
+        raise InputError(
+            f"{recording.folder}: in every trial something is touched or held, none shows the mechanism alone; name "
+            "contact effects (python -m tactile_cube.identify effects=[lateral_friction]) or record free motion too"
+        )
+    return recording.with_trials(free)
+
+
+def has_free_motion(recording: Recording) -> bool:
+    """Whether some trial shows the mechanism alone."""
+    return any(trial.touch is None and trial.load is None for trial in recording.trials)
 
 
 def with_object(recording: Recording) -> Recording:
