@@ -1,7 +1,7 @@
 import numpy as np
 
 from tactile_cube.hand import DLR_HAND2, Gait, tip_positions
-from tactile_cube.hand.gait import joint_angles, walks
+from tactile_cube.hand.gait import joint_angles, similar_gaits
 
 
 def test_opposing_fingers_hold_while_the_others_are_in_the_air() -> None:
@@ -25,9 +25,9 @@ def test_joint_angles_reach_the_targets() -> None:
     np.testing.assert_allclose(tip_positions(DLR_HAND2, joint_angles(DLR_HAND2, tips)), tips, atol=1e-4)
 
 
-def test_walks_differ_and_stay_in_the_action_range() -> None:
-    actions = walks(DLR_HAND2, number=3, steps=40, direction=-1)
+def test_similar_gaits_differ_and_stay_in_the_action_range() -> None:
+    actions = similar_gaits(DLR_HAND2, number=3, steps=40, direction=-1)
     assert actions.shape == (3, 40, 12)
     assert np.abs(actions).max() <= 1.0
     assert np.abs(np.diff(actions, axis=0)).max(axis=(1, 2)).min() > 0.1
-    np.testing.assert_array_equal(actions, walks(DLR_HAND2, number=3, steps=40, direction=-1))
+    np.testing.assert_array_equal(actions, similar_gaits(DLR_HAND2, number=3, steps=40, direction=-1))

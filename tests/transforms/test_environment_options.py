@@ -34,7 +34,9 @@ def _configuration() -> Iterator[None]:
 
 def configured(*settings: str, **options: str) -> EnvConfig:
     groups = GROUPS | options
-    config = compose(overrides=["+env=rotation", *(f"+{group}={name}" for group, name in groups.items()), *settings])
+    config = compose(
+        overrides=["+env=rotation", "+model=null", *(f"+{group}={name}" for group, name in groups.items()), *settings]
+    )
     return instantiate(config.env)
 
 

@@ -50,28 +50,32 @@ def test_what_was_taken_reaches_the_world(transformed: MakeEnv) -> None:
     assert task.world.commands[-1] == pytest.approx(wanted)
 
 
-def test_stretches_of_a_gait_are_played_in_order_with_all_fingers(transformed: MakeEnv) -> None:
-    walks = (torch.arange(2.0)[:, None] + torch.arange(1.0, 9.0) / 10.0)[..., None].expand(2, 8, 12)
-    explore = Exploration(episodes=1.0, probability=0.2, shortest=3, gait=1.0, gait_longest=8)
-    taken = run(transformed(FingerExploration(explore, walks), worlds=40), 40, 30)
-    assert torch.equal(taken.amin((2, 3)), taken.amax((2, 3)))
-    played, lengths = taken[:, :, 0, 0], []
-    for world in range(40):
-        steps = played[:, world].tolist()
-        for step, value in enumerate(steps):
-            begins = value in (pytest.approx(0.1), pytest.approx(1.1))
-            assert value == 0.0 or begins or value == pytest.approx(steps[step - 1] + 0.1)
-            if begins:
-                lengths.append(0)
-            if value != 0.0:
-                lengths[-1] += 1
-    assert max(lengths) <= 8
-    assert {3, 8} <= set(lengths)
+def test_a_gait_acts_in_demonstrations_and_the_policy_takes_over_for_stretches(transformed: MakeEnv) -> None:
+    gaits = (torch.arange(2.0)[:, None] / 2.0 + torch.arange(1.0, 31.0) / 100.0)[..., None].expand(2, 30, 12)
+    explore = Exploration(episodes=0.0, probability=0.1, demonstrations=0.5, noise=0.0)
+    env = transformed(FingerExploration(explore, gaits), worlds=100)
+    taken = run(env, 100, 30)
+    shows = env.transform._exploring.flatten()
+    assert float(shows.float().mean()) == pytest.approx(0.5, abs=0.15)
+    assert (taken[:, ~shows] == 0.0).all()
+    gait = taken[:, shows, 0, 0]
+    assert torch.equal(taken[:, shows].amin((2, 3)), taken[:, shows].amax((2, 3)))
+    clock = torch.arange(1.0, 31.0)[:, None] / 100.0
+    followed = torch.isclose(gait, clock) | torch.isclose(gait, clock + 0.5)
+    assert (followed | (gait == 0.0)).all()
+    assert 0.05 < float((gait == 0.0).float().mean()) < 0.5
 
 
-def test_a_stretch_longer_than_the_gaits_is_refused() -> None:
-    with pytest.raises(InputError, match="gaits last 4 steps"):
-        FingerExploration(Exploration(gait=1.0, gait_longest=9), torch.zeros(1, 4, 12))
+def test_noise_on_demonstrations_stays_in_the_action_range(transformed: MakeEnv) -> None:
+    explore = Exploration(episodes=0.0, probability=0.0, demonstrations=1.0, noise=0.3)
+    taken = run(transformed(FingerExploration(explore, torch.full((1, 9, 12), 0.9)), worlds=50), 50, 9)
+    assert taken.max() == 1.0
+    assert float(taken.mean()) == pytest.approx(0.83, abs=0.03)
+
+
+def test_more_than_all_episodes_are_refused() -> None:
+    with pytest.raises(InputError, match="more than all"):
+        Exploration(episodes=0.6, demonstrations=0.5)
 
 
 def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> None:

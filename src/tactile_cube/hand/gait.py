@@ -69,24 +69,23 @@ def joint_angles(hand: HandModel, tips: Array) -> Array:
     return np.concatenate([finger_angles(hand, finger, tip[None])[0] for finger, tip in enumerate(tips)])
 
 
-def walks(hand: HandModel, number: int, steps: int, direction: int, seed: int = 0) -> Array:
-    """Return actions `(number, steps, 12)` of gaits around the published one, begun at any phase.
+def similar_gaits(hand: HandModel, number: int, steps: int, direction: int, seed: int = 0) -> Array:
+    """Return actions `(number, steps, 12)` of gaits that turn the cube.
 
-    Periods are 1.5 to 3.5 s: at T_s 0.25 s such gaits turn a cube on a table by 3 to 5 rad in 10 s.
+    3 to 4 rad in 10 s at T_s 0.25 s and full weight; they lie around the best of 216 gaits that were tried there by a cross-entropy search on reward=early.
     """
     rng = np.random.default_rng(seed)
     actions = np.empty((number, steps, len(hand.joint_names)))
-    for walk in actions:
+    for episode in actions:
         gait = Gait(
-            swing=rng.uniform(0.5, 0.85),
-            shift=rng.uniform(-0.2, 0.0),
-            period=int(rng.integers(15, 36)),
-            air_share=rng.uniform(0.3, 0.45),
-            pressed=rng.uniform(0.042, 0.048),
-            lifted=rng.uniform(0.075, 0.1),
-            height=rng.uniform(0.0, 0.015),
-            closing=0,
+            swing=rng.uniform(0.74, 0.87),
+            shift=rng.uniform(-0.18, -0.1),
+            period=int(rng.integers(40, 49)),
+            air_share=rng.uniform(0.28, 0.36),
+            pressed=rng.uniform(0.0455, 0.0486),
+            lifted=rng.uniform(0.089, 0.098),
+            height=rng.uniform(0.005, 0.0085),
+            closing=int(rng.integers(5, 7)),
         )
-        begin = int(rng.integers(gait.period))
-        walk[:] = [gait.action(hand, begin + step, direction) for step in range(steps)]
+        episode[:] = [gait.action(hand, step, direction) for step in range(steps)]
     return actions

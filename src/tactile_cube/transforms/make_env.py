@@ -16,7 +16,7 @@ from tactile_cube.env import Curriculum, Reward, RotationEnv, Task
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel
-from tactile_cube.hand.gait import walks as gait_walks
+from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
@@ -26,7 +26,7 @@ from tactile_cube.transforms.privileged_state import PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
 
-WALKS, WALK_STEPS = 64, 120  # gaits that exploration chooses from, and their length in policy steps
+GAITS = 64  # that demonstrations choose from
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,8 @@ def transforms(config: EnvConfig, hand: HandModel, explore: bool) -> list[Transf
         PrivilegedState(),
         StickyAction(disturbances.sticky_probability),
     ]
-    if explore and config.exploration.episodes > 0.0:
-        walks = gait_walks(hand, WALKS, WALK_STEPS, config.task.direction)
-        chain.append(FingerExploration(config.exploration, torch.tensor(walks, dtype=torch.float32)))
+    if explore and config.exploration.extra > 0.0:
+        chain.append(FingerExploration(config.exploration, demonstrated_gaits(config, hand)))
     return chain
 
 
@@ -130,3 +129,11 @@ def placed_effects(effect: Effect | str) -> list[Effect]:
         return [effect]
     name, values = parse_effect(effect)
     return [kind(joint, **values) for kind, joint in resolve([name], DLR_HAND2.joint_names)]
+
+
+def demonstrated_gaits(config: EnvConfig, hand: HandModel) -> torch.Tensor | None:
+    """Actions (gaits, steps, 12) of whole episodes; None without demonstrations."""
+    if config.exploration.demonstrations == 0.0:
+        return None
+    gaits = similar_gaits(hand, GAITS, config.task.episode_steps, config.task.direction)
+    return torch.tensor(gaits, dtype=torch.float32)
