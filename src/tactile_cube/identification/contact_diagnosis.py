@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,7 +13,7 @@ from scipy import stats
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
 from tactile_cube.identification.contact_fit import fit_contact, shown_by
-from tactile_cube.identification.contact_search import first_value
+from tactile_cube.identification.contact_search import first_value, refined_value
 from tactile_cube.identification.contact_trial import ContactTrial
 from tactile_cube.identification.contact_unknown import unknowns
 from tactile_cube.measurement.bench import with_object
@@ -152,7 +153,7 @@ def diagnose_contact(
         trials = _some_of_each_kind([ContactTrial(replay, trial) for trial in fitted_part.trials], FITTED)
         judges = _some_of_each_kind([ContactTrial(replay, trial) for trial in held_out.trials], JUDGED)
         start = contact_of(model)
-        search = _Search(trials, judges, say)
+        search = ContactSearch(trials, judges, say)
         search.run(start)
         estimates = {}
         if search.found:
@@ -168,7 +169,7 @@ def diagnose_contact(
     }
     noise = float(np.sqrt(np.mean(sensor_noise(held) ** 2)))
     names = [one.trial.name for one in judges]
-    verdict = _verdict(search, stages["with_effects"].overall)
+    verdict = verdict_of(search, stages["with_effects"].overall)
     return ContactDiagnosis(verdict, search.found, search.rivals, search.tried, estimates, stages, noise, names)
 
 
@@ -190,20 +191,30 @@ def with_contact(result: Mapping[str, Any], found: ContactDiagnosis) -> dict[str
     }
 
 
-class _Search:
-    """Effect after effect, each time the one that leaves least of the held-out error."""
+class ContactSearch:
+    """Effect after effect, each time the one that leaves least of the held-out error.
+
+    Attributes:
+        found: effects that were added, in that order.
+        rivals: what explains the last of them as well.
+        tried: everything that was tried, best first in each round.
+        first: mean square of the held-out residual to begin with (trials, 1, joints) [rad^2].
+    """
 
     def __init__(self, trials: Sequence[ContactTrial], judges: Sequence[ContactTrial], say: Callable[[str], None]):
+        """Takes the trials to fit, those that judge, and what takes progress lines."""
         self.trials, self.judges, self.say = trials, judges, say
         self.found: list[Tried] = []
         self.rivals: list[Tried] = []
         self.tried: list[list[Tried]] = []
 
     def run(self, contact: Contact) -> None:
-        """Fill `found`, `rivals` and `tried`."""
+        """Fill `found`, `rivals`, `tried` and `first`."""
         self.first = before = _squares(self.judges, contact)
         while len(self.found) < MOST_EFFECTS and (not self.found or np.sqrt(before.mean()) > GOOD):
             known = {one.effect for one in self.found}
+            for one in self.trials:
+                one.settle(contact)
             left = [effect for effect in contact_catalogue().values() if effect not in known]
             tried = sorted((self._try(effect, contact, before) for effect in left), key=lambda one: one.error)
             self.tried.append(tried)
@@ -216,8 +227,10 @@ class _Search:
 
     def _try(self, effect: type[ContactEffect], contact: Contact, before: Array) -> Tried:
         for unknown in unknowns([effect]):
-            value = first_value(shown_by(self.trials, effect), contact, unknown)
-            contact = contact if value is None else unknown.put(contact, value)
+            trials = [copy(one) for one in shown_by(self.trials, effect)]  # the next effect starts from where this did
+            value = first_value(trials, contact, unknown)
+            if value is not None:
+                contact = unknown.put(contact, refined_value(trials, contact, unknown, value))
         after = _squares(self.judges, contact)
         gain = 1 - float(np.sqrt(after.mean() / before.mean()))
         better = (np.sqrt(before) - np.sqrt(after)).ravel()
@@ -226,7 +239,8 @@ class _Search:
         return Tried(effect, contact, float(np.sqrt(after.mean())), gain, p_value)
 
 
-def _verdict(search: _Search, left: float) -> Verdict:
+def verdict_of(search: ContactSearch, left: float) -> Verdict:
+    """The answer, with `left` of the held-out error [rad]."""
     if not search.found:
         return "adequate" if left < 2 * GOOD else "unknown_effect"
     return "ambiguous" if search.rivals else "missing_effect"
@@ -235,8 +249,8 @@ def _verdict(search: _Search, left: float) -> Verdict:
 def _squares(trials: Sequence[ContactTrial], contact: Contact) -> Array:
     """Mean square of the residual (trials, 1, joints) [rad^2], offsets and the box's place fitted."""
     rows = []
-    for one in trials:
-        one.settle(contact, rounds=1)
+    for one in map(copy, trials):
+        one.settle(contact)
         rows.append([np.mean(one.residual(contact)[one.trial.valid] ** 2, axis=0)])
     return np.array(rows)
 

@@ -53,6 +53,8 @@ def fit_contact(
         say: takes progress lines.
     """
     contact, wanted = start, unknowns(list(effects))
+    for one in dict.fromkeys(one for effect in effects for one in shown_by(trials, effect)):
+        one.settle(start)
     for unknown in wanted:
         value = first_value(shown_by(trials, unknown.effect), contact, unknown)
         contact = unknown.put(contact, _neutral(unknown) if value is None else value)

@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from tactile_cube.identification.contact_fit import fit_contact, summarise
+from tactile_cube.identification.contact_search import TrialEstimate, best_value, first_value
+from tactile_cube.identification.contact_unknown import unknowns
+from tactile_cube.measurement.hand_replay import Contact
+from tactile_cube.simulation.contact_effects import LateralFriction, ObjectCom, SpinningFriction, TipCompliance
+from tests.identification.easy_contact import friction
+
+LATERAL = unknowns([LateralFriction])[0]
+
+
+def opinion(initialisation: int, value: float, telling: bool = True) -> TrialEstimate:
+    return TrialEstimate("t", initialisation, value, telling, 1.0)
+
+
+def test_a_grid_spans_the_bounds_in_equal_factors_or_differences() -> None:
+    grid = LATERAL.grid()
+    assert (grid[0], grid[-1]) == pytest.approx((0.2, 1.6))
+    np.testing.assert_allclose(grid[1:] / grid[:-1], grid[1] / grid[0])
+    compliance = unknowns([TipCompliance])[0].grid()
+    np.testing.assert_allclose(np.diff(compliance), compliance[1])
+    assert unknowns([SpinningFriction])[0].grid(around=0.25)[-1] == pytest.approx(0.3)
+
+
+def test_an_effect_has_an_unknown_for_each_parameter() -> None:
+    assert [one.label for one in unknowns([ObjectCom, LateralFriction])] == [
+        "object_com x",
+        "object_com y",
+        "object_com z",
+        "lateral_friction",
+    ]
+
+
+@pytest.mark.parametrize("truth", [0.3, 0.62, 1.3])
+def test_the_coarse_grid_and_one_trial_find_the_truth(truth: float) -> None:
+    trials = [friction("hold", k, truth) for k in range(2)]
+    start = first_value(trials, Contact({}), LATERAL)  # type: ignore[arg-type]
+    assert start is not None
+    found = best_value(trials[0], Contact({}), LATERAL, start)  # type: ignore[arg-type]
+    assert found.telling
+    assert found.value == pytest.approx(truth, rel=0.05)
+
+
+def test_a_trial_that_does_not_change_knows_nothing() -> None:
+    trial = friction("twist", 0)
+    assert first_value([trial], Contact({}), LATERAL) is None  # type: ignore[list-item]
+    assert not best_value(trial, Contact({}), LATERAL, 0.9).telling  # type: ignore[arg-type]
+
+
+def test_the_interval_is_students_of_the_initialisations() -> None:
+    said = [opinion(0, 0.5), opinion(0, 0.7), opinion(1, 0.6), opinion(2, 0.66), opinion(3, 0.1, telling=False)]
+    logs = np.array([0.5 * np.log(0.5 * 0.7), np.log(0.6), np.log(0.66)])
+    half = np.hypot(4.3027 * logs.std(ddof=1) / np.sqrt(3), 0.03)
+    estimate = summarise(LATERAL, said)
+    assert np.log([estimate.low, estimate.value, estimate.high]) == pytest.approx(
+        [logs.mean() - half, logs.mean(), logs.mean() + half], rel=1e-3
+    )
+
+
+def test_without_a_telling_trial_the_interval_is_everything() -> None:
+    estimate = summarise(LATERAL, [opinion(0, 0.5, telling=False)])
+    assert (estimate.value, estimate.low, estimate.high) == (0.9, 0.2, 1.6)
+
+
+def test_one_trial_alone_gives_a_wide_interval() -> None:
+    estimate = summarise(LATERAL, [opinion(0, 0.6)])
+    assert estimate.low < 0.45 < 0.6 < 0.8 < estimate.high
+
+
+def test_each_effect_is_fitted_on_the_kind_of_trial_that_shows_it() -> None:
+    trials = [friction(kind, k, 0.6, 0.03) for k in range(3) for kind in ("hold", "twist")]
+    fit = fit_contact(trials, [LateralFriction, SpinningFriction], Contact({}), lambda line: None)  # type: ignore[arg-type]
+    assert {one.trial.split("_")[0] for one in fit.opinions["spinning_friction", "radius"]} == {"twist"}
+    assert fit.contact.values["lateral_friction"]["coefficient"] == pytest.approx(0.6, rel=0.05)
+    assert fit.contact.values["spinning_friction"]["radius"] == pytest.approx(0.03, rel=0.05)
+    assert fit.silent() == []
