@@ -151,7 +151,8 @@ def _require_hand(recording: Recording, hand: HandModel) -> None:
     if sorted(recording.joints) != sorted(hand.joint_names):
         raise InputError(
             f"{file}: key 'joints': received {list(recording.joints)}; trials with an object are simulated with the "
-            f"whole hand and need its joints {list(hand.joint_names)} (rig.urdf: python -m tactile_cube.record source=grasp)"
+            f"whole hand and need its joints {list(hand.joint_names)} and its rig.urdf "
+            "(python -m tactile_cube.record source=grasp writes them)"
         )
     if recording.torque_controlled:
         raise InputError(f"{file}: key 'controller.mode': received torque; trials with an object need mode position")
