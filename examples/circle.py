@@ -7,6 +7,7 @@ result is there already is left out, so that the same call goes on after an inte
     python examples/circle.py            # about an hour of one core, most of it learning
     python examples/circle.py --smoke    # every stage, as small as it can be: shows that it runs, nothing more
     python examples/circle.py --control  # beside it: the same learning in the world without the effect
+    python examples/circle.py --publish docs/results/circle    # also copies tables, model and pictures there
 
 Results lie in outputs/circle/: circle.md and circle.json (the table), diagnose/report.html, identify/model.yaml,
 finetune/policy.safetensors, after/*.gif.
@@ -17,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -163,21 +165,33 @@ def table(rows: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def publish(out: Path, folder: Path) -> None:
+    """Copy what people look at: tables, diagnosis, model, learning curve, the best episodes before and after."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for pattern in ("circle.*", "diagnose/diagnosis.json", "identify/model.yaml", "finetune/metrics.csv"):
+        for path in out.glob(pattern):
+            shutil.copy(path, folder / path.name)
+    for stage in ("before", "after"):
+        for path in [*out.glob(f"{stage}/*.gif"), *out.glob(f"{stage}/*.png")]:
+            shutil.copy(path, folder / f"{stage}{path.suffix}")
+
+
 def main() -> None:
     """Every stage, then the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("outputs/circle"), help="folder of all results")
     parser.add_argument("--policy", default=POLICY, help="policy to start from: a name, a file or a run's folder")
     parser.add_argument("--control", action="store_true", help="also learn in the world without the effect")
+    parser.add_argument("--publish", type=Path, help="folder to copy the tables, the model and the pictures to")
     parser.add_argument("--smoke", action="store_true", help="as small as it can be")
     given = parser.parse_args()
     circle = Circle(given.out, SMOKE if given.smoke else FULL, given.policy)
     real, rows = f'["{HIDDEN}"]', {}
     rows["shipped on plain"] = circle.evaluate("plain", "the policy on the hand of its training", given.policy, "[]")
-    rows["shipped on real"] = circle.evaluate("before", "the same policy on the real hand", given.policy, real)
+    film = not given.smoke
+    rows["shipped on real"] = circle.evaluate("before", "the same policy on the real hand", given.policy, real, film)
     diagnosis, model = circle.find()
     tuned = circle.learn("finetune", "learn in the world of the model that was found", model)
-    film = not given.smoke
     rows["fine-tuned with the model on real"] = circle.evaluate(
         "after", "back on the real hand", str(tuned), real, film
     )
@@ -188,6 +202,8 @@ def main() -> None:
     result = {"hidden": HIDDEN, "verdict": diagnosis["verdict"], "effects": effects, "error": diagnosis["error"]}
     (given.out / "circle.json").write_text(json.dumps(result | {"evaluations": rows}, indent=1), encoding="utf-8")
     (given.out / "circle.md").write_text(table(rows) + "\n", encoding="utf-8")
+    if given.publish:
+        publish(given.out, given.publish)
     print(f"\nhidden: {HIDDEN}\nfound:  {diagnosis['verdict']} {effects}\n\n{table(rows)}\n\nresults: {given.out}")
 
 

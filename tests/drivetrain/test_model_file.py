@@ -1,8 +1,16 @@
 from pathlib import Path
 
 import pytest
+from omegaconf import OmegaConf
 
-from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
+from tactile_cube.drivetrain.model_file import (
+    EffectEstimate,
+    Estimate,
+    ModelFile,
+    as_model,
+    read_model,
+    write_model,
+)
 from tactile_cube.errors import InputError
 
 
@@ -54,3 +62,10 @@ def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str)
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_model(tmp_path / "none.yaml")
+
+
+def test_a_model_is_taken_from_a_configurations_contents() -> None:
+    model = ModelFile(joints=["q1"], values={"kp": {"q1": Estimate(value=3.0, low=2.9, high=3.1)}})
+    assert as_model(OmegaConf.create({"model": model.model_dump()}).model) == model
+    with pytest.raises(InputError, match=r"model: key 'joints'"):
+        as_model({"joints": 3})

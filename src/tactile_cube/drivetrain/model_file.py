@@ -1,6 +1,6 @@
 """The one file that says what was identified: values, intervals, effects, provenance and errors, as plain YAML."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -158,7 +158,7 @@ def as_model(given: ModelFile | Mapping[str, Any] | str | Path) -> ModelFile:
     if isinstance(given, str | Path):
         return read_model(given)
     try:
-        return ModelFile.model_validate(given)
+        return ModelFile.model_validate(_plain(given))
     except ValidationError as error:
         raise InputError(f"model: {describe(error)}") from None
 
@@ -166,3 +166,10 @@ def as_model(given: ModelFile | Mapping[str, Any] | str | Path) -> ModelFile:
 def write_model(model: ModelFile, path: str | Path) -> None:
     """Write `model` as plain YAML, keys in the order of the schema."""
     Path(path).write_text(yaml.safe_dump(model.model_dump(), sort_keys=False), encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """Dicts and lists in place of a configuration's own containers."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(part) for key, part in value.items()}
+    return [_plain(part) for part in value] if isinstance(value, Sequence) and not isinstance(value, str) else value
