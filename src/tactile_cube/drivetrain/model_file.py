@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from tactile_cube.drivetrain.plain_yaml import describe, read_schema
 from tactile_cube.errors import InputError
 
-
 OBJECT_EFFECTS = (
     "lateral_friction",
     "spinning_friction",
