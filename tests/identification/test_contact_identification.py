@@ -18,6 +18,8 @@ from tactile_cube.identification.contact_identification import (
 from tactile_cube.measurement.recording import Recording, read_recording
 from tactile_cube.measurement.sources.simulated_grasp import SimulatedGrasp
 from tactile_cube.measurement.writing import write_recording
+from tactile_cube.randomization import Randomization, Uniform, identified
+from tactile_cube.simulation import EpisodeConstants
 from tests.measurement import small_rig
 
 LATERAL, SPINNING = 0.6, 0.03
@@ -78,6 +80,14 @@ def test_the_model_file_names_values_intervals_and_units(found: ContactIdentific
     assert model.errors.with_effects == found.stages["with_effects"].overall
     assert set(model.provenance.held_out) == set(found.held_out)
     assert not set(model.provenance.trials) & set(found.held_out)
+
+
+def test_the_training_world_takes_values_and_intervals(found: ContactIdentification, recording: Recording) -> None:
+    model = found.into(stated_model(recording, "identify", 0), alone=True)
+    constants, randomization, effects = identified(model, EpisodeConstants(), Randomization(), recording.joints)
+    estimate = found.fit.estimates["lateral_friction", "coefficient"]
+    assert (constants.tip_friction, effects) == (estimate.value, [])
+    assert randomization.values["tip_friction"] == Uniform(estimate.low, estimate.high)
 
 
 def test_a_contact_effect_without_an_object_is_refused(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.error import ErrorSummary, summarise
 from tactile_cube.measurement.hand_replay import Contact, HandReplay, contact_of
 from tactile_cube.measurement.noise_floor import sensor_noise
-from tactile_cube.measurement.parameters import nominal_parameters
+from tactile_cube.measurement.parameters import CONTROLLER, nominal_parameters
 from tactile_cube.measurement.recording import DESCRIPTION, Recording
 from tactile_cube.measurement.split import held_out_split
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
@@ -94,8 +94,9 @@ def contact_effects(names: Sequence[str], recording: Recording) -> list[type[Con
 
 
 def stated_model(recording: Recording, command: str, seed: int) -> ModelFile:
-    """What recording.yaml says of the drivetrain, as a model without intervals."""
-    constants = nominal_parameters(recording, None).constants
+    """What recording.yaml says of the drivetrain, as a model without intervals; it is silent where the recording is."""
+    every = nominal_parameters(recording, None).constants
+    constants = {key: row for key, row in every.items() if key in (*CONTROLLER, *recording.nominal)}
     values = {
         key: {
             joint: Estimate(value=v, low=v, high=v) for joint, v in zip(recording.joints, map(float, row), strict=True)
