@@ -4,7 +4,7 @@ The "real" hand here is the simulated one with an effect that nobody tells the m
 finger open, as a return spring would. Every stage is one command of the package, printed before it runs; a stage whose
 result is there already is left out, so that the same call goes on after an interruption.
 
-    python examples/circle.py            # about an hour of one core, most of it learning
+    python examples/circle.py
     python examples/circle.py --smoke    # every stage, as small as it can be: shows that it runs, nothing more
     python examples/circle.py --control  # beside it: the same learning in the world without the effect
     python examples/circle.py --publish docs/results/circle    # also copies tables, model and pictures there
