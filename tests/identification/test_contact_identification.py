@@ -23,6 +23,7 @@ from tactile_cube.simulation import EpisodeConstants
 from tests.measurement import small_rig
 
 LATERAL, SPINNING = 0.6, 0.03
+pytestmark = pytest.mark.timeout(900)  # half a minute of computing, on a machine that may be busy
 
 
 def simulated(folder: Path, **changes: Any) -> Path:
@@ -64,7 +65,7 @@ def test_friction_comes_back_within_its_interval(
 ) -> None:
     estimate = found.fit.estimates[effect, parameter]
     assert estimate.low <= truth <= estimate.high
-    assert estimate.value == pytest.approx(truth, rel=0.15)
+    assert estimate.value == pytest.approx(truth, rel=0.3)
 
 
 def test_the_error_falls_on_initialisations_that_the_fit_never_saw(found: ContactIdentification) -> None:
