@@ -1,10 +1,11 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tactile_cube.identification.noise import sensor_noise
-from tactile_cube.identification.stretches import cut, steps_per_row
+from tactile_cube.identification.stretches import Drive, _states, cut, steps_per_row
 from tactile_cube.measurement.recording import Recording, read_recording
 from tests.measurement.small_rig import write
 
@@ -68,3 +69,17 @@ def test_a_later_stretch_wakes_the_memories_of_effects_before_its_samples_count(
     assert later.any()
     assert not stretches.weight[later, :10].any()
     assert stretches.weight[later, 10:11].all()
+
+
+def test_a_start_in_the_middle_of_a_jerk_is_read_without_bias(recording: Recording) -> None:
+    """3 rad/s reached and lost within 60 ms, sampled at 500 Hz, under a command with a kink."""
+    time, row = np.arange(200) / 500.0, 88
+    pulse = np.exp(-0.5 * ((time - time[100]) / 0.03) ** 2)
+    link = np.repeat(np.cumsum(3.0 * pulse)[:, None] / 500.0, 2, axis=1)
+    command = link + np.maximum(time - time[row], 0.0)[:, None]
+    drive = Drive(*(np.full(2, value) for value in (4.0, 0.0, 1.0, 0.04)))
+    motor = (link + 4.0 * 0.04 * command) / (1.0 + 4.0 * 0.04)
+    trial = replace(recording.trials[0], time=time, position=motor)
+    position, speed, _ = _states(trial, command, np.zeros_like(command), drive, np.array([row]))
+    assert position[0] == pytest.approx(motor[row])
+    assert speed[0] == pytest.approx(3.0 * pulse[row], abs=0.06)

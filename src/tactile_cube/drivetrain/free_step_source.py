@@ -60,14 +60,14 @@ def roll(commands, length, history, substeps, memory, rows, out):
 
 
 @inner
-def start_segment(position, speed, nudge, last, memory):
+def start_segment(position, speed, nudge, trial, memory):
     """Puts the sensor to its measured position and the joints to their measured speed; effects keep their past.
 
-    `last` is the memory whose last step says how far the sensor is from the joint.
+    `trial` has made the coming step already, which says how far the sensor is from the joint.
     """
     for a in range(C * n):
         column = a % n
-        x = signals_of(a // n, last)
+        x = signals_of(a // n, trial)
         memory[Q + a] = position[a] - (x[MOTOR_POSITION, column] - x[POSITION, column]) + nudge[a]
         memory[V + a] = speed[a] + nudge[C * n + a]
 
@@ -76,11 +76,12 @@ def start_segment(position, speed, nudge, last, memory):
 def roll_segments(commands, length, history, substeps, segment, position, speed, nudge, memory, rows, out):
     reading = min(int(memory[READING]), substeps - 1)
     trial = memory.copy()
-    free_step(commands[history], trial)
     for k in range(history + length):
         if k >= history and (k - history) % segment == 0:
             part = (k - history) // segment
-            start_segment(position[part], speed[part], nudge, memory if part > 0 else trial, memory)
+            trial[:] = memory
+            free_step(commands[k], trial)
+            start_segment(position[part], speed[part], nudge, trial, memory)
         for s in range(substeps):
             if k < history:
                 listen(commands[k], memory)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.trial import Trial
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 SEGMENT = (
     0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
 )
@@ -37,7 +39,8 @@ ROWS = (
     "clamped",
 )
 """Arrays with one row a stretch."""
-SMOOTHING = 0.025  # [s] half width of the parabola that reads the state at a segment's start
+SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
+MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Stretches:
         measured: (S, K segment, n) measured positions [rad].
         jump: (S, K segment, n) mean command at each reading less the one that the log feels [rad].
         weight: (S, K segment, n) 1 / sensor noise; 0 where nothing was measured [1/rad].
-        position: (S, K, n) measured position at each segment's start [rad].
+        position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
         speed: (S, K, n) [rad/s].
         acceleration: (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2].
         gains: (S, 3, n) kp, kd and torque limit of the trial over those of the recording.
@@ -143,6 +146,7 @@ def _pieces(
     substeps = steps_per_row(recording)
     fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
     jump = _half_jump(command, recording.read)
+    drive = _drive(recording, trial)
     for first in range(0, len(trial.time), forward):
         span = np.arange(first, first + rows)
         usable = np.minimum(span, len(trial.time) - 1)
@@ -151,7 +155,7 @@ def _pieces(
         if np.count_nonzero(present) < FEWEST:
             continue
         starts = np.minimum(span[::segment], len(trial.time) - 1)
-        position, speed, acceleration = _states(trial, starts)
+        position, speed, acceleration = _states(trial, command, jump, drive, starts)
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": trial.position[usable],
@@ -191,6 +195,24 @@ def _gains(recording: Recording, trial: Trial) -> Array:
     return np.where(usable, own / np.where(usable, common, 1.0), 1.0)
 
 
+class Drive(NamedTuple):
+    """Nominal values (n,) by which a drive deflects: kp, kd, torque limit and compliance [rad/(N m)]."""
+
+    kp: Array
+    kd: Array
+    limit: Array
+    compliance: Array
+
+
+def _drive(recording: Recording, trial: Trial) -> Drive:
+    joints = len(recording.joints)
+    stiffness = recording.nominal.get("stiffness", np.full(joints, np.inf))
+    if recording.torque_controlled:
+        return Drive(np.full(joints, TORQUE_MODE_GAIN), np.zeros(joints), np.full(joints, np.inf), 1.0 / stiffness)
+    gains = trial.gains
+    return Drive(np.array(gains.kp), np.array(gains.kd), np.array(gains.torque_limit), 1.0 / stiffness)
+
+
 def _impulses(command: Array, reading: str, substeps: int) -> Array:
     """Commands (T, n) as the simulation's steps take them, (T substeps, n), from the instant at which row 0 is read.
 
@@ -217,13 +239,26 @@ def _half_jump(command: Array, reading: str) -> Array:
     return 0.5 * (after - before) if reading == "after" else 0.5 * (before - after)
 
 
-def _states(trial: Trial, rows: NDArray[np.int64]) -> tuple[Array, Array, Array]:
-    """Position, speed and acceleration (K, n) at some rows: a parabola through the samples around each."""
+def _states(trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows) -> tuple[Array, Array, Array]:
+    """Position of the sensor, speed and acceleration of the link (K, n) at some rows.
+
+    The sensor follows every kink of the command, for the drive deflects with its torque; the link does not. So speed
+    and acceleration come from a polynomial through the samples around, with the drive's deflection taken off: of
+    fourth degree, since a joint that is pulled out of its stiction is fast before a parabola can follow, or a parabola
+    where samples lie on one side only or are few.
+    """
+    torque = np.clip(drive.kp * (command - trial.position), -drive.limit, drive.limit)
+    link = trial.position - drive.compliance * torque  # behind by compliance * kd * speed
     half = max(2, round(SMOOTHING / trial.step))
     found = []
     for row in rows:
         near = slice(max(0, row - half), min(len(trial.time), row + half + 1))
-        basis = np.vander(trial.time[near] - trial.time[row], 3, increasing=True)
-        found.append(np.linalg.lstsq(basis, trial.position[near], rcond=None)[0])
-    states = np.array(found)
-    return states[:, 0], states[:, 1], 2.0 * states[:, 2]
+        centred = near.start == row - half and near.stop == row + half + 1
+        terms = 5 if centred and 2 * half >= MANY else 3
+        basis = np.vander(trial.time[near] - trial.time[row], terms, increasing=True)
+        found.append(np.linalg.lstsq(basis, link[near], rcond=None)[0][1:3])
+    slope, half_curvature = np.moveaxis(np.array(found), 1, 0)
+    acceleration = 2.0 * half_curvature
+    soft = drive.kp * drive.compliance
+    position = trial.position[rows] + soft / (1.0 + soft) * jump[rows]
+    return position, slope + drive.compliance * drive.kd * acceleration, acceleration
