@@ -2,8 +2,9 @@
 
     python tests/blind/judge.py --draws 60 --out outputs/blind --jobs 1
 
-Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped.
-identification.md and identification.json beside it sum the lines up. What counts as right stands in scoring.py.
+Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped, and
+`--draws 0` only sums up what is there. identification.md, .json and .png (the confusion matrix) beside it sum the
+lines up. What counts as right stands in scoring.py.
 """
 
 import argparse
@@ -22,6 +23,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 
 from generator import write
+from matplotlib.figure import Figure
 from scoring import score
 
 FIRST_SEED = 10_000
@@ -165,17 +167,36 @@ def _sentence(summary: dict[str, Any], key: str, words: str) -> str:
     )
 
 
+COLUMNS = (
+    "adequate",
+    "missing_effect, the truth",
+    "missing_effect, another",
+    "ambiguous",
+    "unknown_effect",
+    "no answer",
+)
+
+
+def picture(summary: dict[str, Any], path: Path) -> None:
+    """The confusion matrix: what was hidden against what was answered."""
+    rows = list(summary["confusion"])
+    counts = [[summary["confusion"][row].get(column, 0) for column in COLUMNS] for row in rows]
+    canvas = Figure(figsize=(8.0, 1.8 + 0.5 * len(rows)), layout="constrained")
+    axes = canvas.add_subplot()
+    axes.imshow(counts, cmap="Blues", vmin=0)
+    axes.set_xticks(range(len(COLUMNS)), [column.replace(", ", ",\n") for column in COLUMNS])
+    axes.set_yticks(range(len(rows)), rows)
+    axes.set_title(f"Blind diagnosis, {summary['draws']} draws: hidden (rows) and answered (columns)", fontsize=10)
+    most = max((max(row) for row in counts), default=1)
+    for i, row in enumerate(counts):
+        for j, count in enumerate(row):
+            axes.text(j, i, str(count), ha="center", va="center", color="white" if count > 0.6 * most else "black")
+    canvas.savefig(path, dpi=110)
+
+
 def markdown(lines: list[dict[str, Any]], command: str) -> str:
     """The summary as a page."""
     s = summarise(lines)
-    columns = [
-        "adequate",
-        "missing_effect, the truth",
-        "missing_effect, another",
-        "ambiguous",
-        "unknown_effect",
-        "no answer",
-    ]
     share = (s["right"] + s["acceptable"]) / max(s["draws"], 1)
     page = [
         "# Blind diagnosis of hidden effects",
@@ -189,10 +210,12 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
         f"- candidates left open by an ambiguous answer: {', '.join(map(str, s['ambiguous_set_sizes'])) or '-'}",
         f"- median time of a diagnosis: {s['median_seconds']} s",
         "",
-        "| hidden | " + " | ".join(columns) + " |",
-        "|---" * (len(columns) + 1) + "|",
+        "![confusion matrix](identification.png)",
+        "",
+        "| hidden | " + " | ".join(COLUMNS) + " |",
+        "|---" * (len(COLUMNS) + 1) + "|",
     ]
-    page += [f"| {k} | " + " | ".join(str(row.get(c, 0)) for c in columns) + " |" for k, row in s["confusion"].items()]
+    page += [f"| {k} | " + " | ".join(str(row.get(c, 0)) for c in COLUMNS) + " |" for k, row in s["confusion"].items()]
     page += ["", "| reason | draws |", "|---|---|"]
     page += [f"| {k} | {n} |" for k, n in sorted(s["reasons"].items())]
     page += [
@@ -215,6 +238,8 @@ def report(folder: Path, command: str) -> dict[str, Any]:
     lines = [judged(x) for x in read_lines(folder / "verdicts.jsonl")]
     summary = summarise(lines)
     (folder / "identification.md").write_text(markdown(lines, command))
+    if lines:
+        picture(summary, folder / "identification.png")
     (folder / "identification.json").write_text(
         json.dumps({"command": command, **summary, "draws_judged": lines}, indent=1)
     )
@@ -236,7 +261,7 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     done = {x["seed"] for x in read_lines(args.out / "verdicts.jsonl")}
     wanted = [s for s in range(args.first_seed, args.first_seed + args.draws) if s not in done]
-    command = f"python tests/blind/judge.py --draws {args.draws}"
+    command = f"python tests/blind/judge.py --draws {args.draws or len(done)}"
     command += f" --first-seed {args.first_seed}" * (args.first_seed != FIRST_SEED) + (
         f" --seconds {args.seconds:g}" if args.seconds else ""
     )

@@ -7,7 +7,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.candidates import Candidate, forms
-from tactile_cube.identification.evidence import Judgement, gain, p_value
+from tactile_cube.identification.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.gauss_newton import Fit
 from tactile_cube.identification.model import Model
@@ -86,3 +86,34 @@ def test_paired_segments_tell_a_real_gain_from_none(better: float, significant: 
     before = judged(2.0)
     after = replace(before, costs=before.costs * better)
     assert (p_value(before, after) < 1e-3) == significant
+
+
+@pytest.mark.parametrize(("factor", "found"), [(1.001, False), (1.02, True)])
+def test_at_the_noise_a_small_but_steady_loss_speaks_against_an_effect(factor: float, found: bool) -> None:
+    best = judged(1.0)
+    assert worse(replace(best, costs=best.costs * factor), best) == found
+
+
+def test_a_loss_is_measured_by_what_the_better_model_leaves_unexplained() -> None:
+    best = judged(2.0)
+    assert not worse(replace(best, costs=best.costs * 1.1), best)
+    assert worse(replace(best, costs=best.costs * 1.5), best)
+
+
+def test_a_single_segment_does_not_decide() -> None:
+    best = judged(1.0)
+    other = best.costs.copy()
+    other[0] += 400.0
+    assert not worse(replace(best, costs=other), best)
+
+
+def test_a_rival_that_the_held_out_trials_speak_against_is_none() -> None:
+    verdict = decide(findings(20.0, explanation("torque_bias", 1.0), explanation("torque_gain", 1.05)))
+    assert verdict.kind == "missing_effect"
+
+
+def test_one_effect_that_does_as_well_beats_two() -> None:
+    one = explanation("stribeck_friction", 1.03)
+    both = replace(one, effects=(*one.effects, *explanation("torque_bias", 1.0).effects))
+    found = Findings(findings(20.0).base, judged(40.0), ((both,), (one,)), ())
+    assert decide(found).chosen is one

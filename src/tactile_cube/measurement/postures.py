@@ -16,7 +16,9 @@ from tactile_cube.measurement.replay import Engine, Simulated, replay
 Array = NDArray[np.float64]
 SPREAD = 0.03  # [rad] standard deviation of a joint offset. Source: Sievers et al., ICRA 2022: up to 3 deg
 NUDGE = 0.005  # [rad] finite difference
-ITERATIONS = 2
+ITERATIONS = 4
+LARGEST = 0.06  # [rad] no initialisation is further off
+LARGEST_STEP = 0.02  # [rad] the simulation is far from linear where joints stick
 CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
 
@@ -51,14 +53,32 @@ def fitted_postures(recording: Recording, parameters: Parameters, step: float) -
             nudged = {key: value + NUDGE * _unit(joint, len(value)) for key, value in postures.items()}
             changed = _errors(recording, parameters, nudged, step)
             columns.append([(a - b) / NUDGE for a, b in zip(left, changed, strict=True)])
-        for initialisation, posture in postures.items():
-            rows = [k for k, trial in enumerate(recording.trials) if trial.initialisation == initialisation]
-            error = np.concatenate([left[k].ravel() for k in rows])
-            slopes = np.stack([np.concatenate([one[k].ravel() for k in rows]) for one in columns], axis=1)
-            trust = CORRELATED * float(np.mean(error**2)) / SPREAD**2
-            normal = slopes.T @ slopes + trust * np.eye(len(posture))
-            postures[initialisation] = posture + np.linalg.solve(normal, slopes.T @ error - trust * posture)
+        tried = {key: _step(recording, key, value, left, columns) for key, value in postures.items()}
+        changed = _errors(recording, parameters, tried, step)
+        better = {key: _size(recording, key, changed) < _size(recording, key, left) for key in postures}
+        postures = {key: tried[key] if better[key] else value for key, value in postures.items()}
     return postures
+
+
+def _step(
+    recording: Recording, initialisation: int, posture: Array, left: list[Array], columns: list[list[Array]]
+) -> Array:
+    """A cautious Gauss-Newton step of one initialisation's posture (joints,) [rad]."""
+    error = _stacked(recording, initialisation, left)
+    slopes = np.stack([_stacked(recording, initialisation, one) for one in columns], axis=1)
+    trust = CORRELATED * float(np.mean(error**2)) / SPREAD**2
+    normal = slopes.T @ slopes + trust * np.eye(len(posture))
+    step = np.linalg.solve(normal, slopes.T @ error - trust * posture)
+    return np.clip(posture + np.clip(step, -LARGEST_STEP, LARGEST_STEP), -LARGEST, LARGEST)
+
+
+def _stacked(recording: Recording, initialisation: int, arrays: list[Array]) -> Array:
+    rows = [k for k, trial in enumerate(recording.trials) if trial.initialisation == initialisation]
+    return np.concatenate([arrays[k].ravel() for k in rows])
+
+
+def _size(recording: Recording, initialisation: int, errors: list[Array]) -> float:
+    return float(np.sum(_stacked(recording, initialisation, errors) ** 2))
 
 
 def _errors(recording: Recording, parameters: Parameters, postures: Mapping[int, Array], step: float) -> list[Array]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, TORQUE, catalogue, resolve
+from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, POSITION, TORQUE, catalogue, resolve
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
@@ -144,7 +144,10 @@ class Replay:
         self.plant.view(memory, "offset")[0] += self.tree.ratio * parameters.posture[self.tree.follow]
         self.plant.view(memory, "angle_offset")[:] = parameters.posture
         position, velocity, torque = self.start(trial)
-        self.plant.reset(memory, position - torque / parameters.constants["stiffness"], velocity)
+        deflection = torque / parameters.constants["stiffness"]
+        self.plant.reset(memory, position - deflection, velocity)
+        further = self._further_reading(memory, trial.command[0])
+        self.plant.reset(memory, position - deflection - further, velocity)
         self.plant.view(memory, "reading")[:] = 0  # at the beginning of each period; read_out looks at its end
         if trial.clamped:
             self.plant.view(memory, "brake")[:] = CLAMPED
@@ -153,6 +156,15 @@ class Replay:
                 self.tree, trial.force, trial.position.mean(axis=0)
             )
         return memory
+
+    def _further_reading(self, memory: Array, command: Array) -> Array:
+        """What effects add to the sensor's reading beside the drive's deflection (n,) [rad], in a step of a copy."""
+        scale = TORQUE_MODE_GAIN if self.recording.torque_controlled else 1.0
+        copy = memory.copy()
+        self.plant.kernel.step(command / scale, copy)
+        position, motor, torque = (self.plant.signal(copy, row) for row in (POSITION, MOTOR_POSITION, TORQUE))
+        further: Array = motor - position - self.plant.view(memory, "compliance") * torque
+        return further
 
     def _constants(self, trial: Trial, parameters: Parameters) -> dict[str, Array]:
         """The constants of one trial: gains scaled as the trial's own are to the recording's."""
