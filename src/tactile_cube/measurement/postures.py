@@ -69,7 +69,7 @@ def _step(
     trust = CORRELATED * float(np.mean(error**2)) / SPREAD**2
     normal = slopes.T @ slopes + trust * np.eye(len(posture))
     step = np.linalg.solve(normal, slopes.T @ error - trust * posture)
-    return np.clip(posture + np.clip(step, -LARGEST_STEP, LARGEST_STEP), -LARGEST, LARGEST)
+    return np.asarray(np.clip(posture + np.clip(step, -LARGEST_STEP, LARGEST_STEP), -LARGEST, LARGEST))
 
 
 def _stacked(recording: Recording, initialisation: int, arrays: list[Array]) -> Array:
