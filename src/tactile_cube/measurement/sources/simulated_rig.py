@@ -149,7 +149,7 @@ class _Session:
         """Simulate one trial and log it as the rig's sensors would."""
         settle = round(SETTLING * self.settings.rate)
         trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), self.simulator.recording, entry)
-        effects = self.effects if entry.touch is None else (*self.effects, self._obstacle(entry.touch, offset))
+        effects = self.effects if entry.touch is None else (*self.effects, _obstacle(entry.touch))
         parameters = Parameters(self.constants, effects, -offset)
         result = self.simulator.simulate([trial], parameters)[0]
         if entry.force is not None:  # a force pulls at the posture that it leads to
@@ -162,10 +162,10 @@ class _Session:
         time = np.arange(len(command)) / self.settings.rate
         return TrialTable(entry, time, command, position, torque)
 
-    def _obstacle(self, touch: Touch, offset: Array) -> tuple[str, dict[str, float]]:
-        """A hard stop where the touching joint meets the obstacle, in the coordinates of its sensor."""
-        place = touch.angle + float(offset[self.simulator.recording.joints.index(touch.joint)])
-        return f"joint_stop@{touch.joint}", {"upper": place, "stiffness": OBSTACLE, "damping": 0.5}
+
+def _obstacle(touch: Touch) -> tuple[str, dict[str, float]]:
+    """A hard stop where the touching joint meets the obstacle."""
+    return f"joint_stop@{touch.joint}", {"upper": touch.angle, "stiffness": OBSTACLE, "damping": 0.5}
 
 
 def _unmeasured(description: Description, rig: Rig, constants: dict[str, Array]) -> Recording:
