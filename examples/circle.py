@@ -56,12 +56,10 @@ FULL = Sizes(
     evaluation=(),
     bench=(),
     training=(
-        "training.steps=15000",
-        "training.barrier_iterations=10",
-        "training.checkpoint_barriers=1",
-        "training.learning_starts=3000",
-        "training.actor_frozen=1000",  # the policy file brings no critics: they learn first what the policy is worth
-        "agent.learning_rate=3e-4",
+        "training.steps=250000",
+        "training.stop_when_angle_above=6",
+        "training.learning_starts=6000",
+        "training.actor_frozen=3000",  # the policy file brings no critics: they learn first what the policy is worth
     ),
 )
 SMOKE = Sizes(
