@@ -136,12 +136,15 @@ class Circle:
         model = self.run("identify", "identify/model.yaml", "fit it", f"recording={bench}", effects)
         return diagnosis, model
 
-    def learn(self, name: str, title: str, model: Path | None) -> Path:
-        """Go on learning from the shipped policy, in the world of a model or in the plain one."""
+    def learn(self, name: str, title: str, model: Path | None, like: Path | None = None) -> Path:
+        """Go on learning from the shipped policy, in the world of a model or the plain one; as long as the run `like`."""
         first = f"training.init_from={policy_file(self.policy)}"
         world = [f"model={model}"] if model else []
         start = ["training.random_steps=0", "agent.alpha_init=0.015"]  # a trained policy's temperature, nothing random
         words = ["+experiment=table", first, *world, *start, *self.sizes.training]
+        if like is not None:
+            steps = json.loads((like.parent / "ledger.json").read_text(encoding="utf-8"))["steps"]
+            words += [f"training.steps={steps}", "training.stop_when_angle_above=null"]
         return self.run("train", f"{name}/policy.safetensors", title, *words)
 
 
@@ -194,7 +197,7 @@ def main() -> None:
         "after", "back on the real hand", str(tuned), real, film
     )
     if given.control:
-        control = circle.learn("control", "control: learn as long in the plain world", None)
+        control = circle.learn("control", "control: learn as long in the plain world", None, like=tuned)
         rows["fine-tuned without it on real"] = circle.evaluate("after_control", "control", str(control), real)
     effects = diagnosis["effects"]
     result = {"hidden": HIDDEN, "verdict": diagnosis["verdict"], "effects": effects, "error": diagnosis["error"]}
@@ -202,7 +205,8 @@ def main() -> None:
     (given.out / "circle.md").write_text(table(rows) + "\n", encoding="utf-8")
     if given.publish:
         publish(given.out, given.publish)
-    print(f"\nhidden: {HIDDEN}\nfound:  {diagnosis['verdict']} {effects}\n\n{table(rows)}\n\nresults: {given.out}")
+    named = ", ".join(f"{one['name']}@{joint}" for one in effects for joint in one["joints"])
+    print(f"\nhidden: {HIDDEN}\nfound:  {diagnosis['verdict']}: {named}\n\n{table(rows)}\n\nresults: {given.out}")
 
 
 if __name__ == "__main__":

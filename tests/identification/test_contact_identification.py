@@ -23,7 +23,7 @@ from tactile_cube.simulation import EpisodeConstants
 from tests.measurement import small_rig
 
 LATERAL, SPINNING = 0.6, 0.03
-pytestmark = pytest.mark.timeout(900)  # half a minute of computing, on a machine that may be busy
+pytestmark = pytest.mark.timeout(300)  # half a minute of computing, on a machine that may be busy
 
 
 def simulated(folder: Path, **changes: Any) -> Path:
@@ -57,15 +57,16 @@ def test_the_recording_tells_of_the_load_and_not_of_the_friction(recording: Reco
 
 
 @pytest.mark.parametrize(
-    ("effect", "parameter", "truth"),
-    [("lateral_friction", "coefficient", LATERAL), ("spinning_friction", "radius", SPINNING)],
+    ("effect", "parameter", "truth", "factor"),
+    [("lateral_friction", "coefficient", LATERAL, 1.2), ("spinning_friction", "radius", SPINNING, 2.0)],
 )
 def test_friction_comes_back_within_its_interval(
-    found: ContactIdentification, effect: str, parameter: str, truth: float
+    found: ContactIdentification, effect: str, parameter: str, truth: float, factor: float
 ) -> None:
     estimate = found.fit.estimates[effect, parameter]
     assert estimate.low <= truth <= estimate.high
-    assert estimate.value == pytest.approx(truth, rel=0.3)
+    assert truth / factor < estimate.value < truth * factor
+    assert estimate.high / estimate.low < factor**4
 
 
 def test_the_error_falls_on_initialisations_that_the_fit_never_saw(found: ContactIdentification) -> None:

@@ -26,7 +26,7 @@ PHASES = np.array([0.0, 0.5, 0.0, 0.5])
 class Gait:
     """Shape of the walk.
 
-    Found by cross-entropy searches at full weight, T_s 0.25 and 0.5 s; turning about -z is what this hand pose does best.
+    Found by cross-entropy searches at full weight, T_s 0.25 and 0.5 s; about -z is what this hand pose turns best.
 
     Attributes:
         swing: a finger walks from +swing to -swing about its place, and back in the air, to turn the cube in -z [rad].
@@ -72,7 +72,8 @@ def joint_angles(hand: HandModel, tips: Array) -> Array:
 def similar_gaits(hand: HandModel, number: int, steps: int, direction: int, seed: int = 0) -> Array:
     """Return actions `(number, steps, 12)` of gaits that turn the cube.
 
-    3 to 4 rad in 10 s at T_s 0.25 s and full weight; they lie around the best of 216 gaits that were tried there by a cross-entropy search on reward=early.
+    3 to 4 rad in 10 s at T_s 0.25 s and full weight; they lie around the best of 216 gaits that a cross-entropy search
+    tried there.
     """
     rng = np.random.default_rng(seed)
     actions = np.empty((number, steps, len(hand.joint_names)))
