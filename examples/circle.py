@@ -137,7 +137,7 @@ class Circle:
         return diagnosis, model
 
     def learn(self, name: str, title: str, model: Path | None, like: Path | None = None) -> Path:
-        """Go on learning from the shipped policy, in the world of a model or the plain one; as long as run `like` did."""
+        """Go on learning from the policy, in the world of a model or the plain one; as long as run `like` did."""
         first = f"training.init_from={policy_file(self.policy)}"
         world = [f"model={model}"] if model else []
         start = ["training.random_steps=0", "agent.alpha_init=0.015"]  # a trained policy's temperature, nothing random
