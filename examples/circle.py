@@ -171,7 +171,8 @@ def publish(out: Path, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for pattern in ("circle.*", "diagnose/diagnosis.json", "identify/model.yaml", "finetune/metrics.csv"):
         for path in out.glob(pattern):
-            shutil.copy(path, folder / path.name)
+            text = path.read_text(encoding="utf-8").replace(f"{Path.cwd()}/", "")
+            (folder / path.name).write_text(text, encoding="utf-8")
     for stage in ("before", "after"):
         for path in [*out.glob(f"{stage}/*.gif"), *out.glob(f"{stage}/*.png")]:
             shutil.copy(path, folder / f"{stage}{path.suffix}")
