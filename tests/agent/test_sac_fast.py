@@ -29,6 +29,7 @@ def random_batch(rows: int = 32, seed: int = 1) -> Batch:
         next_privileged=normal(SIZES.privileged),
         terminated=(normal(1) > 1.0).float(),
         steps=torch.randint(1, 4, (rows, 1), generator=generator).float(),
+        demonstrated=(normal(1) > 0.0).float(),
     )
 
 
@@ -84,6 +85,39 @@ def test_both_compositions_stay_together_over_updates() -> None:
         torch.testing.assert_close(mine, theirs, rtol=1e-3, atol=2e-5)
     targets = torch.cat([p.reshape(2, -1) for n, p in plain.loss.state_dict().items() if n.startswith("target")], 1)
     assert fast.networks.target_master.double().norm().item() == pytest.approx(targets.double().norm().item(), rel=1e-4)
+
+
+def test_imitation_adds_the_gradient_of_better_demonstrated_actions_alone() -> None:
+    batch, weight = random_batch(), 0.7
+    _, fast = pair()
+    torch.manual_seed(7)
+    fast.compute_gradients(batch)
+    before = [g.clone() for g in gradients_of_fast(fast)]
+    torch.manual_seed(3)
+    imitating = FastSac(SIZES, **SETTINGS, demonstration_weight=weight)
+    torch.manual_seed(7)
+    imitating.compute_gradients(batch)
+    after = gradients_of_fast(imitating)
+
+    actor = fast.policy().requires_grad_(True)
+    torch.manual_seed(7)
+    torch.randn(len(batch.action), SIZES.action)  # of the next actions
+    mean, scale = actor(batch.observation)
+    proposed = torch.tanh(mean + scale * torch.randn(mean.shape)).detach()
+    state = torch.cat((batch.observation, batch.privileged), -1)
+
+    def value(action: torch.Tensor) -> torch.Tensor:
+        x = torch.cat((state, action), -1)
+        return torch.minimum(*(critic.forward(x)[0] for critic in fast.networks.critics))
+
+    better = (value(batch.action) > value(proposed)).float() * batch.demonstrated
+    assert 0 < better.sum() < batch.demonstrated.sum() < len(better)
+    loss = weight * (better * (torch.tanh(mean) - batch.action).square()).sum() / len(better)
+    expected = torch.autograd.grad(loss, list(actor.body.parameters()))
+    for index, gradient in enumerate(expected):
+        torch.testing.assert_close(after[index] - before[index], gradient, rtol=1e-4, atol=1e-6)
+    for mine, same in zip(after[len(expected) :], before[len(expected) :], strict=True):
+        assert torch.equal(mine, same)
 
 
 def test_bfloat16_follows_float32_roughly() -> None:

@@ -66,6 +66,19 @@ def test_a_gait_acts_in_demonstrations_and_the_policy_takes_over_for_stretches(t
     assert 0.05 < float((gait == 0.0).float().mean()) < 0.5
 
 
+def test_demonstrated_steps_are_marked(transformed: MakeEnv) -> None:
+    explore = Exploration(episodes=0.2, probability=0.2, demonstrations=0.4, noise=0.0)
+    env = transformed(FingerExploration(explore, torch.full((1, 30, 12), 0.5)), worlds=100)
+    data, marks, taken = env.reset(), [], []
+    assert not data["demonstrated"].any()
+    for _ in range(20):
+        data = step_mdp(env.step(data.set("action", torch.zeros(100, 12))))
+        marks.append(data["demonstrated"].flatten())
+        taken.append((data["action_taken"] == 0.5).all(-1))
+    assert torch.equal(torch.stack(marks), torch.stack(taken))
+    assert 0.1 < float(torch.stack(marks).float().mean()) < 0.4
+
+
 def test_noise_on_demonstrations_stays_in_the_action_range(transformed: MakeEnv) -> None:
     explore = Exploration(episodes=0.0, probability=0.0, demonstrations=1.0, noise=0.3)
     taken = run(transformed(FingerExploration(explore, torch.full((1, 9, 12), 0.9)), worlds=50), 50, 9)

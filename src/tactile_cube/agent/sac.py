@@ -40,6 +40,11 @@ class Sac:
             raise InputError(
                 f"agent.precision={self.settings.precision}: agent=sac knows fp32 only; use agent=sac_fast"
             )
+        if self.settings.demonstration_weight:
+            raise InputError(
+                f"agent.demonstration_weight={self.settings.demonstration_weight}: agent=sac imitates nobody; "
+                "use agent=sac_fast, or 0"
+            )
         self.device = self.settings.torch_device()
         self.actor, *critics = build_networks(sizes, self.settings)
         self.loss = self._build_loss(critics).to(self.device)

@@ -133,15 +133,16 @@ class FastSac:
         log_prob = squashed_log_prob(noise, log_sigma, pre_tanh)
 
         target = self._target(batch, action[first], alpha * log_prob[first])
-        critic_loss, values, action_gradient = self._critics(batch, action[second], target)
+        critic_loss, values, action_gradient, better = self._critics(batch, action[second], target)
 
         # d/du of alpha log pi(u) is 2 alpha tanh(u) (its other part enters through log sigma)
         share = alpha / size
         a = action[second]
         pre_gradient = 2.0 * share * a + action_gradient * (1.0 - a.square())
         sigma_gradient = pre_gradient * deviation[second] - share
+        mean_gradient = pre_gradient + self._imitation_gradient(batch, torch.tanh(mean[second]), better)
         slope = 0.5 * (LOG_SCALE_HIGH - LOG_SCALE_LOW) * (1.0 - torch.tanh(raw[second]).square())
-        self._actor_backward(actor_kept, torch.cat((pre_gradient, sigma_gradient * slope), -1), second)
+        self._actor_backward(actor_kept, torch.cat((mean_gradient, sigma_gradient * slope), -1), second)
 
         mean_log_prob = log_prob[second].mean()
         self.log_alpha.grad.copy_(-(mean_log_prob + self.settings.target_entropy))  # type: ignore[union-attr]
@@ -153,6 +154,14 @@ class FastSac:
             "value": values.mean(),
         }
 
+    def _imitation_gradient(self, batch: Batch, likeliest: Tensor, better: Tensor) -> Tensor | float:
+        """Gradient by the actor's mean of weight * |tanh(mean) - a|^2 over demonstrated actions a that are better."""
+        weight = self.settings.demonstration_weight
+        if not weight:
+            return 0.0
+        share = weight / len(better) * batch.demonstrated * better
+        return 2.0 * share * (likeliest - batch.action) * (1.0 - likeliest.square())
+
     def _cast(self, x: Tensor) -> Tensor:
         return x.to(self.networks.working.dtype)
 
@@ -163,8 +172,10 @@ class FastSac:
         discount = self.settings.gamma**batch.steps * (1.0 - batch.terminated)
         return batch.reward + discount * (lowest - entropy_cost)
 
-    def _critics(self, batch: Batch, proposed: Tensor, target: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def _critics(self, batch: Batch, proposed: Tensor, target: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Critic loss, the lower of the two values of the proposed actions, and minus its gradient by the action.
+
+        Last, 1 where the replayed action is worth more than the proposed one.
 
         The critics' parameter gradients come from the replayed half, the action's gradient from the proposed half.
         """
@@ -186,7 +197,8 @@ class FastSac:
             at_first = critic.backward(kept, gradient, first)
             columns = slice(self.sizes.critic - self.sizes.action, self.sizes.critic)
             action_gradient += critic.input_gradient(at_first[second], columns).float()
-        return loss, torch.minimum(q1[second], q2[second]), action_gradient
+        lower = torch.minimum(q1, q2)
+        return loss, lower[second], action_gradient, (lower[first] > lower[second]).float()
 
     def _actor_backward(self, kept: list[Activation], gradient: Tensor, rows: slice) -> None:
         mine = [(x[rows], product[rows], mean, inverse) for x, product, mean, inverse in kept]

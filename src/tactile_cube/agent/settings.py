@@ -22,6 +22,8 @@ class AgentSettings(BaseModel):
         alpha_init: temperature at the start.
         target_entropy: entropy [nat] the temperature is tuned towards.
         n_step: rewards summed before bootstrapping.
+        demonstration_weight: of imitating a demonstrated action where the critics hold it for better than the actor's own
+            (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone, more is for `sac_fast` only.
         batch_size: replayed transitions an update.
         precision: arithmetic of the matrix products; bf16 is for `sac_fast` only.
         device: "cpu", "cuda" or "cuda:0"; collection stays on the CPU.
@@ -41,6 +43,7 @@ class AgentSettings(BaseModel):
     alpha_init: PositiveFloat = 0.2
     target_entropy: float = -6.0
     n_step: PositiveInt = 1
+    demonstration_weight: float = Field(default=0.0, ge=0.0)
     batch_size: PositiveInt = 256
     precision: Literal["fp32", "bf16"] = "fp32"
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?)$")

@@ -33,6 +33,7 @@ class Replay:
             "next_privileged": sizes.privileged,
             "terminated": 1,
             "steps": 1,
+            "demonstrated": 1,
         }
         self.widths = widths
         self.capacity = capacity

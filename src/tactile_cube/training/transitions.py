@@ -64,6 +64,12 @@ def _fields(block: TensorDictBase) -> dict[str, Tensor]:
         "next_privileged": following["privileged"],
         "terminated": following["terminated"].float(),
         "steps": torch.ones_like(following["terminated"], dtype=torch.float32),
+        "demonstrated": _demonstrated(following),
         "done": following["done"],
         "faulty": following["faulty"],
     }
+
+
+def _demonstrated(following: TensorDictBase) -> Tensor:
+    flag = following.get("demonstrated", None)  # missing where no extra exploration is configured
+    return torch.zeros_like(following["terminated"], dtype=torch.float32) if flag is None else flag.float()

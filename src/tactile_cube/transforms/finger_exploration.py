@@ -71,8 +71,9 @@ class FingerExploration(Transform):  # type: ignore[misc]
     """In some episodes a group of fingers holds a random target for a few steps instead of what the policy says.
 
     In others a hand-crafted gait acts. Adds "exploring" (1), constant in an episode, so that statistics can leave such
-    episodes out, and "action_taken" (12), the action after this transform: the one that a replay must store. Draws from
-    torch's global generator, the same number of draws at every step.
+    episodes out, "demonstrated" (1), true after a step in which a gait acted, and "action_taken" (12), the action after
+    this transform: the one that a replay must store. Draws from torch's global generator, the same number of draws at
+    every step.
 
     Example:
         >>> env = TransformedEnv(worlds, FingerExploration(Exploration(episodes=0.3)))
@@ -80,10 +81,10 @@ class FingerExploration(Transform):  # type: ignore[misc]
 
     def __init__(self, exploration: Exploration, gaits: Tensor | None = None) -> None:
         """Explores as `exploration` says; `gaits` (gaits, steps, 12) are what demonstrations play."""
-        super().__init__(out_keys=["exploring", "action_taken"])
+        super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
         self._gaits = torch.zeros(1, 1, 12) if gaits is None else gaits
-        self._exploring = self._demonstrating = self._held = torch.zeros(0)
+        self._exploring = self._demonstrating = self._demonstrated = self._held = torch.zeros(0)
         self._gait = self._clock = self._target = self._fingers = self._taken = torch.zeros(0)
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
@@ -92,6 +93,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         if self._exploring.shape != mask.shape:
             self._exploring = torch.zeros_like(mask)
             self._demonstrating = torch.zeros_like(mask)
+            self._demonstrated = torch.zeros_like(mask)
             self._held = torch.zeros_like(mask, dtype=torch.int64)
             self._gait = torch.zeros_like(mask, dtype=torch.int64)
             self._clock = torch.zeros_like(mask, dtype=torch.int64)
@@ -105,6 +107,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         self._gait = torch.where(mask, torch.randint(len(self._gaits), mask.shape), self._gait)
         self._clock = self._clock.masked_fill(mask, 0)
         self._held = self._held.masked_fill(mask, 0)
+        self._demonstrated = self._demonstrated & ~mask
         self._taken = self._taken.masked_fill(mask, 0.0)
         return self._call(tensordict_reset)
 
@@ -115,6 +118,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         usual = torch.where(self._demonstrating, gait.clamp(-1.0, 1.0), policy)
         instead = torch.where(self._demonstrating, policy, torch.where(self._fingers, self._target, policy))
         self._taken = torch.where(self._held > 0, instead, usual)
+        self._demonstrated = self._demonstrating & (self._held == 0)
         self._held = (self._held - 1).clamp_min(0)
         self._clock = (self._clock + 1).clamp_max(self._gaits.shape[1] - 1)
         return tensordict.set("action", self._taken)
@@ -131,11 +135,13 @@ class FingerExploration(Transform):  # type: ignore[misc]
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
         next_tensordict.set("exploring", self._exploring)
+        next_tensordict.set("demonstrated", self._demonstrated)
         return next_tensordict.set("action_taken", self._taken)
 
     def transform_observation_spec(self, observation_spec: Composite) -> Composite:
-        """Adds the two keys."""
+        """Adds the three keys."""
         worlds = observation_spec.shape
         observation_spec["exploring"] = Categorical(2, shape=(*worlds, 1), dtype=torch.bool)
+        observation_spec["demonstrated"] = Categorical(2, shape=(*worlds, 1), dtype=torch.bool)
         observation_spec["action_taken"] = Unbounded((*worlds, 12))
         return observation_spec
