@@ -26,8 +26,8 @@ class Batch:
     """Replayed transitions, all float32 of shape (batch, width).
 
     `reward` sums `steps` discounted rewards, after which `next_observation` was reached. `terminated` is 1 where the
-    episode ended for good; a time limit is no such end, so there the value of the last state still counts. `demonstrated`
-    is 1 where a hand-crafted gait chose the action.
+    episode ended for good; a time limit is no such end, so there the value of the last state still counts.
+    `demonstrated` is 1 where a hand-crafted gait chose the action.
     """
 
     observation: Tensor

@@ -22,8 +22,8 @@ class AgentSettings(BaseModel):
         alpha_init: temperature at the start.
         target_entropy: entropy [nat] the temperature is tuned towards.
         n_step: rewards summed before bootstrapping.
-        demonstration_weight: of imitating a demonstrated action where the critics hold it for better than the actor's own
-            (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone, more is for `sac_fast` only.
+        demonstration_weight: of imitating a demonstrated action where the critics hold it for better than the actor's
+            own (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone, more is for `sac_fast`.
         batch_size: replayed transitions an update.
         precision: arithmetic of the matrix products; bf16 is for `sac_fast` only.
         device: "cpu", "cuda" or "cuda:0"; collection stays on the CPU.
