@@ -16,6 +16,7 @@ from tactile_cube.training.checkpoint import FILE, load_checkpoint, require_same
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
+from tactile_cube.training.folder_lock import lock_folder
 from tactile_cube.training.heap import keep_freed_memory
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import Loggers, MetricLogger
@@ -50,9 +51,11 @@ def build_run(
         config: the resolved configuration, as plain data.
 
     Raises:
-        InputError: a checkpoint that is damaged or made with other settings, an unusable `init_from`.
+        InputError: another process trains in the folder, a checkpoint that is damaged or made with other settings, an
+            unusable `init_from`.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    lock = lock_folder(folder)
     keep_freed_memory()
     torch.set_num_threads(training.threads)
     torch.manual_seed(seed)
@@ -77,7 +80,7 @@ def build_run(
         processes = 1 if in_process else collector.workers + 1
         ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
         made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
-        run = Run(learner, folder, config, Loggers(made), ledger)
+        run = Run(learner, folder, config, Loggers(made), ledger, lock)
     except BaseException:
         collection.close()  # worker processes would keep the program from ending
         raise

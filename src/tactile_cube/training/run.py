@@ -10,6 +10,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from filelock import BaseFileLock
+
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
 from tactile_cube.training.checkpoint import save_checkpoint
 from tactile_cube.training.ledger import Ledger
@@ -31,6 +33,7 @@ class Run:
         config: resolved configuration, kept in checkpoints and policy files.
         loggers: where metrics go.
         ledger: what it costs.
+        lock: keeps other processes out of the folder.
     """
 
     learner: Learner
@@ -38,6 +41,7 @@ class Run:
     config: dict[str, Any]
     loggers: Loggers
     ledger: Ledger
+    lock: BaseFileLock
 
     def __post_init__(self) -> None:
         """A session begins."""
@@ -85,6 +89,7 @@ class Run:
         self.ledger.write(self.learner.steps)  # first: the workers take their CPU time with them
         self.learner.collection.close()
         self.loggers.close()
+        self.lock.release()
 
     def _after_iteration(self) -> None:
         learner = self.learner
