@@ -31,12 +31,16 @@ def test_proximal_term_sums_the_fourth_power_of_each_fingers_first_joint() -> No
     assert terms.proximal(angles.tolist()) == pytest.approx(0.1**4 + 0.2**4 + 0.3**4)
 
 
+def test_off_centre_is_the_squared_horizontal_distance_from_the_start() -> None:
+    assert terms.off_centre(STILL._replace(x=0.1), STILL._replace(x=0.13, y=-0.04, z=0.5)) == pytest.approx(0.0025)
+
+
 def test_published_weights_and_their_signs() -> None:
-    assert Reward().weights().tolist() == [16, -100, -300, -50, -25, -10]
+    assert Reward().weights().tolist() == [16, -100, -300, -50, -25, 0, -10]
 
 
 def test_penalty_scale_changes_the_motion_weights_only() -> None:
-    ratio = Reward().weights(0.2) / Reward().weights(1.0)
+    ratio = Reward(off_centre=1.0).weights(0.2) / Reward(off_centre=1.0).weights(1.0)
     scaled = {name for name, r in zip(REWARD_TERMS, ratio, strict=True) if r != 1.0}
     assert scaled == {"height", "plane", "tilt"}
     assert ratio[1:4] == pytest.approx([0.2] * 3)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tactile_cube.env.cube_pose import CubePose
 from tactile_cube.errors import InputError
 
-REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "leaving")
+REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "off_centre", "leaving")
 """Names and order of the terms in the key "reward_terms"."""
 
 
@@ -45,6 +45,14 @@ def proximal(joint_angles: Sequence[float]) -> float:
     return sum(q**4 for q in joint_angles[::3])
 
 
+def off_centre(first: CubePose, after: CubePose) -> float:
+    """Squared horizontal distance from where the episode began [m^2]. Not in the paper.
+
+    A cube that is dragged aside is lost some twenty steps later, beyond what the discount lets the agent foresee.
+    """
+    return (after.x - first.x) ** 2 + (after.y - first.y) ** 2
+
+
 def leaving(lost: bool) -> float:
     """1 in the step that ends the episode because the cube was lost, else 0."""
     return float(lost)
@@ -60,6 +68,7 @@ class Reward:
         plane: lambda_plane [1/m].
         tilt: lambda_rot [1/rad].
         proximal: lambda_proxy [1/rad^4].
+        off_centre: penalty for a cube away from where it began [1/m^2]; 0 in the paper.
         leaving: penalty for losing the cube (size not published). Must exceed what going on costs, or dropping pays.
         fastest: rotation above this rate earns nothing more [rad/s].
     """
@@ -69,6 +78,7 @@ class Reward:
     plane: float = 300.0
     tilt: float = 50.0
     proximal: float = 25.0
+    off_centre: float = 0.0
     leaving: float = 10.0
     fastest: float = 1.0
 
@@ -81,10 +91,10 @@ class Reward:
                 )
 
     def weights(self, penalty_scale: float = 1.0) -> NDArray[np.float32]:
-        """Signed weights (6,) in the order of REWARD_TERMS: reward = reward_terms @ weights.
+        """Signed weights (7,) in the order of REWARD_TERMS: reward = reward_terms @ weights.
 
         Args:
             penalty_scale: factor on height, plane and tilt, from the curriculum.
         """
         motion = [-penalty_scale * w for w in (self.height, self.plane, self.tilt)]
-        return np.array([self.spin, *motion, -self.proximal, -self.leaving], dtype=np.float32)
+        return np.array([self.spin, *motion, -self.proximal, -self.off_centre, -self.leaving], dtype=np.float32)

@@ -35,7 +35,7 @@ class Moment:
         object_state: what only the critic may see `(25,)`: cube position (3) [m], sin 4theta, cos 4theta, phi, psi,
             linear velocity (3) [m/s], angular velocity (3) [rad/s], q_f (12) [rad]. Source: paper, section II.
         theta: rotation since the start in the rewarded direction, unwrapped [rad].
-        reward_terms: the terms before weighing, in the order of REWARD_TERMS `(6,)`.
+        reward_terms: the terms before weighing, in the order of REWARD_TERMS `(7,)`.
         reward: their weighted sum.
         outcome: index into OUTCOMES; anything but 0 ends the episode.
         step: policy steps since the start.
@@ -161,6 +161,7 @@ class RotationEnv:
                 terms.plane(before, after),
                 terms.tilt(before, after),
                 terms.proximal(self.world.q.tolist()),
+                terms.off_centre(self._first, after),
                 terms.leaving(outcome in LOST),
             )
         )

@@ -16,20 +16,23 @@ from tactile_cube.measurement.recording import Recording
 
 EFFECT = "position_offset"
 LEAST = 0.012  # [rad] joint offsets below this are ordinary
-OVER_SCATTER = 2.5  # mean offset over the scatter between initialisations that makes it a shared one
+UNLIKELY = 0.01  # probability, over all joints, of such offsets by initialising alone at which they are still ordinary
 
 
 def shared_offset(base: Explanation, fitted: Recording, effects: Sequence[type[Effect]]) -> Explanation | None:
     """The base model with the offsets that all initialisations share as an effect; None if there are none.
 
-    A joint offset that differs between initialisations is what initialising does, and no error of the model.
+    A joint offset that differs between initialisations is what initialising does, and no error of the model. Two or
+    three initialisations whose offsets happen to be alike are no evidence either: Student's t decides.
     """
     effect = next((effect for effect in effects if effect.name == EFFECT), None)
     offsets = -np.array([base.judgement.model.posture[k] for k in sorted(base.judgement.model.posture)])
     if effect is None or len(offsets) < 2:
         return None
     mean, scatter = offsets.mean(axis=0), offsets.std(axis=0, ddof=1)
-    shared = (np.abs(mean) > LEAST) & (np.abs(mean) > OVER_SCATTER * scatter)
+    ratio = np.abs(mean) / np.maximum(scatter, 1e-9) * np.sqrt(len(offsets))
+    by_chance = np.minimum(1.0, 2.0 * student_t.sf(ratio, len(offsets) - 1) * len(mean))
+    shared = (np.abs(mean) > LEAST) & (by_chance < UNLIKELY)
     if not shared.any():
         return None
     places = np.flatnonzero(shared)
@@ -37,8 +40,6 @@ def shared_offset(base: Explanation, fitted: Recording, effects: Sequence[type[E
     terms = tuple(Term(effect, fitted.joints[j], {"offset": float(mean[j])}, ("offset",)) for j in places)
     posture = {key: value + np.where(shared, mean, 0.0) for key, value in base.fit.model.posture.items()}
     model = Model(base.fit.model.constants, (*base.fit.model.terms, *terms), posture)
-    ratio = np.abs(mean[shared]) / np.maximum(scatter[shared], 1e-9) * np.sqrt(len(offsets))
-    likely = float(2.0 * student_t.sf(ratio.min(), len(offsets) - 1))
     candidate = Candidate(effect, joints, {"offset": float(np.abs(mean[shared]).max())})
     fit = replace(base.fit, model=model)
-    return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=min(1.0, likely))
+    return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=float(by_chance[shared].max()))
