@@ -64,6 +64,14 @@ def test_a_richer_effect_that_does_no_better_is_no_rival() -> None:
     assert verdict.chosen.effects[0].effect.name == "coulomb_friction"
 
 
+def test_a_richer_effect_is_a_rival_only_if_it_does_noticeably_better() -> None:
+    coulomb = explanation("coulomb_friction", 1.03)
+    a_little = replace(
+        explanation("stribeck_friction", 1.02), judgement=replace(judged(1.03), costs=judged(1.02).costs)
+    )
+    assert decide(findings(20.0, coulomb, a_little)).kind == "missing_effect"
+
+
 def test_an_effect_that_leaves_much_unexplained_is_not_named() -> None:
     assert decide(findings(20.0, explanation("backlash", 9.0))).kind == "unknown_effect"
 
@@ -79,6 +87,14 @@ def test_a_further_effect_needs_a_real_part_of_the_error() -> None:
     completing = replace(explanation("torque_bias", 1.05), gain=0.7)
     assert not worthwhile(tiny, first, base)
     assert worthwhile(completing, first, base)
+
+
+def test_a_second_effect_that_a_large_remainder_needs_is_no_detail_of_the_first() -> None:
+    base = Explanation((), FIT, judged(300.0), 1.0, 0.0)
+    stop, small = explanation("joint_stop", 14.0), explanation("joint_stop", 3.5)
+    assert worthwhile(replace(explanation("stribeck_friction", 2.5), gain=0.97), stop, base)
+    assert not worthwhile(replace(explanation("stribeck_friction", 8.0), gain=0.7), stop, base)
+    assert not worthwhile(replace(explanation("stribeck_friction", 1.3), gain=0.9), small, base)
 
 
 @pytest.mark.parametrize(("better", "significant"), [(0.9, True), (1.0, False)])

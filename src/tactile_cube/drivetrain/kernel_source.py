@@ -62,9 +62,10 @@ def _constants(topology: Topology, layout: MemoryLayout) -> str:
 
 def _laws(effects: Sequence[type[Effect]]) -> str:
     return "\n".join(
-        f'law_{index} = inner(import_module("{effect.__module__}").{effect.__qualname__}.law)'
+        f'{law}_{index} = inner(import_module("{effect.__module__}").{effect.__qualname__}.{law})'
         for index, effect in enumerate(effects)
-        if effect.stage is not Stage.MECHANISM
+        for law in ("law", "torque_law")
+        if (effect.stage is not Stage.MECHANISM if law == "law" else effect.acts_on_torque)
     )
 
 
@@ -73,6 +74,8 @@ def _stage_source(stage: Stage, effects: Sequence[type[Effect]], layout: MemoryL
     for index, effect in enumerate(effects):
         if effect.stage is stage:
             lines += _effect_lines(index, effect, layout)
+        if stage is Stage.MOTOR_TORQUE and effect.acts_on_torque:
+            lines += _effect_lines(index, effect, layout, "torque_law", Stage.MOTOR_TORQUE)
     return "\n".join([*lines, "    return", ""])
 
 
@@ -85,7 +88,9 @@ def _ahead_source(effects: Sequence[type[Effect]], layout: MemoryLayout) -> str:
     return "\n".join([*lines, "    return", ""])
 
 
-def _effect_lines(index: int, effect: type[Effect], layout: MemoryLayout) -> list[str]:
+def _effect_lines(
+    index: int, effect: type[Effect], layout: MemoryLayout, law: str = "law", stage: Stage | None = None
+) -> list[str]:
     active, parameters = (layout.entries[f"{part}:{effect.name}"][0] for part in ("active", "parameters"))
     count = len(effect.parameters)
     return [
@@ -95,10 +100,5 @@ def _effect_lines(index: int, effect: type[Effect], layout: MemoryLayout) -> lis
         f"            size = int(memory[STATE_SIZE + {index}])",
         f"            start = int(memory[STATE_OFFSET + {index}]) + a * size",
         f"            p = memory[{parameters} + a * {count} : {parameters} + (a + 1) * {count}]",
-        f"            x[{stage_row(effect)}, j] = law_{index}(x, j, p, memory[start : start + size], dt)",
+        f"            x[{(stage or effect.stage).value}, j] = {law}_{index}(x, j, p, memory[start : start + size], dt)",
     ]
-
-
-def stage_row(effect: type[Effect]) -> int:
-    """The row of the signals that an effect's law returns anew."""
-    return int(effect.stage.value)

@@ -14,6 +14,8 @@ from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
 EffectClass = type[Effect]
+MOST_SHOWN = 4  # fitted parameters that a label lists
+DEAD = 0.1  # part of the usual torque at which a dead zone of the torque starts
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Candidate:
     @property
     def label(self) -> str:
         """Readable and unique: `backlash(play)@q2`."""
-        return f"{self.effect.name}({', '.join(self.form)})@{'+'.join(self.joints)}"
+        fitted = ", ".join(self.form) if len(self.form) <= MOST_SHOWN else f"{len(self.form)} values"
+        return f"{self.effect.name}({fitted})@{'+'.join(self.joints)}"
 
     @property
     def size(self) -> int:
@@ -116,6 +119,8 @@ def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[s
     span = seen.high - seen.low
     if name == "torque_saturation":
         return [{"limit": float(level)} for level in seen.torque]
+    if name == "command_dead_zone" and "torque" in form:
+        return [{"torque": DEAD * float(seen.torque[0])}]
     if name == "rate_limit":
         return [{"speed": share * seen.command_speed} for share in (0.8, 0.4, 0.15)]
     if name == "joint_stop":

@@ -42,7 +42,8 @@ def start_of(
     place = np.clip(np.searchsorted(edges, position) - 1, 0, BINS - 1)
     count = np.bincount(place, minlength=BINS)
     mean = np.bincount(place, missing.torque, minlength=BINS) / np.maximum(count, 1)
-    basis = np.array([_profile(effect, {name: 1.0, "first": low, "last": high}, edges) for name in form]).T
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    basis = np.array([profile_of(effect, {name: 1.0, "first": low, "last": high}, middles) for name in form]).T
     weight = count / max(count.sum(), 1)
     bend = np.diff(np.eye(len(form)), n=3, axis=0)
     normal = basis.T @ (weight[:, None] * basis) + SMOOTH / len(form) * bend.T @ bend
@@ -50,12 +51,12 @@ def start_of(
     return {name: float(value) for name, value in zip(form, found, strict=True)}
 
 
-def _profile(effect: type[Effect], values: Mapping[str, float], edges: Array) -> Array:
-    """Torque (BINS,) of an effect with these values, all others neutral, in the middle of each bin [N m]."""
+def profile_of(effect: type[Effect], values: Mapping[str, float], angles: Array) -> Array:
+    """Torque (N,) of an effect with these values, all others neutral, at each angle [N m]."""
     known = np.array([values.get(p.name, p.neutral) for p in effect.parameters])
     x = np.zeros((ROWS, 1))
     torques = []
-    for angle in 0.5 * (edges[1:] + edges[:-1]):
+    for angle in angles:
         x[ANGLE, 0], x[JOINT_TORQUE, 0] = angle, 0.0
         torques.append(effect.law(x, 0, known, np.zeros(0), 1.0))
     return np.array(torques)

@@ -20,10 +20,15 @@ from tactile_cube.identification.residual_starts import residual_candidates
 from tactile_cube.identification.screening import Score, screen
 from tactile_cube.identification.shared_offset import shared_offset
 from tactile_cube.identification.shooting import Shooting
+from tactile_cube.identification.special_laws import special_candidates
 from tactile_cube.identification.stretches import Stretches, cut
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
+FAR_FROM_FLOOR, NEARLY_ALL = (
+    4.0,
+    0.9,
+)  # error of an explanation that is none, share that a further effect then has to do
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
 SIGNIFICANT = 0.01  # after Holm's correction
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
@@ -132,21 +137,33 @@ class Search:
         self.last_scores = screen(self.problem, frozen, wanted, [placed(c, self.fitted) for c in wanted])
         chosen = with_groups(self.last_scores)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
-        raced = self.race(frozen, chosen)
-        return [self.finish(parent, candidate, fitted) for candidate, fitted in raced[:FINALISTS]]
+        raced = self.race(frozen, chosen)[:FINALISTS]
+        special = [one for pair in raced for one in self.special(frozen, *pair)]
+        return [self.finish(parent, candidate, fitted) for candidate, fitted in (*raced, *special)]
+
+    def special(self, frozen: Fit, candidate: Candidate, fitted: Fit) -> list[tuple[Candidate, Fit]]:
+        """Simpler laws that a fitted profile looks like, fitted, but for those that stay far behind it."""
+        wanted = special_candidates(candidate, fitted.model.terms[-1], self.effects)
+        tried = [self.refit(frozen, one, LONG) for one in wanted]
+        self.tell(tried)
+        return [pair for pair in tried if pair[1].cost <= FAR_BEHIND * fitted.cost]
 
     def race(self, frozen: Fit, chosen: Sequence[Candidate]) -> list[tuple[Candidate, Fit]]:
         """Refit briefly, then the leaders at length; those that stay far behind drop out. Best first."""
         brief = sorted((self.refit(frozen, candidate, BRIEF) for candidate in chosen), key=lambda pair: pair[1].cost)
         leaders = [(c, self.continued(frozen, f)) for c, f in brief[:RACED]]
         leaders.sort(key=lambda pair: pair[1].cost)
-        for candidate, fitted in leaders:
-            self.say(f"  {np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)):8.3f}  {candidate.label}")
+        self.tell(leaders)
         if not leaders:
             return []
         best = leaders[0][1].cost
         at_floor = best < NEARLY**2 * np.count_nonzero(self.problem.weight)
         return [pair for pair in leaders if pair[1].cost <= (FAR_BEHIND_AT_FLOOR if at_floor else FAR_BEHIND) * best]
+
+    def tell(self, refitted: Sequence[tuple[Candidate, Fit]]) -> None:
+        """Show the fitted errors in units of the sensor noise."""
+        for candidate, fitted in refitted:
+            self.say(f"  {np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)):8.3f}  {candidate.label}")
 
     def continued(self, frozen: Fit, fitted: Fit) -> Fit:
         """The same fit for longer."""
@@ -198,13 +215,16 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation)
     """Whether an effect earns its place.
 
     Significantly, and by more than a few per cent; a further effect has to complete the explanation, or to do most of
-    what is left while that is a real part of the whole.
+    what is left while that is a real part of the whole, or so much that it cannot be a detail of the effect before.
     """
     if explanation.gain < SMALLEST_GAIN or explanation.p_value > SIGNIFICANT:
         return False
     if not parent.effects or explanation.error <= FLOOR:
         return True
-    return parent.explained(base) < REAL_PART and explanation.explained(parent) > COMPLETED
+    share = explanation.explained(parent)
+    if parent.explained(base) < REAL_PART:
+        return share > COMPLETED
+    return parent.error > FAR_FROM_FLOOR and share > NEARLY_ALL
 
 
 def without_effect(explanation: Explanation, place: int) -> Model:

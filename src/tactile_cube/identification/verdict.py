@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from tactile_cube.identification.evidence import p_value, worse
+from tactile_cube.identification.evidence import gain, p_value, worse
 from tactile_cube.identification.explanation import Explanation
-from tactile_cube.identification.search import Findings
+from tactile_cube.identification.search import SMALLEST_GAIN, Findings
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete
@@ -59,10 +59,17 @@ def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Expl
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
         if len(named(other)) > len(named(chosen)) or named(other) == named(chosen):
             continue
-        earned = other.size <= chosen.size or p_value(chosen.judgement, other.judgement) < LIKELY
-        if earned and not worse(other.judgement, chosen.judgement):
+        if (other.size <= chosen.size or _richer_earned(other, chosen)) and not worse(
+            other.judgement, chosen.judgement
+        ):
             rivals.setdefault(named(other), other)
     return tuple(rivals.values())
+
+
+def _richer_earned(other: Explanation, chosen: Explanation) -> bool:
+    """Whether more numbers than the chosen one has pay: a law that contains another always fits a little better."""
+    better = gain(chosen.judgement, other.judgement) > SMALLEST_GAIN
+    return better and p_value(chosen.judgement, other.judgement) < LIKELY
 
 
 def named(explanation: Explanation) -> frozenset[tuple[str, str]]:

@@ -62,6 +62,8 @@ def run(effect: type[Effect], values: dict[str, float]) -> tuple[np.ndarray, np.
         x = signals(seed)
         before.append(x[effect.stage.value, 1])
         x[effect.stage.value, 1] = effect.law(x, 1, p, s, DT)
+        if effect.acts_on_torque:
+            x[12, 1] += effect.torque_law(x, 1, p, s, DT) - x[9, 1]
         after.append(x[[effect.stage.value, 12], 1].sum())
         before[-1] += signals(seed)[12, 1] if effect.stage.value != 12 else before[-1]
         if effect.stage.value == 12:

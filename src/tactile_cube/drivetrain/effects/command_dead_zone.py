@@ -1,25 +1,28 @@
 """A command that is ignored while it asks for little."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, VELOCITY
+from tactile_cube.drivetrain.signals import COMMAND, DAMPING, MOTOR_POSITION, TORQUE, VELOCITY
 
 
 class CommandDeadZone(Effect):
-    """Dead zones in the four forms that drives have.
+    """Dead zones in the five forms that drives have.
 
     error: control errors below it are ignored, larger ones reduced by it. gate: control errors below it are
     ignored, larger ones act in full. hold: a new command is taken only when it differs by more than this from the
-    one in force. play: the command in force trails the sent one by this.
+    one in force. play: the command in force trails the sent one by this. torque: commanded torques below it are
+    ignored, larger ones reduced by it.
     Source: dead bands of servo drives; Tao and Kokotovic, Adaptive control with actuator nonlinearities, 1996.
     """
 
     name = "command_dead_zone"
     stage = Stage.COMMAND
+    acts_on_torque = True
     parameters = (
         Parameter("error", unit="rad", neutral=0.0, low=0.0, high=0.2, typical=0.005, source="0.1-1 deg"),
         Parameter("gate", unit="rad", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="0.1-1 deg"),
         Parameter("hold", unit="rad", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="0.1-1 deg"),
         Parameter("play", unit="rad", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="0.1-1 deg"),
+        Parameter("torque", unit="N m", neutral=0.0, low=0.0, high=1.0, typical=0.0, source="1-10 % of the rating"),
     )
 
     forms = (
@@ -27,6 +30,7 @@ class CommandDeadZone(Effect):
         {"gate": 0.005},
         {"hold": 0.005},
         {"play": 0.005},
+        {"torque": 0.01},
     )
 
     @classmethod
@@ -54,3 +58,10 @@ class CommandDeadZone(Effect):
         if p[0] > 0.0:
             return command - min(max(difference, -p[0]), p[0])
         return command
+
+    @staticmethod
+    def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Motor torque [N m]."""
+        if abs(x[TORQUE, j]) < p[4]:
+            x[DAMPING, j] = 0.0
+        return x[TORQUE, j] - min(max(x[TORQUE, j], -p[4]), p[4])

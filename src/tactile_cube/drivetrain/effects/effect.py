@@ -100,6 +100,8 @@ class Effect:
 
     Empty: one form, all parameters at their typical values.
     """
+    acts_on_torque: ClassVar[bool] = False
+    """Whether the effect has a `torque_law` beside its `law`."""
 
     def __init__(self, joint: str, **values: float) -> None:
         """Place the effect on `joint`; parameters not given take their typical value.
@@ -132,6 +134,11 @@ class Effect:
             s: (state_size,) the law's own memory, to be changed in place.
             dt: step [s].
         """
+        raise NotImplementedError
+
+    @staticmethod
+    def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """The new motor torque of joint j [N m], for effects that act there too; arguments as of `law`."""
         raise NotImplementedError
 
     @staticmethod
