@@ -144,7 +144,9 @@ class Search:
     def special(self, frozen: Fit, candidate: Candidate, fitted: Fit) -> list[tuple[Candidate, Fit]]:
         """Simpler laws that a fitted profile looks like, fitted, but for those that stay far behind it."""
         wanted = special_candidates(candidate, fitted.model.terms[-1], self.effects)
-        tried = [self.refit(frozen, one, LONG) for one in wanted]
+        # beside the joint offsets and constants that were fitted together with the profile
+        before = replace(fitted.model, terms=fitted.model.terms[:-1])
+        tried = [self.refit(frozen, one, LONG, before) for one in wanted]
         self.tell(tried)
         return [pair for pair in tried if pair[1].cost <= FAR_BEHIND * fitted.cost]
 
@@ -175,9 +177,11 @@ class Search:
         prediction, columns = self.problem.columns(fitted.model, fitted.unknowns)
         return renewed(self.problem, fitted, prediction, columns)
 
-    def refit(self, frozen: Fit, candidate: Candidate, iterations: int = 6) -> tuple[Candidate, Fit]:
-        """Fit a candidate's numbers beside the frozen columns of its parent."""
-        model, unknowns = candidate.added_to(frozen.model, placed(candidate, self.fitted))
+    def refit(
+        self, frozen: Fit, candidate: Candidate, iterations: int = 6, model: Model | None = None
+    ) -> tuple[Candidate, Fit]:
+        """Fit a candidate's numbers beside the frozen columns of its parent, started from `model` or the parent's."""
+        model, unknowns = candidate.added_to(model or frozen.model, placed(candidate, self.fitted))
         return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
 
     def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit) -> Explanation:
