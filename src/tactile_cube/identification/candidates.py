@@ -15,7 +15,7 @@ from tactile_cube.measurement.recording import Recording
 Array = NDArray[np.float64]
 EffectClass = type[Effect]
 MOST_SHOWN = 4  # fitted parameters that a label lists
-DEAD = 0.1  # part of the usual torque at which a dead zone of the torque starts
+DEAD = (0.1, 0.4)  # parts of the usual torque at which a dead zone of the torque starts
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ class Candidate:
 
 
 def term_unknowns(term: Term, place: int, form: Mapping[str, float]) -> tuple[Unknown, ...]:
-    """The unknowns of a term; the size of its start is the scale of each."""
+    """The unknowns of a term; where a parameter does not say otherwise, the size of its start is the scale."""
     parameters = {p.name: p for p in term.effect.parameters}
     sizes = {name: abs(form.get(name, 0.0)) or abs(parameters[name].typical) for name in term.fitted}
     fallback = max([size for size in sizes.values() if size > 0.0], default=1.0)
     return tuple(
-        Unknown("effect", name, place, parameters[name].low, parameters[name].high, sizes[name] or fallback)
-        for name in term.fitted
+        Unknown("effect", name, place, p.low, p.high, p.scale or sizes[name] or fallback)
+        for name, p in ((name, parameters[name]) for name in term.fitted)
     )
 
 
@@ -120,7 +120,7 @@ def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[s
     if name == "torque_saturation":
         return [{"limit": float(level)} for level in seen.torque]
     if name == "command_dead_zone" and "torque" in form:
-        return [{"torque": DEAD * float(seen.torque[0])}]
+        return [{"torque": share * float(seen.torque[0])} for share in DEAD]
     if name == "rate_limit":
         return [{"speed": share * seen.command_speed} for share in (0.8, 0.4, 0.15)]
     if name == "joint_stop":

@@ -13,6 +13,9 @@ from tactile_cube.identification.problem import Problem
 
 Array = NDArray[np.float64]
 CONVERGED = 2e-3  # relative gain below which a fit ends
+SHORTER = (
+    6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many
+)
 CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
 
@@ -52,7 +55,7 @@ def fit(
         problem: the stretches to fit.
         model: where to start.
         unknowns: what to fit; with `frozen`, beside its unknowns.
-        iterations: most steps that are tried.
+        iterations: most steps that are taken.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
     """
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
@@ -60,10 +63,13 @@ def fit(
     damping = 1e-4
     for _ in range(iterations):
         weight = temper(problem, best.cost)
-        tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
-        if tried.cost + weight * tried.surprise >= best.cost + weight * best.surprise:
+        for _ in range(SHORTER):
+            tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
+            if tried.cost + weight * tried.surprise < best.cost + weight * best.surprise:
+                break
             damping *= 10.0
-            continue
+        else:
+            return best  # no step is too short to fail where a fit has converged
         gain = (best.cost - tried.cost) / max(best.cost, 1e-9)
         damping *= 0.3
         best = tried

@@ -39,6 +39,12 @@ def periodic_candidates(
     return found
 
 
+def waves_of(form: Mapping[str, float]) -> tuple[str, str]:
+    """The parameters of a periodic form that multiply its sine and its cosine: the first two beside the harmonic."""
+    first, second = [name for name in form if name != HARMONIC][:2]
+    return first, second
+
+
 def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) -> list[Mapping[str, float]]:
     """The form at each strong harmonic, with the phase that the missing torque has there.
 
@@ -51,13 +57,14 @@ def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) 
     speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
     weight = np.ones_like(position) if damping is None else speed
     starts: list[Mapping[str, float]] = []
+    first, second = waves_of(form)
     for harmonic, sine, cosine in peaks(position, missing.torque, weight, missing.initialisation):
         if damping is not None:  # damping * d/dt (a sin + b cos) = damping * n v (a cos - b sin)
             sine, cosine = cosine / (damping * harmonic), -sine / (damping * harmonic)
-        size = max(abs(form["sine"]), 1e-9)
+        size = max(abs(form[first]), 1e-9)
         known = max(np.hypot(sine, cosine), 0.1 * size)
         angle = np.arctan2(cosine, sine)
-        starts.append({**form, "sine": known * np.cos(angle), "cosine": known * np.sin(angle), HARMONIC: harmonic})
+        starts.append({**form, first: known * np.cos(angle), second: known * np.sin(angle), HARMONIC: harmonic})
     return starts
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.identification.candidates import Candidate, forms
 from tactile_cube.identification.model import Term
-from tactile_cube.identification.periodicity import HARMONIC, LOWEST
+from tactile_cube.identification.periodicity import HARMONIC, LOWEST, waves_of
 from tactile_cube.identification.position_profile import PROFILE, profile_of
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def special_candidates(candidate: Candidate, term: Term, effects: Sequence[type[
     found = []
     for effect in effects:
         for form in forms(effect):
-            if HARMONIC in form and effect.stage is Stage.MOTOR_TORQUE:
+            if HARMONIC in form and effect.stage is not Stage.POSITION_SENSOR:
                 starts = _ripples(angles, torques, form, FINEST * np.pi / spacing)
             elif "stiffness" in form and ("upper" in form or "lower" in form):
                 starts = _stops(angles, torques, form, "upper" if "upper" in form else "lower")
@@ -52,11 +52,12 @@ def special_candidates(candidate: Candidate, term: Term, effects: Sequence[type[
 def _ripples(angles: Array, torques: Array, form: Mapping[str, float], finest: float) -> list[Mapping[str, float]]:
     """The form at the harmonic that explains the profile best, besides a constant and a slope."""
     slow = np.vander(angles - angles.mean(), 2)
+    first, second = waves_of(form)
     trials = []
     for harmonic in np.arange(LOWEST, finest, 0.2 / (angles[-1] - angles[0])):
         waves = np.column_stack([np.sin(harmonic * angles), np.cos(harmonic * angles), slow])
         numbers, share = _explained(waves, torques, slow)
-        trials.append((share, {**form, "sine": numbers[0], "cosine": numbers[1], HARMONIC: float(harmonic)}))
+        trials.append((share, {**form, first: numbers[0], second: numbers[1], HARMONIC: float(harmonic)}))
     return _best(trials)
 
 

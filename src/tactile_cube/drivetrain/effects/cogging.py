@@ -3,29 +3,51 @@
 from math import cos, sin
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import ANGLE, TORQUE
+from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, TORQUE
+
+RIPPLE = "1-5 % of the rating"
 
 
 class Cogging(Effect):
-    """tau += sine * sin(harmonic q) + cosine * cos(harmonic q).
+    """tau += sine * sin(harmonic q) + cosine * cos(harmonic q) in the motor, or the same at the joint.
 
+    A ripple of the motor also bends the drive's elasticity; one of a gear's last stage or a bearing does not.
     Source: Holtz and Springob, Identification and compensation of torque ripple, 1996.
     """
 
     name = "cogging"
-    stage = Stage.MOTOR_TORQUE
+    stage = Stage.JOINT_TORQUE
+    acts_on_torque = True
     parameters = (
-        Parameter("sine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.01, source="1-5 % of the rating"),
-        Parameter("cosine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source="1-5 % of the rating"),
+        Parameter("sine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.01, source=RIPPLE),
+        Parameter("cosine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
         Parameter(
-            "harmonic", unit="1/rad", neutral=10.0, low=1.0, high=250.0, typical=10.0, source="poles times gear ratio"
+            "harmonic",
+            unit="1/rad",
+            neutral=10.0,
+            low=1.0,
+            high=250.0,
+            typical=10.0,
+            source="poles times gear ratio",
+            scale=0.5,  # moves a ripple by a fraction of its period at the end of the range
         ),
+        Parameter("joint_sine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
+        Parameter("joint_cosine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
     )
 
-    forms = ({"sine": 0.01, "cosine": 0.0, "harmonic": 10.0},)
+    forms = (
+        {"sine": 0.01, "cosine": 0.0, "harmonic": 10.0},
+        {"joint_sine": 0.01, "joint_cosine": 0.0, "harmonic": 10.0},
+    )
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Joint torque [N m]."""
+        angle = p[2] * x[ANGLE, j]
+        return x[JOINT_TORQUE, j] + p[3] * sin(angle) + p[4] * cos(angle)
+
+    @staticmethod
+    def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Motor torque [N m]."""
         angle = p[2] * x[ANGLE, j]
         return x[TORQUE, j] + p[0] * sin(angle) + p[1] * cos(angle)

@@ -43,6 +43,7 @@ class Parameter:
         high: largest.
         typical: a usual size, where a search starts.
         source: where the figures come from.
+        scale: size of a noticeable change; None: as large as the value a search starts from.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Parameter:
     high: float
     typical: float
     source: str
+    scale: float | None = None
 
 
 @dataclass(frozen=True)

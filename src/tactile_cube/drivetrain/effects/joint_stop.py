@@ -21,6 +21,7 @@ class JointStop(Effect):
             high=1e9,
             typical=1.0,
             source="within the range of motion",
+            scale=0.05,
         ),
         Parameter(
             "lower",
@@ -30,6 +31,7 @@ class JointStop(Effect):
             high=7.0,
             typical=-1e9,
             source="within the range of motion",
+            scale=0.05,
         ),
         Parameter("stiffness", unit="N m/rad", neutral=5.0, low=0.1, high=500.0, typical=5.0, source="rubber to metal"),
         Parameter("damping", unit="N m s/rad", neutral=0.0, low=0.0, high=2.0, typical=0.0, source="rubber to metal"),

@@ -25,6 +25,7 @@ class TransmissionError(Effect):
             high=250.0,
             typical=10.0,
             source="eccentric pulleys to teeth",
+            scale=0.5,  # moves a ripple by a fraction of its period at the end of the range
         ),
     )
 
