@@ -37,6 +37,7 @@ FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candid
 FAR_BEHIND_AT_FLOOR = 1.5  # the same where the best one explains nearly everything
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
 COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
+RESIZED = (0.2, 6.0)  # factors of the first look that are believed
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 STRETCHES = 12  # enough data to search on; the final fit takes all
 DEEPEST = 3  # effects in combination
@@ -251,13 +252,22 @@ def some(stretches: Stretches, count: int) -> Stretches:
     return stretches.take(np.array(sorted(order[:count])))
 
 
+def resized(score: Score) -> Candidate:
+    """The candidate with its start as large as the first look says, where a single number makes the effect's size."""
+    (name, start), *more = score.candidate.form.items()
+    known = {p.name: p for p in score.candidate.effect.parameters}[name]
+    if more or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
+        return score.candidate
+    return replace(score.candidate, form={name: min(max(score.factor * start, known.low), known.high)})
+
+
 def with_groups(scores: Sequence[Score]) -> list[Candidate]:
     """Candidates worth a refit, best first; an effect that helps at several joints also stands for all of them."""
     best: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Score] = {}
     for score in scores:
         key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
         best.setdefault(key, score)
-    ranked = [(score.gain, score.candidate) for score in best.values() if score.gain > 0.0]
+    ranked = [(score.gain, resized(score)) for score in best.values() if score.gain > 0.0]
     families: dict[tuple[str, tuple[str, ...]], list[Score]] = {}
     for (name, form, _), score in best.items():
         families.setdefault((name, form), []).append(score)
