@@ -27,6 +27,7 @@ class Summary:
         kept: episodes that ended with the cube in the hand.
         rate: mean of final angle over duration [rad/s].
         finger_lifts: mean number of finger lifts an episode.
+        reward_terms: mean over the episodes of each weighed term's sum.
         verdicts: how often each verdict was given.
         exploits: how often each exploit was found.
     """
@@ -41,6 +42,7 @@ class Summary:
     kept: int
     rate: float
     finger_lifts: float
+    reward_terms: dict[str, float]
     verdicts: dict[str, int]
     exploits: dict[str, int]
 
@@ -65,6 +67,9 @@ def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> 
         kept=sum(result.kept for result in results),
         rate=float(np.mean([result.final_angle / max(result.duration, 1e-9) for result in results])),
         finger_lifts=float(np.mean([sum(result.finger_lifts) for result in results])),
+        reward_terms={
+            name: float(np.mean([result.reward_terms[name] for result in results])) for name in results[0].reward_terms
+        },
         verdicts={verdict.value: sum(result.verdict == verdict for result in results) for verdict in Verdict},
         exploits=dict(Counter(name for result in results for name in result.exploits)),
     )
@@ -107,9 +112,10 @@ def row(result: EpisodeResult, name: str = "nominal") -> str:
 def sentence(name: str, summary: Summary) -> str:
     """Return a summary in one line."""
     verdicts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in summary.verdicts.items() if count)
+    terms = ", ".join(f"{name} {value:.1f}" for name, value in summary.reward_terms.items() if value)
     return (
         f"{name}: {summary.mean_angle:.2f} +- {summary.std_angle:.2f} rad (best {summary.best_angle:.2f}), "
         f"{summary.successes}/{summary.episodes} successful (95 %: {100 * summary.success_low:.0f} to "
         f"{100 * summary.success_high:.0f} %), {summary.kept} kept the cube, "
-        f"{summary.finger_lifts:.1f} finger lifts; {verdicts}"
+        f"{summary.finger_lifts:.1f} finger lifts; {verdicts}; reward {sum(summary.reward_terms.values()):.0f}: {terms}"
     )

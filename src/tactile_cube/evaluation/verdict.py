@@ -62,7 +62,7 @@ class EpisodeResult:
         face_changes: how often each finger moved to another side face, ring to thumb.
         faces_visited: different side faces each finger has stood on, ring to thumb.
         max_tilt: largest tilt of the cube [rad].
-        episode_return: sum of the rewards.
+        reward_terms: sum of each weighed term of the reward.
         exploits: names of physical exploits found; empty when the turning is honest.
     """
 
@@ -77,7 +77,7 @@ class EpisodeResult:
     face_changes: tuple[int, ...]
     faces_visited: tuple[int, ...]
     max_tilt: float
-    episode_return: float
+    reward_terms: dict[str, float]
     exploits: tuple[str, ...]
 
     @property
@@ -108,7 +108,7 @@ def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResu
         face_changes=changes,
         faces_visited=tuple(len(set(history.faces)) for history in histories),
         max_tilt=float(np.max(tilt(record))),
-        episode_return=float(np.sum(record.reward)),
+        reward_terms={name: float(np.sum(term)) for name, term in record.reward_terms.items()},
         exploits=tuple(exploits(record)),
     )
 
