@@ -20,13 +20,14 @@ def main(config: DictConfig) -> None:
 
     source = policy_path(config.policy)
     _, info = load_policy(source)
-    costs = read_costs(Path(config.run or source.parent))
+    folders = [Path(folder) for folder in (*config.before, config.run or source.parent)]
+    runs = {folder.name: read_costs(folder) for folder in folders}
     results = [read_results(Path(file)) for file in config.results]
     SHIPPED.mkdir(exist_ok=True)
     target = SHIPPED / f"{config.name}.safetensors"
     shutil.copyfile(source, target)
     card = target.with_suffix(".md")
-    card.write_text(model_card(config.name, info, costs, results, config.limits), encoding="utf-8")
+    card.write_text(model_card(config.name, info, runs, results, config.limits), encoding="utf-8")
     print(f"{source} -> {target}\ncard: {card}")
 
 

@@ -22,10 +22,14 @@ INFO = PolicyInfo(
 def test_the_card_says_how_it_was_made_and_what_it_does() -> None:
     result = results("paper")
     result["variants"][0]["summary"]["exploits"] = {}
-    card = model_card("default", INFO, {"simulating": 2.0, "learning": 3.5, "wall": 4.0}, [result], "")
+    runs = {
+        "curriculum": {"steps": 1_000_000, "simulating": 1.5, "learning": 3.0, "wall": 3.0},
+        "finetune": {"steps": 500_000, "simulating": 0.5, "learning": 0.5, "wall": 1.0},
+    }
+    card = model_card("default", INFO, runs, [result], "")
     for fact in (
         "full, T_s 0.5 s",
-        "1 500 000",
+        "1 000 000 (curriculum), then 500 000 (finetune)",
         "abc123",
         "5.50 (4.00 h on the clock)",
         "9/10 successful",
@@ -38,7 +42,7 @@ def test_a_ledger_gives_the_costs(tmp_path: Path) -> None:
     (tmp_path / "ledger.json").write_text(
         json.dumps({"simulating_hours": 1.5, "learning_hours": 2, "wall_hours": 3, "steps": 9})
     )
-    assert read_costs(tmp_path) == {"simulating": 1.5, "learning": 2.0, "wall": 3.0}
+    assert read_costs(tmp_path) == {"steps": 9, "simulating": 1.5, "learning": 2.0, "wall": 3.0}
 
 
 @pytest.mark.parametrize("content", ["", "{}", "[]"])

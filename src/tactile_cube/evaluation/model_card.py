@@ -14,7 +14,7 @@ Results = dict[str, Any]
 
 
 def read_costs(folder: Path) -> dict[str, float]:
-    """Read a run's ledger.
+    """Read the environment steps of a run and its hours from its ledger.
 
     Args:
         folder: of the training run.
@@ -25,18 +25,22 @@ def read_costs(folder: Path) -> dict[str, float]:
     path = folder / "ledger.json"
     try:
         ledger = json.loads(path.read_text(encoding="utf-8"))
-        return {name: float(ledger[f"{name}_hours"]) for name in ("simulating", "learning", "wall")}
+        hours = {name: float(ledger[f"{name}_hours"]) for name in ("simulating", "learning", "wall")}
+        return {"steps": int(ledger["steps"]), **hours}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not the ledger of a training run ({type(error).__name__}: {error})") from error
 
 
-def model_card(name: str, info: PolicyInfo, costs: Mapping[str, float], results: Sequence[Results], limits: str) -> str:
+def model_card(
+    name: str, info: PolicyInfo, runs: Mapping[str, Mapping[str, float]], results: Sequence[Results], limits: str
+) -> str:
     """Return the card as Markdown.
 
     Args:
         name: of the policy.
         info: what its file says.
-        costs: hours of CPU time "simulating" and "learning", and of "wall" time.
+        runs: costs of the training runs by name, each begun from the one before: "steps", hours of CPU time
+            "simulating" and "learning", and of "wall" time.
         results: results files of evaluations of this policy.
         limits: what it cannot do, in the author's words.
     """
@@ -44,10 +48,12 @@ def model_card(name: str, info: PolicyInfo, costs: Mapping[str, float], results:
     filter_time, gravity = task.get("filter_time", "?"), task.get("gravity_scale", "?")
     made = {
         "task": f"{task.get('name', '?')}, T_s {filter_time} s, gravity {gravity}",
-        "environment steps": f"{info.steps:,}".replace(",", " "),
+        "environment steps": ", then ".join(
+            f"{costs['steps']:,} ({run})".replace(",", " ") for run, costs in runs.items()
+        ),
         "seed": info.seed,
         "commit": info.commit,
-        "CPU hours": f"{costs['simulating'] + costs['learning']:.2f} ({costs['wall']:.2f} h on the clock)",
+        "CPU hours": f"{_total(runs, 'simulating', 'learning'):.2f} ({_total(runs, 'wall'):.2f} h on the clock)",
         "network": f"{info.observation_size} -> {' -> '.join(map(str, info.hidden))} -> {info.action_size}",
     }
     lines = [
@@ -61,6 +67,10 @@ def model_card(name: str, info: PolicyInfo, costs: Mapping[str, float], results:
     lines += ["", "## Limits", "", limits or "Trained and measured in simulation only; never run on a hand.", ""]
     lines += ["## Configuration", "", "```json", json.dumps(info.config, indent=1), "```", ""]
     return "\n".join(lines)
+
+
+def _total(runs: Mapping[str, Mapping[str, float]], *names: str) -> float:
+    return sum(costs[name] for costs in runs.values() for name in names)
 
 
 def _measured(results: Sequence[Results]) -> list[str]:
