@@ -4,6 +4,7 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import policy_path
+from tactile_cube.evaluation.policy_source import find_policy
 
 
 def test_a_run_folder_means_its_latest_policy(tmp_path: Path) -> None:
@@ -19,3 +20,7 @@ def test_an_empty_run_folder_is_refused(tmp_path: Path) -> None:
 def test_an_unknown_policy_is_refused_with_the_choices() -> None:
     with pytest.raises(InputError, match=r"policy=nobody.*hold, random, scripted"):
         policy_path("nobody")
+
+
+def test_the_shipped_policy_is_named_without_the_place_of_the_package() -> None:
+    assert find_policy(None).provenance["file"] == "default.safetensors"

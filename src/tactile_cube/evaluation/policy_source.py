@@ -9,7 +9,7 @@ from typing import Any
 
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.evaluation.policies import ActorPolicy, HoldPolicy, Policy, RandomPolicy, ReplayPolicy
-from tactile_cube.evaluation.policy_path import policy_path
+from tactile_cube.evaluation.policy_path import SHIPPED, policy_path
 from tactile_cube.evaluation.scripted import ScriptedPolicy
 
 BASELINES: dict[str, type[HoldPolicy] | type[RandomPolicy] | type[ScriptedPolicy]] = {
@@ -63,5 +63,6 @@ def _from_file(path: Path) -> PolicySource:
     actor, info = load_policy(path)
     stack = max(1, info.observation_size // READING)
     require_sizes(path, info, stack * READING, JOINTS)
-    provenance = {"file": str(path), **info.model_dump(exclude={"config"})}
+    file = path.name if path.parent == SHIPPED else str(path)
+    provenance = {"file": file, **info.model_dump(exclude={"config"})}
     return PolicySource(ActorPolicy(actor), path.stem, provenance, info.config, stack)
