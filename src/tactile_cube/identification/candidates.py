@@ -87,7 +87,7 @@ def candidates(recording: Recording, effects: Sequence[EffectClass]) -> list[Can
         if _possible(effect, recording, joint)
         for form in forms(effect)
         if "harmonic" not in form and "torque_0" not in form  # those start from the residual: see residual_starts
-        for start in _starts(effect.name, form, seen[j])
+        for start in (*_starts(effect.name, form, seen[j]), *_mirrored(effect, form))
     ]
 
 
@@ -128,6 +128,15 @@ def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[s
         sign = 1.0 if side == "upper" else -1.0
         return [{**form, side: edge - sign * share * span} for share in (0.03, 0.12, 0.3)]
     return [form]
+
+
+def _mirrored(effect: EffectClass, form: Mapping[str, float]) -> list[Mapping[str, float]]:
+    """The form with the other sign of its first parameter that has one, where a first look cannot turn it about.
+
+    A first look scales a whole effect; with several numbers the sign of one of them is not that of the whole.
+    """
+    signed = [p.name for p in effect.parameters if p.low < 0.0 < p.high and 0.0 < abs(form.get(p.name, 0.0)) < 1e6]
+    return [{**form, signed[0]: -form[signed[0]]}] if signed and len(form) > 1 and effect.name != "joint_stop" else []
 
 
 def placed(candidate: Candidate, recording: Recording) -> dict[str, float]:
