@@ -21,6 +21,7 @@ class TorqueSaturation(Effect):
             high=1e9,
             typical=0.1,
             source="a fraction of the stated limit",
+            scale=0.02,
         ),
     )
 
