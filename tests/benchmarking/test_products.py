@@ -1,5 +1,6 @@
 """The matrix products of an update."""
 
+import pytest
 import torch
 
 from tactile_cube.agent.batch import Sizes
@@ -12,6 +13,11 @@ def test_an_update_of_the_paper_takes_two_point_six_giga_operations() -> None:
     assert 2.5e9 < operations < 2.7e9
 
 
-def test_products_run_in_either_precision() -> None:
-    for dtype in (torch.float32, torch.bfloat16):
-        multiplying([(3, 4, 5), (2, 3, 1)], dtype)()
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_every_product_is_computed_in_the_precision_asked_for(
+    dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+    monkeypatch.setattr(torch, "mm", lambda left, right, out: seen.append((*left.shape, *right.shape, out.dtype)))
+    multiplying([(3, 4, 5), (2, 3, 1)], dtype)()
+    assert seen == [(3, 4, 4, 5, dtype), (2, 3, 3, 1, dtype)]

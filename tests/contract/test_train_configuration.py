@@ -1,6 +1,7 @@
 """Every choice of train's configuration composes and instantiates."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hydra import compose, initialize_config_dir
@@ -64,12 +65,14 @@ def test_finetune_experiment_has_the_published_numbers() -> None:
     assert config.randomization.sensor_noise == 0.02
 
 
-def test_loggers_instantiate(tmp_path: str) -> None:
+def test_loggers_write_into_the_run_folder(tmp_path: Path) -> None:
     for option in ("default", "csv"):
+        (tmp_path / option).mkdir()
         for entry in composed(f"logger={option}").logger.values():
-            logger = instantiate(entry, _partial_=True)(folder=__import__("pathlib").Path(tmp_path), resumed_at=0)
+            logger = instantiate(entry, _partial_=True)(folder=tmp_path / option, resumed_at=0)
             logger.log(1, {"a": 1.0})
             logger.close()
+        assert "1" in (tmp_path / option / "metrics.csv").read_text()
 
 
 def test_default_worker_count_divides_the_worlds() -> None:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.model import Model, Unknown
 from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN
+from tactile_cube.measurement.postures import LARGEST_OFFSET
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
@@ -22,7 +23,6 @@ SPREAD = 0.12  # relative standard deviation of a true constant about its nomina
 CREEP_SPREAD = 0.1  # [rad/s per N m]
 OFFSET_SPREAD = 0.01  # [rad]
 LARGEST_CREEP = 1.0  # [rad/s per N m] joints that stick give way slowly where friction is regularised
-LARGEST_OFFSET = 0.06  # [rad]
 
 
 def nominal_model(recording: Recording) -> Model:

@@ -131,12 +131,12 @@ def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[s
 
 
 def _mirrored(effect: EffectClass, form: Mapping[str, float]) -> list[Mapping[str, float]]:
-    """The form with the other sign of its first parameter that has one, where a first look cannot turn it about.
+    """The form with the other sign of its first size that may have either, where a first look cannot turn it about.
 
     A first look scales a whole effect; with several numbers the sign of one of them is not that of the whole.
     """
-    signed = [p.name for p in effect.parameters if p.low < 0.0 < p.high and 0.0 < abs(form.get(p.name, 0.0)) < 1e6]
-    return [{**form, signed[0]: -form[signed[0]]}] if signed and len(form) > 1 and effect.name != "joint_stop" else []
+    signed = [p.name for p in effect.parameters if p.neutral == 0.0 and p.low < 0.0 and form.get(p.name)]
+    return [{**form, signed[0]: -form[signed[0]]}] if signed and len(form) > 1 else []
 
 
 def placed(candidate: Candidate, recording: Recording) -> dict[str, float]:

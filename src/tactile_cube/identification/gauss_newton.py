@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.model import Model, Unknown, put_all, read_all
 from tactile_cube.identification.problem import Problem
+from tactile_cube.measurement.postures import CORRELATED
 
 Array = NDArray[np.float64]
 CONVERGED = 2e-3  # relative gain below which a fit ends
 SHORTER = (
     6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many
 )
-CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 SPREAD = 0.03  # [rad] standard deviation of a joint offset. Source: Sievers et al., ICRA 2022: up to 3 deg
 NUDGE = 0.005  # [rad] finite difference
 ITERATIONS = 4
-LARGEST = 0.06  # [rad] no initialisation is further off
+LARGEST_OFFSET = 0.06  # [rad] no initialisation is further off
 LARGEST_STEP = 0.02  # [rad] the simulation is far from linear where joints stick
 CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
@@ -69,7 +69,7 @@ def _step(
     trust = CORRELATED * float(np.mean(error**2)) / SPREAD**2
     normal = slopes.T @ slopes + trust * np.eye(len(posture))
     step = np.linalg.solve(normal, slopes.T @ error - trust * posture)
-    return np.asarray(np.clip(posture + np.clip(step, -LARGEST_STEP, LARGEST_STEP), -LARGEST, LARGEST))
+    return np.asarray(np.clip(posture + np.clip(step, -LARGEST_STEP, LARGEST_STEP), -LARGEST_OFFSET, LARGEST_OFFSET))
 
 
 def _stacked(recording: Recording, initialisation: int, arrays: list[Array]) -> Array:

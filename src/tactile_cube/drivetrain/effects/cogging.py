@@ -3,6 +3,7 @@
 from math import cos, sin
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.harmonic import harmonic
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, TORQUE
 
 RIPPLE = "1-5 % of the rating"
@@ -21,16 +22,7 @@ class Cogging(Effect):
     parameters = (
         Parameter("sine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.01, source=RIPPLE),
         Parameter("cosine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
-        Parameter(
-            "harmonic",
-            unit="1/rad",
-            neutral=10.0,
-            low=1.0,
-            high=250.0,
-            typical=10.0,
-            source="poles times gear ratio",
-            scale=0.5,  # moves a ripple by a fraction of its period at the end of the range
-        ),
+        harmonic(source="poles times gear ratio"),
         Parameter("joint_sine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
         Parameter("joint_cosine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
     )

@@ -3,6 +3,7 @@
 from math import cos, sin
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.harmonic import harmonic
 from tactile_cube.drivetrain.signals import ANGLE, MOTOR_POSITION
 
 
@@ -17,16 +18,7 @@ class TransmissionError(Effect):
     parameters = (
         Parameter("sine", unit="rad", neutral=0.0, low=-0.1, high=0.1, typical=0.003, source="1 arcmin to 0.5 deg"),
         Parameter("cosine", unit="rad", neutral=0.0, low=-0.1, high=0.1, typical=0.0, source="1 arcmin to 0.5 deg"),
-        Parameter(
-            "harmonic",
-            unit="1/rad",
-            neutral=10.0,
-            low=1.0,
-            high=250.0,
-            typical=10.0,
-            source="eccentric pulleys to teeth",
-            scale=0.5,  # moves a ripple by a fraction of its period at the end of the range
-        ),
+        harmonic(source="eccentric pulleys to teeth"),
     )
 
     forms = ({"sine": 0.003, "cosine": 0.0, "harmonic": 10.0},)
