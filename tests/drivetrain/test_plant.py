@@ -17,6 +17,7 @@ from tactile_cube.drivetrain.effects import (
     catalogue,
     resolve,
 )
+from tactile_cube.drivetrain.effects.command_dead_zone import CommandDeadZone
 from tactile_cube.drivetrain.effects.command_delay import CommandDelay
 from tactile_cube.drivetrain.effects.stribeck_friction import StribeckFriction
 from tactile_cube.errors import InputError
@@ -290,3 +291,14 @@ def test_what_a_law_sees_is_what_happened() -> None:
 def test_what_does_not_fit_is_refused(make, complaint) -> None:
     with pytest.raises(InputError, match=complaint):
         make()
+
+
+def test_an_effect_with_a_second_law_acts_on_the_motor_torque() -> None:
+    plant = Plant([wheel(4e-3)], dt=1e-3, effects=(CommandDeadZone,))
+    stiff = DrivetrainConstants(kp=2.0, kd=0.0, static_friction=0.0, reflected_inertia=1e-3, stiffness=1e9)
+    torques = []
+    for target in (0.04, 0.2):  # asks for 0.08 and 0.4 N m
+        memory = plant.memory(stiff, effects=[CommandDeadZone("q", error=0.0, torque=0.1)])
+        plant.reset(memory, 0.0)
+        torques.append(roll(plant, memory, np.full((1, 1), target))[0, 3, 0])
+    assert torques == pytest.approx([0.0, 0.3])

@@ -72,8 +72,7 @@ def joint_angles(hand: HandModel, tips: Array) -> Array:
 def similar_gaits(hand: HandModel, number: int, steps: int, direction: int, seed: int = 0) -> Array:
     """Return actions `(number, steps, 12)` of gaits that turn the cube.
 
-    3 to 4 rad in 10 s at T_s 0.25 s and full weight; they lie around the best of 216 gaits that a cross-entropy search
-    tried there.
+    They lie around the best of 216 gaits that a cross-entropy search tried at full weight and T_s 0.25 s.
     """
     rng = np.random.default_rng(seed)
     actions = np.empty((number, steps, len(hand.joint_names)))

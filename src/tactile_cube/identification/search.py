@@ -25,10 +25,8 @@ from tactile_cube.identification.stretches import Stretches, cut
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
-FAR_FROM_FLOOR, NEARLY_ALL = (
-    4.0,
-    0.9,
-)  # error of an explanation that is none, share that a further effect then has to do
+FAR_FROM_FLOOR = 4.0  # error / sensor noise of an explanation that is none by itself
+NEARLY_ALL = 0.9  # share of what it leaves that a further effect then has to explain
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
 SIGNIFICANT = 0.01  # after Holm's correction
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free

@@ -1,0 +1,37 @@
+from dataclasses import replace
+
+import pytest
+
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.candidates import Candidate, _mirrored
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.screening import Score
+from tactile_cube.identification.search import resized
+
+SCORE = Score(Candidate(find_effect("command_delay"), ("q1",), {"delay": 0.005}), Model({}, (), {}), 1.0, 3.0)
+
+
+def test_several_numbers_start_with_either_sign() -> None:
+    form = {"difference": 0.02, "friction": 0.02}
+    assert _mirrored(find_effect("asymmetric_friction"), form) == [{"difference": -0.02, "friction": 0.02}]
+
+
+def test_a_single_number_and_a_place_have_no_other_sign() -> None:
+    assert _mirrored(find_effect("torque_bias"), {"bias": 0.005}) == []
+    assert _mirrored(find_effect("joint_stop"), {"upper": 1.0, "stiffness": 5.0}) == []
+
+
+def test_a_single_number_starts_as_large_as_the_first_look_says() -> None:
+    assert resized(SCORE).form["delay"] == pytest.approx(0.015)
+
+
+@pytest.mark.parametrize(
+    "score",
+    [
+        replace(SCORE, factor=50.0),
+        replace(SCORE, candidate=Candidate(find_effect("torque_saturation"), ("q1",), {"limit": 0.1})),
+    ],
+    ids=["not believed", "a limit is no size"],
+)
+def test_other_starts_stay(score: Score) -> None:
+    assert resized(score) is score.candidate
