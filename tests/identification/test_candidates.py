@@ -1,12 +1,16 @@
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.identification.candidates import Candidate, _mirrored
+from tactile_cube.identification.candidates import Candidate, _mirrored, candidates
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.screening import Score
 from tactile_cube.identification.search import resized
+from tactile_cube.measurement.recording import read_recording
+from tests.measurement.small_rig import write
 
 SCORE = Score(Candidate(find_effect("command_delay"), ("q1",), {"delay": 0.005}), Model({}, (), {}), 1.0, 3.0)
 
@@ -35,3 +39,12 @@ def test_a_single_number_starts_as_large_as_the_first_look_says() -> None:
 )
 def test_other_starts_stay(score: Score) -> None:
     assert resized(score) is score.candidate
+
+
+def test_a_stiffening_drive_starts_where_its_bend_can_be_seen(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))
+    found = [c for c in candidates(recording, [find_effect("stiffening_elasticity")]) if c.joints == ("a",)]
+    torque = [3.0 * (t.command - t.position) - 0.2 * t.velocity() for t in recording.trials]
+    usual = float(np.quantile(np.abs(np.concatenate(torque)[:, 0]), 0.9))
+    bends = [c.form["cubic"] * (c.form["compliance"] * usual) ** 3 / usual for c in found]
+    assert sorted(bends) == pytest.approx([1.0, 100.0, 1e4], rel=0.01)  # beyond, at and below the usual torques

@@ -79,9 +79,10 @@ def roll_segments(commands, length, history, substeps, segment, position, speed,
     for k in range(history + length):
         if k >= history and (k - history) % segment == 0:
             part = (k - history) // segment
-            trial[:] = memory
-            free_step(commands[k], trial)
-            start_segment(position[part], speed[part], nudge, trial, memory)
+            for _ in range(4 if part == 0 else 1):  # the first start's torque is a guess at first
+                trial[:] = memory
+                free_step(commands[k], trial)
+                start_segment(position[part], speed[part], nudge, trial, memory)
         for s in range(substeps):
             if k < history:
                 listen(commands[k], memory)

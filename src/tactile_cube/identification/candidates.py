@@ -15,6 +15,7 @@ from tactile_cube.measurement.recording import Recording
 Array = NDArray[np.float64]
 EffectClass = type[Effect]
 MOST_SHOWN = 4  # fitted parameters that a label lists
+CUBIC = (0.01, 0.1, 1.0)  # parts of the usual torque at which a cubic spring takes over
 DEAD = (0.1, 0.4)  # parts of the usual torque at which a dead zone of the torque starts
 
 
@@ -114,6 +115,10 @@ class _Seen:
         ]
         self.torque = np.quantile(np.concatenate(torques), [0.9, 0.97, 0.997])
 
+    def cubic_stiffness(self, compliance: float) -> list[float]:
+        """Stiffness [N m/rad^3] of a cubic spring that bends as far as a linear one at parts of the usual torque."""
+        return [float(1.0 / (compliance**3 * (part * self.torque[0]) ** 2)) for part in CUBIC]
+
 
 def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[str, float]]:
     span = seen.high - seen.low
@@ -123,6 +128,9 @@ def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[s
         return [{"torque": share * float(seen.torque[0])} for share in DEAD]
     if name == "rate_limit":
         return [{"speed": share * seen.command_speed} for share in (0.8, 0.4, 0.15)]
+    if name == "stiffening_elasticity":
+        # the cubic part is as large as the linear one at a part of, at about, or only beyond what is seen
+        return [{**form, "cubic": cubic} for cubic in seen.cubic_stiffness(form["compliance"])]
     if name == "joint_stop":
         side, edge = ("upper", seen.high) if "upper" in form else ("lower", seen.low)
         sign = 1.0 if side == "upper" else -1.0

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 SPREAD = 0.03  # [rad] standard deviation of a joint offset. Source: Sievers et al., ICRA 2022: up to 3 deg
 NUDGE = 0.005  # [rad] finite difference
 ITERATIONS = 4
-LARGEST_OFFSET = 0.06  # [rad] no initialisation is further off
+LARGEST_OFFSET = 0.15  # [rad] no initialisation is further off; a servo that is mounted a few degrees off is within
 LARGEST_STEP = 0.02  # [rad] the simulation is far from linear where joints stick
 CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
