@@ -1,5 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,3 +49,15 @@ def test_a_stiffening_drive_starts_where_its_bend_can_be_seen(tmp_path: Path) ->
     usual = float(np.quantile(np.abs(np.concatenate(torque)[:, 0]), 0.9))
     bends = [c.form["cubic"] * (c.form["compliance"] * usual) ** 3 / usual for c in found]
     assert sorted(bends) == pytest.approx([1.0, 100.0, 1e4], rel=0.01)  # beyond, at and below the usual torques
+
+
+def test_where_torques_are_commanded_a_saturation_starts_among_them(tmp_path: Path) -> None:
+    def commanded(data: dict[str, Any]) -> None:
+        data["controller"] = {"mode": "torque"}
+
+    recording = read_recording(write(tmp_path, commanded))
+    found = candidates(recording, [find_effect("torque_saturation")])
+    largest = max(np.abs(t.command[:, 0]).max() for t in recording.trials)
+    starts = [c.form["limit"] for c in found if c.joints == ("a",)]
+    assert len(starts) == 3
+    assert all(0.5 * largest < start <= largest for start in starts)

@@ -108,12 +108,15 @@ class _Seen:
         self.low, self.high = np.quantile(self.position, [0.002, 0.998])
         speeds = [np.abs(np.diff(trial.command[:, joint])) / trial.step for trial in recording.trials]
         self.command_speed = float(np.quantile(np.concatenate(speeds), 0.995))
-        kp, kd = recording.gains.kp[joint], recording.gains.kd[joint]
-        torques = [
-            np.abs(kp * (trial.command - trial.position)[:, joint] - kd * trial.velocity()[:, joint])
-            for trial in recording.trials
-        ]
-        self.torque = np.quantile(np.concatenate(torques), [0.9, 0.97, 0.997])
+        if recording.torque_controlled:
+            torques = [np.abs(trial.command[:, joint]) for trial in recording.trials]
+        else:
+            kp, kd = recording.gains.kp[joint], recording.gains.kd[joint]
+            torques = [
+                np.abs(kp * (trial.command - trial.position)[:, joint] - kd * trial.velocity()[:, joint])
+                for trial in recording.trials
+            ]
+        self.torque = np.maximum(np.quantile(np.concatenate(torques), [0.9, 0.97, 0.997]), 1e-6)
 
     def cubic_stiffness(self, compliance: float) -> list[float]:
         """Stiffness [N m/rad^3] of a cubic spring that bends as far as a linear one at parts of the usual torque."""

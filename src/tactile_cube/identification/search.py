@@ -37,7 +37,7 @@ REAL_PART = 0.98  # share of the excess error up to which an explanation is far 
 COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
 RESIZED = (0.2, 6.0)  # factors of the first look that are believed
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
-STRETCHES = 12  # enough data to search on; the final fit takes all
+SEGMENTS = 132  # enough data to search on, 52.8 s; the final fit takes all
 DEEPEST = 3  # effects in combination
 BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
 
@@ -83,8 +83,8 @@ class Search:
         self.fitted, self.held_out = fitted, held_out
         self.shooting = Shooting(fitted, effects)
         self.all_stretches = cut(fitted, noise)
-        self.problem = Problem(self.shooting, some(self.all_stretches, STRETCHES))
-        self.judges = Problem(self.shooting, some(cut(held_out, noise), STRETCHES))
+        self.problem = Problem(self.shooting, some(self.all_stretches, SEGMENTS))
+        self.judges = Problem(self.shooting, some(cut(held_out, noise), SEGMENTS))
         self.effects = tuple(effects)
         self.candidates = candidates(fitted, effects)
         self.start = nominal_model(fitted)
@@ -238,8 +238,8 @@ def without_effect(explanation: Explanation, place: int) -> Model:
     return replace(model, terms=(*model.terms[:first], *model.terms[last:]))
 
 
-def some(stretches: Stretches, count: int) -> Stretches:
-    """About `count` stretches, spread over trials and over the time within trials."""
+def some(stretches: Stretches, segments: int) -> Stretches:
+    """Stretches of about so many segments, spread over trials and over the time within trials."""
     by_trial = [np.flatnonzero(stretches.trial == k) for k in np.unique(stretches.trial)]
     order = [
         int(rows[(turn + k) % len(rows)])
@@ -247,7 +247,7 @@ def some(stretches: Stretches, count: int) -> Stretches:
         for k, rows in enumerate(by_trial)
         if turn < len(rows)
     ]
-    return stretches.take(np.array(sorted(order[:count])))
+    return stretches.take(np.array(sorted(order[: -(-segments // stretches.segments)])))
 
 
 def resized(score: Score) -> Candidate:
