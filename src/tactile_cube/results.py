@@ -13,13 +13,17 @@ def main(config: DictConfig) -> None:
     from pathlib import Path
 
     from tactile_cube.evaluation.paper_table import paper_page, read_all
+    from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
     from tactile_cube.evaluation.training_curve import read_curve
     from tactile_cube.visualization.curves import write_learning_curves
 
+    for sweep in config.sweeps:
+        print(f"{sweep}\n\n{sweep_table(read_sweep(Path(sweep)))}\n")
     curves = [read_curve(Path(run), label=Path(run).stem) for run in config.curves]
     page = Path(config.page)
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text(paper_page(read_all(Path(config.runs)), curves), encoding="utf-8")
+    table1 = read_sweep(Path(config.table1)) if config.table1 else {}
+    page.write_text(paper_page(read_all(Path(config.runs)), curves, table1), encoding="utf-8")
     print(f"page: {page}")
     if curves:
         write_learning_curves(curves, Path(config.picture), config.title)

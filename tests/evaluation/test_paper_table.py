@@ -6,6 +6,7 @@ import pytest
 
 from tactile_cube.evaluation.paper_table import ROWS, paper_page, read_all
 from tactile_cube.evaluation.results_file import FORMAT
+from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1
 from tactile_cube.evaluation.training_curve import Curve
 
 
@@ -42,7 +43,7 @@ def line(page: str, what: str) -> str:
 
 def test_rows_that_were_not_run_give_their_command() -> None:
     page = paper_page([], [])
-    assert page.count("not run") == len(ROWS)
+    assert page.count("not run") == len(ROWS) + len(PAPER_TABLE_1)
     assert "`python -m tactile_cube.evaluate protocol=endurance`" in line(page, "endurance")
     assert "Not run: `python -m tactile_cube.evaluate protocol=sim_to_sim`" in page
 

@@ -1,0 +1,78 @@
+"""The runs of a multirun side by side: steps and processor time until regrasping, one line a setting."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from statistics import median
+
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, cpu_hours, read_curve, regrasping_begins
+
+PAPER_TABLE_1 = {
+    "task=table, T_s 0.5 s": "0.3, 0.4, 0.3, 0.4",
+    "task=float, T_s 0.5 s": "2.2, 1.7, 0.9, -",
+    "task=full, T_s 0.5 s": "1.8, -, -, 2.3",
+    "task=table, T_s 0.1 s": "0.4, 0.2, 0.2, 0.2",
+    "task=float, T_s 0.1 s": "1.5, 5.8, -, 2.4",
+    "task=full, T_s 0.1 s": "5.1, 1.7, 6.0, 3.9",
+}
+"""Million steps until regrasping of four runs; -: not within 6.5. Source: paper, Table I."""
+_RUN = re.compile(r"(?P<setting>.+)-seed(?P<seed>\d+)$")
+_FILTER_TIME = re.compile(r"task\.filter_time=(?P<time>[\d.]+)-(?P<task>task=\w+)$")
+
+
+def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
+    """Read the runs of a multirun: setting -> seed -> learning curve.
+
+    Args:
+        folder: holds `<setting>-seed<N>` run folders, or copies of their metrics.csv named `<setting>-seed<N>.csv`.
+
+    Raises:
+        InputError: there is no such run in the folder.
+    """
+    runs: dict[str, dict[int, Curve]] = {}
+    for path in sorted(folder.glob("*-seed*")):
+        name = path.stem if path.suffix == ".csv" else path.name
+        match = _RUN.match(name)
+        if match and (path.suffix == ".csv" or (path / "metrics.csv").is_file()):
+            setting = _FILTER_TIME.sub(r"\g<task>, T_s \g<time> s", match["setting"])
+            runs.setdefault(setting, {})[int(match["seed"])] = read_curve(path, name)
+    if not runs:
+        raise InputError(f"{folder}: no run <setting>-seed<N> with a metrics.csv; give the folder of a multirun")
+    return runs
+
+
+def sweep_table(runs: Mapping[str, Mapping[int, Curve]], settings: Sequence[str] = ()) -> str:
+    """Return the table, with the paper's column where a setting is one of its Table I.
+
+    Args:
+        runs: from `read_sweep`.
+        settings: lines to show, those without a run as such; all that there are by default.
+    """
+    shown = list(settings) or sorted(runs)
+    paper = any(setting in PAPER_TABLE_1 for setting in shown)
+    head = ["setting", *(["paper, million steps"] if paper else []), "million steps, seed by seed", "CPU hours (median)"]
+    lines = [head, ["---"] * len(head)]
+    for setting in shown:
+        known = [PAPER_TABLE_1.get(setting, "")] if paper else []
+        curves = runs.get(setting, {})
+        steps = ", ".join(_until(curves[seed]) for seed in sorted(curves))
+        lines.append([setting, *known, steps or "not run", _median_cost(list(curves.values()))])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _until(curve: Curve) -> str:
+    row = regrasping_begins(curve)
+    if row is not None:
+        return f"{curve.columns[STEPS][row] / 1e6:.3f}"
+    return f"> {curve.columns[STEPS][-1] / 1e6:.3f} (at {curve.columns[ANGLE][-1]:.1f} rad)"
+
+
+def _median_cost(curves: Sequence[Curve]) -> str:
+    """Median over the runs; a run that does not regrasp counts as dearer than all others."""
+    begun = [(curve, regrasping_begins(curve)) for curve in curves]
+    costs = [float("inf") if row is None else cpu_hours(curve, row) for curve, row in begun]
+    middle = median(costs) if costs else float("inf")
+    return f"{middle:.3f}" if middle < float("inf") else "-"

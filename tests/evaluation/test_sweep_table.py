@@ -1,0 +1,54 @@
+from pathlib import Path
+
+import pytest
+
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1, read_sweep, sweep_table
+
+
+def run(folder: Path, name: str, angle: float, hours: float = 0.1) -> None:
+    """A run of two rows that ends at 30 k steps."""
+    rows = f"steps,final_angle,episodes,simulating_hours,learning_hours\n15000,1.0,60,0,0\n30000,{angle},120,{hours},0\n"
+    (folder / f"{name}.csv").write_text(rows)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    run(tmp_path, "task.filter_time=0.5-task=table-seed0", 2.5, 0.10)
+    run(tmp_path, "task.filter_time=0.5-task=table-seed1", 2.1, 0.30)
+    run(tmp_path, "task.filter_time=0.5-task=table-seed2", 1.5)
+    run(tmp_path, "agent.n_step=1-seed0", 1.2)
+    return tmp_path
+
+
+def test_seeds_of_a_setting_share_a_line(folder: Path) -> None:
+    line = next(row for row in sweep_table(read_sweep(folder)).splitlines() if "task=table" in row)
+    cells = [cell.strip() for cell in line.strip("|").split("|")]
+    assert cells == ["task=table, T_s 0.5 s", "0.3, 0.4, 0.3, 0.4", "0.030, 0.030, > 0.030 (at 1.5 rad)", "0.300"]
+
+
+def test_what_never_regrasps_has_no_cost(folder: Path) -> None:
+    line = next(row for row in sweep_table(read_sweep(folder)).splitlines() if "n_step" in row)
+    assert [cell.strip() for cell in line.strip("|").split("|")] == [
+        "agent.n_step=1",
+        "",
+        "> 0.030 (at 1.2 rad)",
+        "-",
+    ]
+
+
+def test_settings_without_a_run_stand_as_such(folder: Path) -> None:
+    table = sweep_table(read_sweep(folder), tuple(PAPER_TABLE_1))
+    assert table.count("not run") == len(PAPER_TABLE_1) - 1
+    assert "n_step" not in table
+
+
+def test_run_folders_are_read_like_copies(folder: Path) -> None:
+    (folder / "n_step=3-seed4").mkdir()
+    (folder / "n_step=3-seed4" / "metrics.csv").write_text("steps,final_angle\n1500,0.5\n")
+    assert list(read_sweep(folder)["n_step=3"]) == [4]
+
+
+def test_a_folder_without_runs_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no run <setting>-seed<N>"):
+        read_sweep(tmp_path)
