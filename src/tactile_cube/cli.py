@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 CONFIG = Path(__file__).parent / "conf"
 """The configuration tree; in a checkout a link to conf/ at the top."""
 
+ADDED = ("experiment", "without")
+"""Groups of training that are added with `+group=option`."""
+
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
 USAGE_ERROR = 2
 INTERRUPTED = 130
@@ -165,14 +168,18 @@ def _verbs() -> dict[str, str]:
 
 
 def _group_lines(path: Path) -> list[str]:
-    lines = []
-    for group, default in _groups(path).items():
+    lines, groups = [], _groups(path)
+    for group, default in groups.items():
         files = sorted((CONFIG / group).glob("*.yaml"))
         for index, file in enumerate(files):
             mark = "*" if file.stem == default else " "
             head = f"{group}=" if index == 0 else ""
-            lines.append(f"  {head:<16}{mark}{file.stem:<12} {_summary(file)}")
-    return [*lines, "  (* is the default; an experiment is added with +experiment=<option>)"]
+            lines.append(f"  {head:<16}{mark}{file.stem:<17} {_summary(file)}")
+    return [
+        *lines,
+        "  (* is the default)",
+        *(["  (added to the others: +experiment=option, +without=option)"] if "without" in groups else []),
+    ]
 
 
 def _summary(file: Path) -> str:
@@ -195,9 +202,7 @@ def _groups(path: Path) -> dict[str, str | None]:
             name = group.removeprefix("override ").removeprefix("optional ").split("@")[0].strip("/ ")
             if (CONFIG / name).is_dir() and name != "hydra":
                 groups[name] = option
-    if (CONFIG / "experiment").is_dir():
-        groups["experiment"] = None
-    return groups
+    return groups | (dict.fromkeys(ADDED) if path.stem == "train" else {})
 
 
 def _key_lines(path: Path) -> list[str]:

@@ -79,3 +79,10 @@ def test_default_worker_count_divides_the_worlds() -> None:
     for worlds in range(1, 13):
         settings = CollectorSettings(worlds=worlds)
         assert worlds % settings.workers == 0
+
+
+@pytest.mark.parametrize("part", sorted(file.stem for file in (CONFIG / "without").glob("*.yaml")))
+def test_an_ablation_changes_the_recipe_and_makes_an_environment(part: str) -> None:
+    recipe, ablated = composed("+experiment=ablations"), composed("+experiment=ablations", f"+without={part}")
+    assert (ablated == recipe) == (part == "nothing")
+    assert as_environment(instantiate(ablated.env)).sizes.action == 12

@@ -33,6 +33,17 @@ def test_theta_counts_turns_in_the_tasks_direction(
     assert moment.reward_terms[0] == pytest.approx(0.08)
 
 
+@pytest.mark.parametrize(("symmetry", "period"), [(4, 0.5 * np.pi), (1, 2 * np.pi)])
+def test_critics_see_the_yaw_up_to_the_symmetry(
+    symmetry: int, period: float, scripted_world: Any, rotation_task: MakeTask
+) -> None:
+    env = rotation_task(scripted_world(turn=period / 20), task=Task("full", direction=1, symmetry=symmetry))
+    first = env.reset().object_state[3:5].copy()
+    seen = [env.step(np.zeros(12)).object_state[3:5].copy() for _ in range(20)]
+    assert seen[-1] == pytest.approx(first, abs=1e-9)
+    assert min(np.abs(one - first).max() for one in seen[:-1]) > 0.1
+
+
 def test_reward_is_the_weighted_sum_of_the_terms(scripted_world: Any, rotation_task: MakeTask) -> None:
     env = rotation_task(scripted_world(turn=0.05, shift=(0.001, 0.0, 0.0)))
     env.reset()

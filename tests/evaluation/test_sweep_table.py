@@ -8,7 +8,9 @@ from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1, read_sweep, sweep
 
 def run(folder: Path, name: str, angle: float, hours: float = 0.1) -> None:
     """A run of two rows that ends at 30 k steps."""
-    rows = f"steps,final_angle,episodes,simulating_hours,learning_hours\n15000,1.0,60,0,0\n30000,{angle},120,{hours},0\n"
+    rows = (
+        f"steps,final_angle,episodes,simulating_hours,learning_hours\n15000,1.0,60,0,0\n30000,{angle},120,{hours},0\n"
+    )
     (folder / f"{name}.csv").write_text(rows)
 
 

@@ -40,6 +40,12 @@ def configured(*settings: str, **options: str) -> EnvConfig:
     return instantiate(config.env)
 
 
+def test_critics_may_be_blind() -> None:
+    data = make_env(configured("env.privileged=false"), worlds=1, seed=0).rollout(2)
+    assert not data["privileged"].any()
+    assert data["next", "observation"].any()
+
+
 @pytest.mark.parametrize(("group", "option"), OPTIONS, ids=lambda name: name)
 def test_option_makes_an_environment_that_runs(group: str, option: str) -> None:
     config = pickle.loads(pickle.dumps(configured(**{group: option})))

@@ -170,7 +170,8 @@ class RotationEnv:
         world, pose = self.world, self._pose
         q_m, q_f = world.q_m, world.q_f
         state = np.empty(OBJECT_STATE)
-        state[:7] = (pose.x, pose.y, pose.z, math.sin(4 * pose.theta), math.cos(4 * pose.theta), pose.phi, pose.psi)
+        yaw = self.task.symmetry * pose.theta
+        state[:7] = (pose.x, pose.y, pose.z, math.sin(yaw), math.cos(yaw), pose.phi, pose.psi)
         state[7:10] = world.cube_linear_velocity
         state[10:13] = world.cube_angular_velocity
         state[13:] = q_f

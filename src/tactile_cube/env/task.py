@@ -34,6 +34,7 @@ class Task:
         plane_range: distance from the start in x and y that ends the episode [m] (size not published).
         height_range: distance from the start in z that ends the episode [m] (size not published).
         tilt_limit: angle between the cube's z axis and the vertical that ends the episode [rad]; keeps theta defined.
+        symmetry: of the object about the vertical: critics see its yaw up to 1 / symmetry of a turn. Source: paper.
     """
 
     name: str
@@ -46,10 +47,11 @@ class Task:
     plane_range: float = 0.035
     height_range: float = 0.04
     tilt_limit: float = 0.8
+    symmetry: int = 4
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
-        for key in ("filter_time", "plane_range", "height_range", "tilt_limit", "episode_steps"):
+        for key in ("filter_time", "plane_range", "height_range", "tilt_limit", "episode_steps", "symmetry"):
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"task.{key} is {value}; give a number above 0")

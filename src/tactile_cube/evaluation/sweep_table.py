@@ -53,7 +53,12 @@ def sweep_table(runs: Mapping[str, Mapping[int, Curve]], settings: Sequence[str]
     """
     shown = list(settings) or sorted(runs)
     paper = any(setting in PAPER_TABLE_1 for setting in shown)
-    head = ["setting", *(["paper, million steps"] if paper else []), "million steps, seed by seed", "CPU hours (median)"]
+    head = [
+        "setting",
+        *(["paper, million steps"] if paper else []),
+        "million steps, seed by seed",
+        "CPU hours (median)",
+    ]
     lines = [head, ["---"] * len(head)]
     for setting in shown:
         known = [PAPER_TABLE_1.get(setting, "")] if paper else []

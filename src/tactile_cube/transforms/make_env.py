@@ -22,7 +22,7 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
 from tactile_cube.transforms.joint_offset import JointOffset
 from tactile_cube.transforms.observation_stack import ObservationStack
-from tactile_cube.transforms.privileged_state import PrivilegedState
+from tactile_cube.transforms.privileged_state import SCALE, PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
 
@@ -46,6 +46,7 @@ class EnvConfig:
         model: an identified model, as the path of its file, its contents or a ModelFile: its values, intervals and
             effects replace those of the drive in `constants` and `randomization`. None once that is done.
         stack: readings in an observation, N_stack.
+        privileged: whether critics see the object's state; without it they see zeros.
     """
 
     task: Task
@@ -59,6 +60,7 @@ class EnvConfig:
     effects: Sequence[Any] = ()
     model: Any = None
     stack: int = 5
+    privileged: bool = True
 
     def __post_init__(self) -> None:
         """Makes the effects, puts the model in place, and refuses values without a meaning."""
@@ -115,7 +117,7 @@ def transforms(config: EnvConfig, hand: HandModel, explore: bool) -> list[Transf
         JointOffset(disturbances.joint_offset, half_range),
         SensorNoise(disturbances.sensor_noise),
         ObservationStack(config.stack),
-        PrivilegedState(),
+        PrivilegedState(SCALE if config.privileged else (0.0,) * len(SCALE)),
         StickyAction(disturbances.sticky_probability),
     ]
     if explore and config.exploration.extra > 0.0:
