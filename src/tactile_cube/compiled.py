@@ -42,3 +42,12 @@ def borrowed(array: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     if array.strides[0] != array.itemsize:
         raise ValueError("an array with gaps: pass a contiguous one")
     return numba.carray(_as_pointer(array.ctypes.data), array.shape)  # type: ignore
+
+
+@compiled
+def shaped_view(array: npt.NDArray[np.float64], start: int, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """The numbers from `start` on as an array of another shape; numpy's reshape is an outside call in compiled code.
+
+    Nothing is checked: the caller keeps the array alive, contiguous and long enough.
+    """
+    return numba.carray(_as_pointer(array.ctypes.data + start * array.itemsize), shape)  # type: ignore

@@ -6,7 +6,7 @@ The names in capitals are offsets into the memory, see `memory_layout`; C chains
 JOINT_STEP = '''
 @inner
 def shaped(memory, offset, rows, columns):
-    return memory[offset : offset + rows * columns].reshape(rows, columns)
+    return shaped_view(memory, offset, (rows, columns))
 
 
 @inner
@@ -19,12 +19,12 @@ def find_equations(c, q, v, memory):
     """Fills M, h of all dofs of chain c and their actuated-joint form."""
     mass_matrix_and_bias(
         PARENT, PRISMATIC,
-        memory[PLACEMENT_ROTATION + 9 * c * N : PLACEMENT_ROTATION + 9 * (c + 1) * N].reshape(N, 3, 3),
+        shaped_view(memory, PLACEMENT_ROTATION + 9 * c * N, (N, 3, 3)),
         shaped(memory, PLACEMENT_TRANSLATION + 3 * c * N, N, 3),
         shaped(memory, LINK_AXIS + 3 * c * N, N, 3),
         memory[MASS + c * N : MASS + (c + 1) * N],
         shaped(memory, COM + 3 * c * N, N, 3),
-        memory[INERTIA + 9 * c * N : INERTIA + 9 * (c + 1) * N].reshape(N, 3, 3),
+        shaped_view(memory, INERTIA + 9 * c * N, (N, 3, 3)),
         q, v, memory[GRAVITY + 3 * c : GRAVITY + 3 * c + 3],
         shaped(memory, WORK, N + 1, WORK_COLUMNS), shaped(memory, MASS_MATRIX, N, N), memory[BIAS : BIAS + N],
     )

@@ -23,7 +23,7 @@ from importlib import import_module
 import numpy as np
 from numba import carray, cfunc, njit, types
 
-from tactile_cube.compiled import borrowed
+from tactile_cube.compiled import borrowed, shaped_view
 from tactile_cube.drivetrain.coupled_joints import (
     add_tendons, bullet_torques, estimate_contact, expand, reduce_equations,
 )

@@ -14,6 +14,7 @@ enum {
 };
 
 Handle b3InitStepSimulationCommand(Handle client);
+int b3SubmitClientCommand(Handle client, Handle command); /* done on return: the server runs in this process */
 Handle b3SubmitClientCommandAndWaitStatus(Handle client, Handle command);
 Handle b3RequestActualStateCommandInit(Handle client, int body);
 int b3GetStatusActualState(Handle status, int *body, int *n_q, int *n_v, const double *inertial_frame[],
@@ -72,7 +73,7 @@ static void apply_torques(Handle client, const int *chains, int n_chains, int n_
         Handle command = b3JointControlCommandInit2(client, chains[c], TORQUE_CONTROL);
         for (int j = 0; j < n_joints; ++j)
             b3JointControlSetDesiredForceTorque(command, BASE_NUMBERS - 1 + j, torque[c * n_joints + j]);
-        b3SubmitClientCommandAndWaitStatus(client, command);
+        b3SubmitClientCommand(client, command);
     }
 }
 
@@ -89,10 +90,10 @@ static void read_object(Handle client, int object, double *state) {
 static void push_object(Handle client, int object, const double *wrench, const double *state) {
     Handle command = b3ApplyExternalForceCommandInit(client);
     b3ApplyExternalForce(command, object, -1, wrench, state, WORLD_FRAME);
-    b3SubmitClientCommandAndWaitStatus(client, command);
+    b3SubmitClientCommand(client, command);
     command = b3ApplyExternalForceCommandInit(client);
     b3ApplyExternalTorque(command, object, -1, wrench + 3, WORLD_FRAME);
-    b3SubmitClientCommandAndWaitStatus(client, command);
+    b3SubmitClientCommand(client, command);
 }
 
 /* n_steps physics steps. q, v: states of all joints of all chains, current on entry and on return. object: body of the
@@ -107,7 +108,7 @@ void run_physics_steps(Handle client, const int *chains, int n_chains, int n_joi
         apply_torques(client, chains, n_chains, n_joints, torque);
         if (object_state) read_object(client, object, object_state);
         if (wrench) push_object(client, object, wrench, object_state);
-        b3SubmitClientCommandAndWaitStatus(client, b3InitStepSimulationCommand(client));
+        b3SubmitClientCommand(client, b3InitStepSimulationCommand(client));
         read_chains(client, chains, n_chains, n_joints, q, v);
     }
     if (object_states) read_object(client, object, object_states + 13 * n_steps);
