@@ -125,7 +125,7 @@ def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Compariso
     x = np.linspace(-1, 1, 12)
     shape = Shape("b", "position of b [rad]", x, 0.01 * x, np.full(12, 0.002), 0.83)
     text = page(diagnosis_report(unknown, comparison, None, "cmd", shapes=[shape]), tmp_path / "d.html")
-    assert "explains 83 % of it" in text
+    assert "explains 83 % of what the model lacks" in text
     assert "not explained: b; a black box" in text
     assert "93 %" in text
     assert "helps, but is not the whole of it: command_delay at a" in text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tactile_cube.drivetrain.effects.effect import Effect
@@ -29,7 +29,13 @@ SHOWN_SHAPES = 6
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is left at a joint: shapes over signals, and the share that a black box could still explain."""
+    """What is left at a joint.
+
+    Attributes:
+        joint: its name.
+        shapes: the missing torque over signals, most telling first.
+        black_box: share that a black box could still explain beside the recommended model.
+    """
 
     joint: str
     shapes: list[Shape] = field(repr=False)
@@ -113,7 +119,7 @@ def diagnose(
         rivals=rivals,
         stages=summaries,
         floor=noise_floor(recording),
-        unexplained=_unexplained(search, verdict),
+        unexplained=_unexplained(search, verdict, findings.base),
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
     )
@@ -124,14 +130,24 @@ def with_offsets(model: Model, judged: Model) -> Model:
     return Model(model.constants, model.terms, {**judged.posture, **model.posture})
 
 
-def _unexplained(search: Search, verdict: Verdict) -> list[Unexplained]:
-    chosen = verdict.chosen
-    joints = unexplained_joints(chosen, search.fitted.joints)
+def _unexplained(search: Search, verdict: Verdict, base: Explanation) -> list[Unexplained]:
+    joints = unexplained_joints(verdict.chosen, search.fitted.joints)
     if not joints:
         return []
-    judged = chosen.judgement
-    missing = missing_torques(search.judges, search.held_out, judged.model, judged.residual)
-    return [Unexplained(m.joint, shapes(m)[:SHOWN_SHAPES], black_box(m)) for m in missing if m.joint in joints]
+    # effects that help and are not the cause blur its shape, so the refitted constants alone are looked at too
+    beside = {"the recommended model": verdict.chosen.judgement, "the model with refitted constants": base.judgement}
+    missing = {
+        name: missing_torques(search.judges, search.held_out, judged.model, judged.residual)
+        for name, judged in beside.items()
+    }
+    found = []
+    for j, joint in enumerate(search.fitted.joints):
+        if joint in joints:
+            curves = [[replace(one, beside=name) for one in shapes(torques[j])] for name, torques in missing.items()]
+            clearest = max(curves, key=lambda shown: shown[0].explained)
+            left = black_box(missing["the recommended model"][j])
+            found.append(Unexplained(joint, clearest[:SHOWN_SHAPES], left))
+    return found
 
 
 def write_experiment(diagnosis: Diagnosis, folder: Path) -> Path | None:

@@ -101,6 +101,7 @@ def _unexplained(one: Any) -> dict[str, Any]:
     return {
         "joint": one.joint,
         "black_box": round(one.black_box, 4),
+        "beside": best.beside if best else None,
         "depends_most_on": best.against if best else None,
         "shapes": [
             {

@@ -54,8 +54,9 @@ def _effect(entry: dict[str, Any]) -> str:
 
 def _unexplained(entry: dict[str, Any]) -> str:
     return (
-        f"  {entry['joint']}: the missing torque goes most with {entry['depends_most_on']}; "
-        f"a black box could explain {100 * entry['black_box']:.0f} % of it"
+        f"  {entry['joint']}: the torque that {entry['beside']} lacks goes most with "
+        f"{entry['depends_most_on']}; beside the recommended model a black box could explain "
+        f"{100 * entry['black_box']:.0f} % of it"
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,10 @@ from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
 BINS = 24
+MANY = 10 * BINS  # samples that a curve needs
 FEATURES = 300  # random cosine features of the black box
 RIDGE = 1e-2
+APART = 0.1  # share that curves for motion up and down have to explain beyond one curve for both
 TOLD_APART = 0.6  # share of the segments on which the black box learns
 
 
@@ -24,11 +26,13 @@ class Shape:
 
     Attributes:
         joint: where it is missing.
-        against: the signal, with its unit.
+        against: the signal, with its unit; with ", moving up" or ", moving down" for one direction of motion.
         centres: (bins,) of the signal.
         mean: (bins,) [N m].
         spread: (bins,) standard deviation [N m].
-        explained: share of the missing torque that a function of this signal alone explains.
+        explained: share of the missing torque that a function of this signal alone explains; of a pair of curves for
+            motion up and down, what both explain together.
+        beside: the model that lacks the torque.
     """
 
     joint: str
@@ -37,6 +41,7 @@ class Shape:
     mean: Array
     spread: Array
     explained: float
+    beside: str = ""
 
 
 @dataclass(frozen=True)
@@ -96,8 +101,12 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
 
 
 def shapes(missing: Missing) -> list[Shape]:
-    """The missing torque over every signal, most telling first."""
-    found = [_shape(missing, name, values) for name, values in missing.signals.items()]
+    """The missing torque over every signal, most telling first.
+
+    Where it looks different for motion up and down, as friction does, a signal has two curves.
+    """
+    found = [_shape(missing, name) for name in missing.signals]
+    found += [curve for one in found for curve in _by_direction(missing, one)]
     return sorted(found, key=lambda shape: -shape.explained)
 
 
@@ -121,7 +130,25 @@ def black_box(missing: Missing, seed: int = 0) -> float:
     return float(max(0.0, 1.0 - left.var() / max(test.var(), 1e-30)))
 
 
-def _shape(missing: Missing, name: str, values: Array) -> Shape:
+def _by_direction(missing: Missing, both: Shape) -> list[Shape]:
+    """A curve for motion up and one for motion down, if they explain clearly more than one for both."""
+    speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
+    curves, left = [], 0.0
+    for side, chosen in (("up", speed > 0.0), ("down", speed <= 0.0)):
+        if chosen.sum() < MANY:
+            return []
+        signals = {both.against: missing.signals[both.against][chosen]}
+        parts = (missing.segment[chosen], missing.initialisation[chosen])
+        part = Missing(missing.joint, missing.torque[chosen], signals, *parts)
+        curve = _shape(part, both.against)
+        left += (1.0 - curve.explained) * part.torque.var() * chosen.sum()
+        curves.append(replace(curve, against=f"{both.against}, moving {side}"))
+    explained = 1.0 - left / max(missing.torque.var() * len(speed), 1e-30)
+    return [replace(curve, explained=explained) for curve in curves] if explained > both.explained + APART else []
+
+
+def _shape(missing: Missing, name: str) -> Shape:
+    values = missing.signals[name]
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     count = np.maximum(np.bincount(place), 1)

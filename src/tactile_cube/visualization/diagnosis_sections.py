@@ -70,8 +70,9 @@ def shape_section(shapes: Sequence[Shape]) -> list[Section]:
     if not shapes:
         return []
     text = [
-        "The torque that the model lacks, averaged over bins of one signal at a time. A clear curve is a law of that "
-        "signal alone; write it as an effect of your own, fit it, and see whether the error falls."
+        "The torque that the model lacks, averaged over bins of one signal at a time, apart for motion up and down "
+        "where that matters. A clear curve is a law of that signal alone; write it as an effect of your own, fit it, "
+        "and see whether the error falls."
     ]
     blocks = []
     for one in sorted(shapes, key=lambda shape: -shape.explained):
@@ -79,7 +80,8 @@ def shape_section(shapes: Sequence[Shape]) -> list[Section]:
         low, high = 1e3 * (one.mean - one.spread), 1e3 * (one.mean + one.spread)
         band = Band("+- one standard deviation", one.centres, low, high)
         chart = line_chart(axes, [Line("missing torque", one.centres, 1e3 * one.mean, SIMULATED, 2.0)], [band])
-        blocks.append(Figure(chart, f"{one.joint} against {one.against}: explains {100 * one.explained:.0f} % of it."))
+        share = f"explains {100 * one.explained:.0f} % of what {one.beside or 'the model'} lacks."
+        blocks.append(Figure(chart, f"{one.joint} against {one.against}: {share}"))
     return [Section("The shape of what is unexplained", text, blocks)]
 
 
