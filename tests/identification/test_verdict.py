@@ -89,6 +89,14 @@ def test_a_further_effect_needs_a_real_part_of_the_error() -> None:
     assert worthwhile(completing, first, base)
 
 
+def test_a_large_share_needs_less_significance_than_a_small_one() -> None:
+    base = Explanation((), FIT, judged(2.4), 1.0, 0.0)
+    found = replace(explanation("backlash", 1.4, 2.4), p_value=0.03)
+    assert worthwhile(replace(found, gain=0.6), base, base)
+    assert not worthwhile(replace(found, gain=0.1), base, base)
+    assert not worthwhile(replace(found, gain=0.6, p_value=0.1), base, base)
+
+
 def test_a_second_effect_that_a_large_remainder_needs_is_no_detail_of_the_first() -> None:
     base = Explanation((), FIT, judged(300.0), 1.0, 0.0)
     stop, small = explanation("joint_stop", 14.0), explanation("joint_stop", 3.5)

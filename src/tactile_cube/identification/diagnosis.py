@@ -134,8 +134,9 @@ def _unexplained(search: Search, verdict: Verdict, base: Explanation) -> list[Un
     joints = unexplained_joints(verdict.chosen, search.fitted.joints)
     if not joints:
         return []
-    # effects that help and are not the cause blur its shape, so the refitted constants alone are looked at too
-    beside = {"the recommended model": verdict.chosen.judgement, "the model with refitted constants": base.judgement}
+    beside = {"the recommended model": verdict.chosen.judgement}
+    if verdict.kind == "unknown_effect":  # effects that help and are not the cause blur its shape
+        beside["the model with refitted constants"] = base.judgement
     missing = {
         name: missing_torques(search.judges, search.held_out, judged.model, judged.residual)
         for name, judged in beside.items()

@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 FAR_FROM_FLOOR = 4.0  # error / sensor noise of an explanation that is none by itself
 NEARLY_ALL = 0.9  # share of what it leaves that a further effect then has to explain
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
-SIGNIFICANT = 0.01  # after Holm's correction
+SIGNIFICANT = 0.01  # p-value, corrected for the number of candidates
+LARGE_GAIN, SIGNIFICANT_IF_LARGE = 0.25, 0.05  # the same for a share that no chance explains: short recordings
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
 BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
@@ -220,7 +221,8 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation)
     Significantly, and by more than a few per cent; a further effect has to complete the explanation, or to do most of
     what is left while that is a real part of the whole, or so much that it cannot be a detail of the effect before.
     """
-    if explanation.gain < SMALLEST_GAIN or explanation.p_value > SIGNIFICANT:
+    enough = SIGNIFICANT_IF_LARGE if explanation.gain > LARGE_GAIN else SIGNIFICANT
+    if explanation.gain < SMALLEST_GAIN or explanation.p_value > enough:
         return False
     if not parent.effects or explanation.error <= FLOOR:
         return True
