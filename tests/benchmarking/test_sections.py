@@ -22,7 +22,7 @@ SMALL = {
     "update": partial(update, 1, peers=False, calls=1, hidden=16),
     "collector": partial(collector, 1, worlds=(1, 2), processes=(1,), steps=2),
     "end_to_end": partial(end_to_end, 1, peers=False, worlds=2, steps=3, updates=1, hidden=16),
-    "identification": partial(identification, 1, peers=False, duration=2.0, kinds=2),
+    "identification": partial(identification, 1, peers=False, duration=2.0, kinds=2, session=2.0, hidden=[()]),
     "startup": partial(startup, 1, commands=("--help",), trains=False),
 }
 

@@ -1,9 +1,10 @@
-"""Section: fit the constants of a simulated finger to its recording."""
+"""Section: fit the constants of a simulated finger to its recording; diagnose a whole bench session."""
 
 from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -12,9 +13,12 @@ import numpy as np
 from tactile_cube.benchmarking.mujoco_sysid import fit_finger
 from tactile_cube.benchmarking.peers import find_peer
 from tactile_cube.benchmarking.report import Figure, Section
+from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.identification.diagnosis import diagnose
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.noise import sensor_noise
 from tactile_cube.identification.search import Search
+from tactile_cube.identification.shooting import Shooting
 from tactile_cube.measurement.recording import Recording, read_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 from tactile_cube.measurement.split import held_out_split
@@ -23,10 +27,19 @@ from tactile_cube.measurement.writing import write_recording
 YARDSTICK = "mujoco.sysid"
 CONTROLLER = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0}
 NOMINAL = {"stiffness": float("inf"), "static_friction": 0.02, "reflected_inertia": 0.003}
+HIDDEN = ((), ("stribeck_friction@q3",), ("command_delay", "backlash@q2"))
+"""What the sessions that are diagnosed have and their model lacks."""
 STEP = 0.002
 
 
-def identification(rounds: int, peers: bool = True, duration: float = 8.0, kinds: int = 3) -> Section:
+def identification(
+    rounds: int,
+    peers: bool = True,
+    duration: float = 8.0,
+    kinds: int = 3,
+    session: float = 12.0,
+    hidden: Sequence[Sequence[str]] = HIDDEN,
+) -> Section:
     """Damping, dry friction and rotor inertia of three joints, from trials without joint offsets.
 
     Args:
@@ -34,6 +47,8 @@ def identification(rounds: int, peers: bool = True, duration: float = 8.0, kinds
         peers: whether to measure other people's programs too.
         duration: of a trial [s].
         kinds: of excitation, one trial each.
+        session: duration of a trial of the sessions that are diagnosed [s].
+        hidden: effects of each of these sessions.
     """
     title = f"fit of a finger's constants to trials of {duration:g} s; note: free-running error on held-out trials"
     section = Section("identification", title, YARDSTICK)
@@ -46,8 +61,31 @@ def identification(rounds: int, peers: bool = True, duration: float = 8.0, kinds
         _note(found, "tactile_cube, base fit", *_ours(fitted, held_out))
         if mujoco is not None and sysid is not None:
             _note(found, YARDSTICK, *_theirs(mujoco, sysid, fitted, held_out))
-    section.figures = _figures(found)
+    section.figures = [*_figures(found), *diagnoses(session, hidden)]
     return section
+
+
+def diagnoses(trial: float, hidden: Sequence[Sequence[str]]) -> list[Figure]:
+    """Diagnoses of bench sessions of 12 trials with a finger's three joints, once each: they take long.
+
+    Args:
+        trial: duration of a trial [s].
+        hidden: effects of each session.
+    """
+    effects = list(catalogue().values())
+    figures = []
+    nominal = NOMINAL | {"stiffness": 25.0}
+    for names in hidden:
+        rig = SimulatedRig(controller=CONTROLLER, nominal=nominal, hidden=names, duration=trial, validation=False)
+        recording = _recorded(rig, seed=3)
+        Shooting(recording, effects)  # compiles
+        began = time.perf_counter()
+        verdict = diagnose(recording, effects, engine="fast", say=lambda line: None).verdict
+        seconds = time.perf_counter() - began
+        name = f"diagnosis, {' and '.join(names) or 'nothing'} hidden"
+        note = f"{len(recording.trials)} trials of {trial:g} s: {verdict.kind}"
+        figures.append(Figure(name, seconds, seconds, seconds, "s on the clock", None, note))
+    return figures
 
 
 def simulated_recording(duration: float, kinds: int) -> Recording:
@@ -61,8 +99,12 @@ def simulated_recording(duration: float, kinds: int) -> Recording:
         duration=duration,
         validation=False,
     )
+    return _recorded(source, seed=0)
+
+
+def _recorded(source: SimulatedRig, seed: int) -> Recording:
     with tempfile.TemporaryDirectory() as folder:
-        ((_, tables),) = source.recordings(0).items()
+        ((_, tables),) = source.recordings(seed).items()
         write_recording(Path(folder), tables)
         return read_recording(folder)
 
