@@ -15,6 +15,7 @@ from tactile_cube.measurement.recording import Recording
 Array = NDArray[np.float64]
 EffectClass = type[Effect]
 MOST_SHOWN = 4  # fitted parameters that a label lists
+LEVELS = (0.5, 0.75, 0.9, 0.97, 0.997)  # of the torques that a recording asks for, where a saturation starts
 CUBIC = (0.01, 0.1, 1.0)  # parts of the usual torque at which a cubic spring takes over
 DEAD = (0.1, 0.4)  # parts of the usual torque at which a dead zone of the torque starts
 
@@ -116,19 +117,20 @@ class _Seen:
                 np.abs(kp * (trial.command - trial.position)[:, joint] - kd * trial.velocity()[:, joint])
                 for trial in recording.trials
             ]
-        self.torque = np.maximum(np.quantile(np.concatenate(torques), [0.9, 0.97, 0.997]), 1e-6)
+        self.torques = np.maximum(np.quantile(np.concatenate(torques), LEVELS), 1e-6)
+        self.usual_torque = float(self.torques[LEVELS.index(0.9)])
 
     def cubic_stiffness(self, compliance: float) -> list[float]:
         """Stiffness [N m/rad^3] of a cubic spring that bends as far as a linear one at parts of the usual torque."""
-        return [float(1.0 / (compliance**3 * (part * self.torque[0]) ** 2)) for part in CUBIC]
+        return [float(1.0 / (compliance**3 * (part * self.usual_torque) ** 2)) for part in CUBIC]
 
 
 def _starts(name: str, form: Mapping[str, float], seen: _Seen) -> list[Mapping[str, float]]:
     span = seen.high - seen.low
     if name == "torque_saturation":
-        return [{"limit": float(level)} for level in seen.torque]
+        return [{"limit": float(level)} for level in seen.torques]
     if name == "command_dead_zone" and "torque" in form:
-        return [{"torque": share * float(seen.torque[0])} for share in DEAD]
+        return [{"torque": share * seen.usual_torque} for share in DEAD]
     if name == "rate_limit":
         return [{"speed": share * seen.command_speed} for share in (0.8, 0.4, 0.15)]
     if name == "stiffening_elasticity":

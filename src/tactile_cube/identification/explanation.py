@@ -9,7 +9,7 @@ from tactile_cube.identification.evidence import Judgement
 from tactile_cube.identification.gauss_newton import Fit
 
 FLOOR = 1.1  # error / sensor noise at which nothing is left to explain
-NEARLY, NEARLY_EXPLAINED = 1.5, 0.99  # the same where almost all of a large error is explained: laws differ in detail
+NEARLY = 1.5  # the same of a fit before everything is free
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ class Explanation:
         """Share of the base model's excess over the sensor noise that is explained."""
         return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
 
-    def complete(self, base: Explanation) -> bool:
+    @property
+    def complete(self) -> bool:
         """Whether nothing is left that would be worth a further effect."""
-        return self.error <= FLOOR or (self.error <= NEARLY and self.explained(base) >= NEARLY_EXPLAINED)
+        return self.error <= FLOOR

@@ -99,7 +99,7 @@ class Search:
         levels: list[tuple[Explanation, ...]] = []
         scores: tuple[Score, ...] = ()
         beam: tuple[Explanation, ...] = (base,)
-        while len(levels) < DEEPEST and not any(e.complete(base) for e in beam):
+        while len(levels) < DEEPEST and not any(e.complete for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent)]
             if not scores:
                 scores = tuple(self.last_scores)
