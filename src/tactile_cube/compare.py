@@ -19,7 +19,8 @@ def main(config: DictConfig) -> None:
     from hydra.core.hydra_config import HydraConfig
 
     from tactile_cube.drivetrain.model_file import read_model
-    from tactile_cube.measurement.bench import without_touches
+    from tactile_cube.identification.contact_comparison import compare_contact
+    from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
     from tactile_cube.measurement.comparison import as_json, compare
     from tactile_cube.measurement.recording import read_recording
     from tactile_cube.visualization.comparison_report import comparison_report
@@ -29,11 +30,22 @@ def main(config: DictConfig) -> None:
     begin = time.perf_counter()
     folder = Path(HydraConfig.get().runtime.output_dir)
     model = read_model(config.model) if config.model is not None else None
-    recording = without_touches(read_recording(config.recording))
+    recording = read_recording(config.recording)
     for line in recording.warnings:
         print(f"warning: {line}", file=sys.stderr)
-    spread = {str(key): float(value) for key, value in config.band.spread.items()}
-    comparison = compare(recording, model, config.engine, config.step, config.band.simulations, spread, config.seed)
+
+    def say(line: str) -> None:
+        print(f"[{time.perf_counter() - begin:5.1f} s] {line}", file=sys.stderr, flush=True)
+
+    held, free = len(with_object(recording).trials), has_free_motion(recording)
+    if held and not free:
+        comparison = compare_contact(recording, model, config.step, say)
+    else:
+        if held:
+            say(f"{held} trials with an object are left out here; diagnose and identify use them")
+        spread = {str(key): float(value) for key, value in config.band.spread.items()}
+        band = (config.band.simulations, spread, config.seed)
+        comparison = compare(without_touches(recording), model, config.engine, config.step, *band)
     command = shlex.join(["python", "-m", "tactile_cube.compare", *sys.argv[1:]])
     result = as_json(comparison) | {"model": config.model, "engine": config.engine, "command": command}
     result["seconds"] = round(time.perf_counter() - begin, 2)

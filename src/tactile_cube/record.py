@@ -17,7 +17,6 @@ def main(config: DictConfig) -> None:
     from omegaconf import OmegaConf
 
     from tactile_cube.errors import InputError
-    from tactile_cube.measurement.bench import has_free_motion
     from tactile_cube.measurement.recording import DESCRIPTION, read_recording
     from tactile_cube.measurement.writing import write_recording
 
@@ -35,10 +34,7 @@ def main(config: DictConfig) -> None:
         kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
         joints = ", ".join(recording.joints)
         print(f"{out / name}: {len(recording.trials)} trials ({kinds}), {seconds:.0f} s, joints {joints}")
-    if has_free_motion(read_recording(out)):
-        print(f"next: python -m tactile_cube.compare recording={out}")
-    else:
-        print(f"next: python -m tactile_cube.identify recording={out} effects=[lateral_friction,spinning_friction]")
+    print(f"next: python -m tactile_cube.compare recording={out}")
 
 
 if __name__ == "__main__":

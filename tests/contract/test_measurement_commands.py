@@ -37,6 +37,17 @@ def test_record_then_compare(tmp_path: Path) -> None:
         assert (tmp_path / "run" / file).is_file()
 
 
+def test_a_grasp_is_compared_too(tmp_path: Path) -> None:
+    settings = ["source=grasp", "source.kinds=[twist]", "source.levers=[0.06]", "source.initialisations=1"]
+    made = run("record", "out=grip", *settings, "source.validation=false", folder=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert "next: python -m tactile_cube.compare recording=grip" in made.stdout
+    compared = run("compare", "recording=grip", "hydra.run.dir=run", folder=tmp_path)
+    assert compared.returncode == 0, compared.stderr
+    assert "twist_0_0 simulated, 1 of 1" in compared.stderr
+    assert "what a world with the true effects leaves of a grasp" in (tmp_path / "run" / "report.html").read_text()
+
+
 def test_a_bad_recording_is_one_line_and_status_2(tmp_path: Path) -> None:
     write(tmp_path / "r", spoil=lambda columns: columns.pop("a.command"))
     result = run("compare", "recording=r", folder=tmp_path)

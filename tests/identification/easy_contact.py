@@ -19,10 +19,6 @@ class EasyTrial:
         self.trial = SimpleNamespace(kind=kind, name=name, initialisation=initialisation, valid=valid)
         self.truth, self.neutral = truth, neutral
         self.noise = np.random.default_rng(initialisation).normal(size=(40, len(JOINTS)))
-        self.settled = 0
-
-    def settle(self, contact: Contact, rounds: int = 2) -> None:
-        self.settled += rounds
 
     def residual(self, contact: Contact) -> np.ndarray:
         off = 0.0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.drivetrain.model_file import ModelFile, Provenance
 from tactile_cube.identification.contact_diagnosis import ContactDiagnosis, ContactSearch, verdict_of, with_contact
 from tactile_cube.measurement.error import ErrorSummary
 from tactile_cube.measurement.hand_replay import Contact
@@ -67,7 +67,7 @@ def test_the_answer_has_the_keys_of_diagnosis_json() -> None:
     assert entry["heldout_gain"] > 0.5
     assert entry["p_value"] < 0.05
     assert set(entry["parameters"]["coefficient"]) == {"value", "low", "high", "unit"}
-    assert set(result["error"]) == {"nominal", "refitted", "with_effects", "noise_floor"}
+    assert set(result["error"]) == {"nominal", "with_effects", "noise_floor"}
 
 
 @pytest.mark.parametrize(
@@ -82,6 +82,12 @@ def test_the_answer_has_the_keys_of_diagnosis_json() -> None:
 def test_the_verdicts_on_drivetrain_and_contact_become_one(drive: str, lateral: float, verdict: str) -> None:
     result = {"verdict": drive, "effects": [], "partial_effects": []}
     assert with_contact(result, diagnosis(lateral))["verdict"] == verdict
+
+
+def test_the_model_file_tells_which_trials_judged() -> None:
+    model = ModelFile(joints=["a"], provenance=Provenance(trials=["hold_0", "hold_3"]))
+    made = diagnosis(0.5).into(model, alone=True)
+    assert (made.provenance.trials, made.provenance.held_out) == (["hold_0"], ["hold_3"])
 
 
 def test_an_adequate_contact_adds_nothing_to_the_model() -> None:

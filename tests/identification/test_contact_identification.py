@@ -58,7 +58,7 @@ def test_the_recording_tells_of_the_load_and_not_of_the_friction(recording: Reco
 
 @pytest.mark.parametrize(
     ("effect", "parameter", "truth", "factor"),
-    [("lateral_friction", "coefficient", LATERAL, 1.2), ("spinning_friction", "radius", SPINNING, 2.0)],
+    [("lateral_friction", "coefficient", LATERAL, 1.2), ("spinning_friction", "radius", SPINNING, 1.4)],
 )
 def test_friction_comes_back_within_its_interval(
     found: ContactIdentification, effect: str, parameter: str, truth: float, factor: float
@@ -71,7 +71,7 @@ def test_friction_comes_back_within_its_interval(
 
 def test_the_error_falls_on_initialisations_that_the_fit_never_saw(found: ContactIdentification) -> None:
     assert found.held_out
-    assert found.stages["with_effects"].overall < 0.5 * found.stages["nominal"].overall
+    assert found.stages["with_effects"].overall < 0.65 * found.stages["nominal"].overall
 
 
 def test_the_model_file_names_values_intervals_and_units(found: ContactIdentification, recording: Recording) -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.identification.contact_fit import fit_contact, summarise
-from tactile_cube.identification.contact_search import TrialEstimate, best_value, first_value
+from tactile_cube.identification.contact_search import NARROWINGS, Opinion, first_value, narrowed, opinion
 from tactile_cube.identification.contact_unknown import unknowns
 from tactile_cube.measurement.hand_replay import Contact
 from tactile_cube.simulation.contact_effects import LateralFriction, ObjectCom, SpinningFriction, TipCompliance
@@ -11,8 +11,8 @@ from tests.identification.easy_contact import friction
 LATERAL = unknowns([LateralFriction])[0]
 
 
-def opinion(initialisation: int, value: float, telling: bool = True) -> TrialEstimate:
-    return TrialEstimate("t", initialisation, value, telling, 1.0)
+def said(initialisation: int, value: float, telling: bool = True) -> Opinion:
+    return Opinion("t", initialisation, value, telling, 1.0)
 
 
 def test_a_grid_spans_the_bounds_in_equal_factors_or_differences() -> None:
@@ -21,7 +21,7 @@ def test_a_grid_spans_the_bounds_in_equal_factors_or_differences() -> None:
     np.testing.assert_allclose(grid[1:] / grid[:-1], grid[1] / grid[0])
     compliance = unknowns([TipCompliance])[0].grid()
     np.testing.assert_allclose(np.diff(compliance), compliance[1])
-    assert unknowns([SpinningFriction])[0].grid(around=0.25)[-1] == pytest.approx(0.3)
+    assert max(narrowed([friction("hold", 0)], Contact({}), LATERAL, 1.6)) == pytest.approx(1.6)  # type: ignore[list-item]
 
 
 def test_an_effect_has_an_unknown_for_each_parameter() -> None:
@@ -34,11 +34,11 @@ def test_an_effect_has_an_unknown_for_each_parameter() -> None:
 
 
 @pytest.mark.parametrize("truth", [0.3, 0.62, 1.3])
-def test_the_coarse_grid_and_one_trial_find_the_truth(truth: float) -> None:
+def test_the_coarse_grid_and_narrower_ones_find_the_truth(truth: float) -> None:
     trials = [friction("hold", k, truth) for k in range(2)]
     start = first_value(trials, Contact({}), LATERAL)  # type: ignore[arg-type]
     assert start is not None
-    found = best_value(trials[0], Contact({}), LATERAL, start)  # type: ignore[arg-type]
+    found = opinion(trials, Contact({}), LATERAL, start)  # type: ignore[arg-type]
     assert found.telling
     assert found.value == pytest.approx(truth, rel=0.05)
 
@@ -46,33 +46,40 @@ def test_the_coarse_grid_and_one_trial_find_the_truth(truth: float) -> None:
 def test_a_trial_that_does_not_change_knows_nothing() -> None:
     trial = friction("twist", 0)
     assert first_value([trial], Contact({}), LATERAL) is None  # type: ignore[list-item]
-    assert not best_value(trial, Contact({}), LATERAL, 0.9).telling  # type: ignore[arg-type]
+    assert not opinion([trial], Contact({}), LATERAL, 0.9).telling  # type: ignore[list-item]
 
 
 def test_the_interval_is_students_of_the_initialisations() -> None:
-    said = [opinion(0, 0.5), opinion(0, 0.7), opinion(1, 0.6), opinion(2, 0.66), opinion(3, 0.1, telling=False)]
-    logs = np.array([0.5 * np.log(0.5 * 0.7), np.log(0.6), np.log(0.66)])
+    values = [0.5, 0.6, 0.66]
+    opinions = [said(k, value) for k, value in enumerate(values)] + [said(3, 0.1, telling=False)]
+    logs = np.log(values)
     half = np.hypot(4.3027 * logs.std(ddof=1) / np.sqrt(3), 0.03)
-    estimate = summarise(LATERAL, said)
+    estimate = summarise(LATERAL, opinions)
     assert np.log([estimate.low, estimate.value, estimate.high]) == pytest.approx(
-        [logs.mean() - half, logs.mean(), logs.mean() + half], rel=1e-3
+        [logs.mean() - half, logs.mean(), logs.mean() + half], abs=1e-4
     )
 
 
+def test_initialisations_that_agree_leave_the_spacing_of_the_last_grid() -> None:
+    unknown = unknowns([SpinningFriction])[0]
+    estimate = summarise(unknown, [said(k, 0.02) for k in range(3)])
+    assert np.log(estimate.high / 0.02) == pytest.approx(unknown.spacing / 2**NARROWINGS)
+
+
 def test_without_a_telling_trial_the_interval_is_everything() -> None:
-    estimate = summarise(LATERAL, [opinion(0, 0.5, telling=False)])
+    estimate = summarise(LATERAL, [said(0, 0.5, telling=False)])
     assert (estimate.value, estimate.low, estimate.high) == (0.9, 0.2, 1.6)
 
 
 def test_one_trial_alone_gives_a_wide_interval() -> None:
-    estimate = summarise(LATERAL, [opinion(0, 0.6)])
+    estimate = summarise(LATERAL, [said(0, 0.6)])
     assert estimate.low < 0.45 < 0.6 < 0.8 < estimate.high
 
 
 def test_each_effect_is_fitted_on_the_kind_of_trial_that_shows_it() -> None:
     trials = [friction(kind, k, 0.6, 0.03) for k in range(3) for kind in ("hold", "twist")]
     fit = fit_contact(trials, [LateralFriction, SpinningFriction], Contact({}), lambda line: None)  # type: ignore[arg-type]
-    assert {one.trial.split("_")[0] for one in fit.opinions["spinning_friction", "radius"]} == {"twist"}
+    assert {one.trials.split("_")[0] for one in fit.opinions["spinning_friction", "radius"]} == {"twist"}
     assert fit.contact.values["lateral_friction"]["coefficient"] == pytest.approx(0.6, rel=0.05)
     assert fit.contact.values["spinning_friction"]["radius"] == pytest.approx(0.03, rel=0.05)
     assert fit.silent() == []

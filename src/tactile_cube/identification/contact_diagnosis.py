@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
-from tactile_cube.identification.contact_fit import fit_contact, shown_by
-from tactile_cube.identification.contact_search import first_value, refined_value
-from tactile_cube.identification.contact_trial import ContactTrial
+from tactile_cube.identification.contact_fit import evenly, fit_contact, shown_by
+from tactile_cube.identification.contact_search import best_of, first_value, narrowed, pooled_cost
+from tactile_cube.identification.contact_trial import SIGMA, ContactTrial
 from tactile_cube.identification.contact_unknown import unknowns
 from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.error import ErrorSummary, summarise
@@ -28,6 +27,9 @@ from tactile_cube.simulation.contact_effects import ContactEffect, contact_catal
 Array = NDArray[np.float64]
 Verdict = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 FITTED, JUDGED = 3, 2  # trials of each kind that are fitted and judged
+LOOKED = 2  # of those that are fitted, how many decide whether an effect helps
+ROUGHLY = 2  # times that the grid is halved for that
+PROMISE = 1.1  # factor by which an effect must lower the cost of those to be judged
 GAIN = 0.15  # least share of the held-out error that an effect must take off
 AS_GOOD = 0.1  # an effect that leaves at most this share more is a rival
 P_VALUE = 0.01
@@ -65,7 +67,7 @@ class ContactDiagnosis:
         tried: everything that was tried, best first in each round.
         estimates: (effect, parameter) -> value with interval.
         stages: nominal and with_effects: held-out errors [rad].
-        noise_floor: noise of the position sensors [rad].
+        noise_floor: noise of the position sensors, and what a world with the true effects leaves [rad].
         held_out: names of the trials that judged.
     """
 
@@ -90,6 +92,9 @@ class ContactDiagnosis:
         if alone:
             overall: dict[str, Any] = {key: summary.overall for key, summary in self.stages.items()}
             update["errors"] = ModelErrors(**overall, noise_floor=self.noise_floor)
+            others = [name for name in model.provenance.trials if name not in self.held_out]
+            trials = {"trials": others, "held_out": self.held_out}
+            update["provenance"] = model.provenance.model_copy(update=trials)
         return model.model_copy(update=update)
 
     def as_json(self) -> dict[str, Any]:
@@ -108,9 +113,9 @@ class ContactDiagnosis:
                 for tried in self.tried
                 for one in tried
             ],
-            "error": overall | {"refitted": overall["nominal"], "noise_floor": self.noise_floor},
+            "error": overall | {"noise_floor": self.noise_floor},
             "error_joints": {key: summary.joints for key, summary in self.stages.items()},
-            "noise_floor_source": "guess",
+            "noise_floor_source": "contact",
             "unexplained": [],
             "partial_effects": entries if self.verdict == "unknown_effect" else [],
             "next_experiment": None,
@@ -167,7 +172,7 @@ def diagnose_contact(
     stages = {
         key: summarise(list(np.sqrt(s)), held.joints) for key, s in (("nominal", search.first), ("with_effects", end))
     }
-    noise = float(np.sqrt(np.mean(sensor_noise(held) ** 2)))
+    noise = float(np.hypot(np.sqrt(np.mean(sensor_noise(held) ** 2)), SIGMA))
     names = [one.trial.name for one in judges]
     verdict = verdict_of(search, stages["with_effects"].overall)
     return ContactDiagnosis(verdict, search.found, search.rivals, search.tried, estimates, stages, noise, names)
@@ -210,11 +215,10 @@ class ContactSearch:
 
     def run(self, contact: Contact) -> None:
         """Fill `found`, `rivals`, `tried` and `first`."""
+        self.say(f"simulating {len(self.trials)} trials as stated, and {len(self.judges)} that judge")
         self.first = before = _squares(self.judges, contact)
         while len(self.found) < MOST_EFFECTS and (not self.found or np.sqrt(before.mean()) > GOOD):
             known = {one.effect for one in self.found}
-            for one in self.trials:
-                one.settle(contact)
             left = [effect for effect in contact_catalogue().values() if effect not in known]
             tried = sorted((self._try(effect, contact, before) for effect in left), key=lambda one: one.error)
             self.tried.append(tried)
@@ -226,16 +230,22 @@ class ContactSearch:
             contact, before = best.contact, _squares(self.judges, best.contact)
 
     def _try(self, effect: type[ContactEffect], contact: Contact, before: Array) -> Tried:
+        """The effect at the values that suit the trials best, coarse unless they promise something."""
+        trials = _some_of_each_kind(shown_by(self.trials, effect), LOOKED)
+        start = pooled_cost(trials, contact)
         for unknown in unknowns([effect]):
-            trials = [copy(one) for one in shown_by(self.trials, effect)]  # the next effect starts from where this did
-            value = first_value(trials, contact, unknown)
+            value = first_value(trials[:1], contact, unknown)
             if value is not None:
-                contact = unknown.put(contact, refined_value(trials, contact, unknown, value))
+                contact = unknown.put(contact, value)
+                contact = unknown.put(contact, best_of(narrowed(trials, contact, unknown, value, ROUGHLY)))
+        if start - pooled_cost(trials, contact) < len(trials) * np.log(PROMISE):
+            self.say(f"{effect.name}: takes nothing off the error")
+            return Tried(effect, contact, float(np.sqrt(before.mean())), 0.0, 1.0)
         after = _squares(self.judges, contact)
         gain = 1 - float(np.sqrt(after.mean() / before.mean()))
         better = (np.sqrt(before) - np.sqrt(after)).ravel()
         p_value = float(stats.wilcoxon(better, alternative="greater").pvalue) if np.any(better) else 1.0
-        self.say(f"{effect.name}: takes off {100 * gain:.0f} % of the held-out error")
+        self.say(f"{effect.name}: takes {100 * gain:.0f} % off the held-out error")
         return Tried(effect, contact, float(np.sqrt(after.mean())), gain, p_value)
 
 
@@ -249,22 +259,17 @@ def verdict_of(search: ContactSearch, left: float) -> Verdict:
 def _squares(trials: Sequence[ContactTrial], contact: Contact) -> Array:
     """Mean square of the residual (trials, 1, joints) [rad^2], offsets and the box's place fitted."""
     rows = []
-    for one in map(copy, trials):
-        one.settle(contact)
+    for one in trials:
         rows.append([np.mean(one.residual(contact)[one.trial.valid] ** 2, axis=0)])
     return np.array(rows)
 
 
 def _some_of_each_kind(trials: Sequence[ContactTrial], count: int) -> list[ContactTrial]:
-    """At most `count` trials of each kind, from as many initialisations and with as many loads as possible."""
+    """At most `count` trials of each kind."""
     kinds: dict[str, list[ContactTrial]] = {}
     for one in trials:
         kinds.setdefault(one.trial.kind, []).append(one)
-    chosen = []
-    for members in kinds.values():
-        stride = np.linspace(0, len(members) - 1, min(count, len(members))).round().astype(int)
-        chosen += [members[index] for index in dict.fromkeys(stride.tolist())]
-    return chosen
+    return [one for members in kinds.values() for one in evenly(members, count)]
 
 
 def _values(one: Tried) -> list[tuple[Any, float]]:

@@ -1,4 +1,4 @@
-"""Contact effects from trials with an object: each trial gives a value, their scatter the interval."""
+"""Contact effects from trials with an object: each initialisation gives a value, their scatter the interval."""
 
 from __future__ import annotations
 
@@ -9,17 +9,25 @@ import numpy as np
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import Estimate
-from tactile_cube.identification.contact_search import TrialEstimate, best_value, first_value
+from tactile_cube.identification.contact_search import NARROWINGS, Opinion, best_of, first_value, narrowed, opinion
 from tactile_cube.identification.contact_trial import ContactTrial
 from tactile_cube.identification.contact_unknown import Unknown, unknowns
 from tactile_cube.measurement.hand_replay import Contact
 from tactile_cube.simulation.contact_effects import ContactEffect
 
 CONFIDENCE = 0.95
-SOLVER = 0.03  # relative error of a friction found at 2 ms and 30 iterations, against half the step
-# Values are compared at joint offsets that are not at their best for each of them; all initialisations share what that
-# does to the spinning friction, so that their scatter does not show it. Seen: 0.017 to 0.024 m for a true 0.03 m.
-SHARED = {"spinning_friction": float(np.log(2.0))}
+FEW = 3  # trials of a first look
+# What a world in steps of 2 ms and 30 iterations shares in all initialisations, so that their scatter does not show it:
+# of frictions the logarithm, of the rest in their unit. Seen on recordings made in steps of 1 ms.
+SOLVER = {
+    "lateral_friction": 0.03,
+    "spinning_friction": 0.03,
+    "tip_compliance": 1e-4,
+    "object_mass": 0.01,
+    "object_com": 2e-3,
+    "object_size": 1e-3,
+}
+ASKED = 2  # trials of each initialisation, with loads as different as there are
 
 
 @dataclass(frozen=True)
@@ -29,12 +37,12 @@ class ContactFit:
     Attributes:
         contact: the values.
         estimates: (effect, parameter) -> value with interval.
-        opinions: (effect, parameter) -> what each trial said.
+        opinions: (effect, parameter) -> what each initialisation said.
     """
 
     contact: Contact
     estimates: dict[tuple[str, str], Estimate]
-    opinions: dict[tuple[str, str], list[TrialEstimate]]
+    opinions: dict[tuple[str, str], list[Opinion]]
 
     def silent(self) -> list[str]:
         """Parameters of which no trial knows anything."""
@@ -56,17 +64,25 @@ def fit_contact(
         say: takes progress lines.
     """
     contact, wanted = start, unknowns(list(effects))
-    for one in dict.fromkeys(one for effect in effects for one in shown_by(trials, effect)):
-        one.settle(start)
     for unknown in wanted:
-        value = first_value(shown_by(trials, unknown.effect), contact, unknown)
+        value = first_value(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown)
         contact = unknown.put(contact, _neutral(unknown) if value is None else value)
-    opinions: dict[tuple[str, str], list[TrialEstimate]] = {}
+        say(f"{unknown.label}: about {contact.values[unknown.effect.name][unknown.parameter.name]:.2g}")
+    if len(wanted) > 1:
+        for unknown in wanted:
+            costs = narrowed(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown, _value(contact, unknown))
+            contact = unknown.put(contact, best_of(costs))
+    opinions: dict[tuple[str, str], list[Opinion]] = {}
     estimates: dict[tuple[str, str], Estimate] = {}
     for unknown in wanted:
         key = (unknown.effect.name, unknown.parameter.name)
-        around = contact.values[key[0]][key[1]]
-        opinions[key] = [best_value(one, contact, unknown, around) for one in shown_by(trials, unknown.effect)]
+        groups = _initialisations(shown_by(trials, unknown.effect))
+        opinions[key] = []
+        for group in groups:
+            said = opinion(evenly(group, ASKED), contact, unknown, _value(contact, unknown))
+            opinions[key].append(said)
+            telling = "" if said.telling else ", but does not show it"
+            say(f"{unknown.label}: initialisation {said.initialisation} says {said.value:.3g}{telling}")
         estimates[key] = summarise(unknown, opinions[key])
         contact = unknown.put(contact, estimates[key].value)
         say(f"{unknown.label}: {in_words(estimates[key])}")
@@ -79,35 +95,41 @@ def shown_by(trials: Sequence[ContactTrial], effect: type[ContactEffect]) -> lis
     return chosen or list(trials)
 
 
-def summarise(unknown: Unknown, opinions: Sequence[TrialEstimate]) -> Estimate:
-    """Mean of what the initialisations say, with Student's interval of their scatter.
+def summarise(unknown: Unknown, opinions: Sequence[Opinion]) -> Estimate:
+    """Mean of what the initialisations say, with Student's interval of their scatter, no narrower than the last grid.
 
-    Trials of one initialisation share its joint offsets, so they count as one where there are several. Where no trial
-    knows anything the value is the neutral one and the interval the whole range.
+    Where none knows anything the value is the neutral one and the interval the whole range.
     """
     parameter = unknown.parameter
-    values = _independent([one for one in opinions if one.telling], unknown)
+    values = [unknown.scaled(one.value) for one in opinions if one.telling]
     if not values:
         return Estimate(value=_neutral(unknown), low=parameter.low, high=parameter.high, unit=parameter.unit)
-    mean = float(np.mean(values))
-    if len(values) == 1:
-        grid = np.array([unknown.scaled(float(value)) for value in unknown.grid()])
-        half = float(np.diff(grid).mean())
-    else:
+    half = unknown.spacing
+    if len(values) > 1:
         scatter = float(np.std(values, ddof=1)) / np.sqrt(len(values))
         half = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * scatter
-    half = float(np.hypot(half, SHARED.get(unknown.effect.name, SOLVER))) if unknown.by_factors else half
+        half = max(float(np.hypot(half, SOLVER[unknown.effect.name])), unknown.spacing / 2**NARROWINGS)
+    mean = float(np.mean(values))
     low, value, high = (unknown.unscaled(mean + side * half) for side in (-1, 0, 1))
     return Estimate(value=value, low=low, high=high, unit=parameter.unit)
 
 
-def _independent(opinions: Sequence[TrialEstimate], unknown: Unknown) -> list[float]:
-    groups: dict[int, list[float]] = {}
-    for one in opinions:
-        groups.setdefault(one.initialisation, []).append(unknown.scaled(one.value))
-    if len(groups) > 1:
-        return [float(np.mean(values)) for values in groups.values()]
-    return [value for values in groups.values() for value in values]
+def _initialisations(trials: Sequence[ContactTrial]) -> list[list[ContactTrial]]:
+    """Trials that share their joint offsets, and so count as one."""
+    groups: dict[int, list[ContactTrial]] = {}
+    for one in trials:
+        groups.setdefault(one.trial.initialisation, []).append(one)
+    return list(groups.values())
+
+
+def evenly(trials: Sequence[ContactTrial], count: int) -> list[ContactTrial]:
+    """At most `count` of them, from as many initialisations and with as many loads as possible."""
+    chosen = np.linspace(0, len(trials) - 1, min(count, len(trials))).round().astype(int)
+    return [trials[index] for index in chosen]
+
+
+def _value(contact: Contact, unknown: Unknown) -> float:
+    return contact.values[unknown.effect.name][unknown.parameter.name]
 
 
 def _neutral(unknown: Unknown) -> float:

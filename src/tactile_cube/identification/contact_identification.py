@@ -13,7 +13,7 @@ import numpy as np
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact_fit import ContactFit, fit_contact, shown_by
-from tactile_cube.identification.contact_trial import ContactTrial
+from tactile_cube.identification.contact_trial import SIGMA, ContactTrial
 from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.error import ErrorSummary, summarise
 from tactile_cube.measurement.hand_replay import Contact, HandReplay, contact_of
@@ -29,9 +29,9 @@ class ContactIdentification:
     """Contact effects with intervals, and what they gain.
 
     Attributes:
-        fit: values, intervals and what each trial said.
+        fit: values, intervals and what each initialisation said.
         stages: nominal and with_effects: errors on held-out trials, offsets and the box's place fitted to each [rad].
-        noise_floor: noise of the position sensors [rad].
+        noise_floor: noise of the position sensors, and what a world with the true effects leaves [rad].
         held_out: names of the held-out trials.
     """
 
@@ -66,7 +66,7 @@ class ContactIdentification:
             "error": {key: one.overall for key, one in self.stages.items()} | {"noise_floor": self.noise_floor},
             "joints": {key: one.joints for key, one in self.stages.items()},
             "held_out": self.held_out,
-            "trials": {" ".join(key): [vars(one) for one in said] for key, said in self.fit.opinions.items()},
+            "initialisations": {" ".join(key): [vars(one) for one in said] for key, said in self.fit.opinions.items()},
             "silent": self.fit.silent(),
         }
 
@@ -146,7 +146,7 @@ def identify_contact(
         errors = {key: contact_error(judges, contact, held.joints) for key, contact in stages.items()}
     finally:
         replay.close()
-    noise = float(np.sqrt(np.mean(sensor_noise(held) ** 2)))
+    noise = float(np.hypot(np.sqrt(np.mean(sensor_noise(held) ** 2)), SIGMA))
     return ContactIdentification(fit, errors, noise, [one.trial.name for one in judges])
 
 
@@ -154,6 +154,5 @@ def contact_error(trials: Sequence[ContactTrial], contact: Contact, joints: Sequ
     """RMS error [rad], offsets and the box's place fitted in each trial."""
     residuals = []
     for one in trials:
-        one.settle(contact)
         residuals.append(np.where(one.trial.valid[:, None], one.residual(contact), np.nan))
     return summarise(residuals, tuple(joints))

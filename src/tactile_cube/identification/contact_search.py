@@ -1,11 +1,11 @@
-"""The value of one parameter with which the simulation follows trials best: on a grid for all, then for each trial.
+"""The value of one parameter with which the simulation follows trials best: a coarse grid, then ever narrower ones.
 
 How far two slips are apart in time has a corner where they coincide, so slopes of the error are of no use here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,24 +14,23 @@ from tactile_cube.identification.contact_trial import ContactTrial
 from tactile_cube.identification.contact_unknown import Unknown
 from tactile_cube.measurement.hand_replay import Contact
 
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-REFINEMENTS = 5
+NARROWINGS = 4  # each halves the spacing of the grid
 TELLING = 1.25  # the cost must rise by this factor on both sides of its minimum
 
 
 @dataclass(frozen=True)
-class TrialEstimate:
-    """One trial's opinion.
+class Opinion:
+    """What the trials of one initialisation say.
 
     Attributes:
-        trial: its name.
-        initialisation: of the trial.
+        trials: their names.
+        initialisation: which one.
         value: the best.
-        telling: whether the trial becomes worse on both sides of it; otherwise it does not know.
-        cost: at the best.
+        telling: whether the trials are followed worse on both sides of it; otherwise they do not know.
+        cost: at the best, a trial.
     """
 
-    trial: str
+    trials: str
     initialisation: int
     value: float
     telling: bool
@@ -39,33 +38,31 @@ class TrialEstimate:
 
 
 def first_value(trials: Sequence[ContactTrial], contact: Contact, unknown: Unknown) -> float | None:
-    """The value of a coarse grid that suits all trials best, or None where no value is better than another.
-
-    The trials must be settled.
-    """
+    """The value of a coarse grid that suits all trials best, or None where no value is better than another."""
     grid = unknown.grid()
     total = np.array([pooled_cost(trials, unknown.put(contact, float(value))) for value in grid])
     return float(grid[np.argmin(total)]) if np.ptp(total) > np.log(TELLING) else None
 
 
-def refined_value(trials: Sequence[ContactTrial], contact: Contact, unknown: Unknown, around: float) -> float:
-    """The value between the neighbours of a coarse one that suits all trials best."""
-    near = unknown.put(contact, around)
-    for trial in trials:
-        trial.settle(near, rounds=1)
+def narrowed(
+    trials: Sequence[ContactTrial], contact: Contact, unknown: Unknown, around: float, times: int = NARROWINGS
+) -> dict[float, float]:
+    """Value -> pooled cost on grids about the best value so far, each half as wide as the one before."""
     costs: dict[float, float] = {}
+    best, spacing = unknown.scaled(around), unknown.spacing
+    for _ in range(times):
+        spacing /= 2
+        for scaled in (best, best - spacing, best + spacing):
+            value = unknown.unscaled(scaled)
+            if value not in costs:
+                costs[value] = pooled_cost(trials, unknown.put(contact, value))
+        best = unknown.scaled(best_of(costs))
+    return costs
 
-    def cost(scaled: float) -> float:
-        if scaled not in costs:
-            costs[scaled] = pooled_cost(trials, unknown.put(contact, unknown.unscaled(scaled)))
-        return costs[scaled]
 
-    grid = sorted(unknown.scaled(float(value)) for value in unknown.grid())
-    middle = unknown.scaled(around)
-    cost(middle)
-    lower, upper = [v for v in grid if v < middle - 1e-9], [v for v in grid if v > middle + 1e-9]
-    _golden_section(cost, lower[-1] if lower else middle, upper[0] if upper else middle)
-    return unknown.unscaled(min(costs, key=lambda value: costs[value]))
+def best_of(costs: Mapping[float, float]) -> float:
+    """The value of the least cost."""
+    return min(costs, key=costs.__getitem__)
 
 
 def pooled_cost(trials: Sequence[ContactTrial], contact: Contact) -> float:
@@ -73,36 +70,18 @@ def pooled_cost(trials: Sequence[ContactTrial], contact: Contact) -> float:
     return float(np.sum(np.log([trial.cost(contact) for trial in trials])))
 
 
-def best_value(trial: ContactTrial, contact: Contact, unknown: Unknown, around: float) -> TrialEstimate:
-    """The value near another one that suits one trial best: a grid, then the golden section about its best."""
-    costs: dict[float, float] = {}
-
-    def cost(scaled: float) -> float:
-        if scaled not in costs:
-            costs[scaled] = trial.cost(unknown.put(contact, unknown.unscaled(scaled)))
-        return costs[scaled]
-
-    trial.settle(unknown.put(contact, around), rounds=1)
-    grid = sorted(unknown.scaled(float(value)) for value in unknown.grid(around))
-    best = int(np.argmin([cost(value) for value in grid]))
-    trial.settle(unknown.put(contact, unknown.unscaled(grid[best])), rounds=1)
-    before = {value: costs.pop(value) for value in grid}
-    cost(grid[best])
-    _golden_section(cost, grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-    found = min(costs, key=lambda value: costs[value])
-    least = costs[found]
-    costs.update({value: one for value, one in before.items() if value not in costs})
-    sides = [max((c for v, c in costs.items() if (v - found) * side > 0), default=least) for side in (-1, 1)]
-    name, initialisation = trial.trial.name, trial.trial.initialisation
-    return TrialEstimate(name, initialisation, unknown.unscaled(found), min(sides) > TELLING * least, least)
+def opinion(trials: Sequence[ContactTrial], contact: Contact, unknown: Unknown, around: float) -> Opinion:
+    """The value near another one that suits trials of one initialisation best."""
+    costs = narrowed(trials, contact, unknown, around)
+    found = best_of(costs)
+    rises = [max((cost for value, cost in costs.items() if side * (value - found) > 0), default=costs[found])
+             for side in (-1, 1)]  # fmt: skip
+    telling = min(rises) - costs[found] > np.log(TELLING) * len(trials) or _at_neutral(unknown, found)
+    name = " ".join(one.trial.name for one in trials)
+    return Opinion(name, trials[0].trial.initialisation, found, telling, float(np.exp(costs[found] / len(trials))))
 
 
-def _golden_section(cost: Callable[[float], float], low: float, high: float) -> None:
-    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
-    for _ in range(REFINEMENTS):
-        if cost(inner[0]) < cost(inner[1]):
-            high = inner[1]
-            inner = [high - GOLDEN * (high - low), inner[0]]
-        else:
-            low = inner[0]
-            inner = [inner[1], low + GOLDEN * (high - low)]
+def _at_neutral(unknown: Unknown, value: float) -> bool:
+    """Whether a value is neutral and there is nothing beyond it."""
+    p = unknown.parameter
+    return value == p.neutral and value in (p.low, p.high)

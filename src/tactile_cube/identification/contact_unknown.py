@@ -12,8 +12,7 @@ from tactile_cube.measurement.hand_replay import Contact
 from tactile_cube.simulation.contact_effects import ContactEffect
 
 Array = NDArray[np.float64]
-COARSE, FINE, RATIO = 7, 5, 1.8  # values of a first and of a second grid; the largest ratio of neighbours
-NEAR = 2.0  # factor around a known value
+COARSE, RATIO = 5, 2.3  # least number of values of a first grid; the largest ratio of neighbours
 
 
 @dataclass(frozen=True)
@@ -39,19 +38,19 @@ class Unknown:
         """Whether equal factors matter, and not equal differences."""
         return self.parameter.low > 0
 
-    def grid(self, around: float | None = None) -> Array:
-        """Values to try, over all its range or around one value."""
+    def grid(self) -> Array:
+        """Coarse values over all its range."""
         low, high = self.parameter.low, self.parameter.high
-        if around is not None and self.by_factors:
-            low, high = max(low, around / NEAR), min(high, around * NEAR)
-        elif around is not None:
-            reach = (high - low) / (COARSE - 1)
-            low, high = max(low, around - reach), min(high, around + reach)
-        count = COARSE if around is None else FINE
         if not self.by_factors:
-            return np.linspace(low, high, count)
-        count = max(count, int(np.ceil(np.log(high / low) / np.log(RATIO))) + 1)
+            return np.linspace(low, high, COARSE)
+        count = max(COARSE, int(np.ceil(np.log(high / low) / np.log(RATIO))) + 1)
         return np.asarray(np.geomspace(low, high, count))
+
+    @property
+    def spacing(self) -> float:
+        """Between neighbours of the grid, on the scale of `scaled`."""
+        first, second = self.grid()[:2]
+        return self.scaled(float(second)) - self.scaled(float(first))
 
     def scaled(self, value: float) -> float:
         """The value on the scale in which it is averaged."""

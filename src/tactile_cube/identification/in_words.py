@@ -14,21 +14,23 @@ OPENING = {
     "ambiguous": "An effect is missing, but this recording cannot tell these apart:",
     "unknown_effect": "Something is missing that no effect of the catalogue explains.",
 }
+HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
 
 
 def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     """A few lines for the terminal, from the content of diagnosis.json."""
-    lines = [OPENING[result["verdict"]]]
+    held = result.get("noise_floor_source") == "contact" and result["verdict"] == "adequate"
+    lines = [HELD if held else OPENING[result["verdict"]]]
     lines += [_effect(entry) for entry in result["effects"]]
     if partial := result.get("partial_effects"):
         lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
         lines += [_effect(entry) for entry in partial]
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     error = result["error"]
+    refitted = f"{_mrad(error['refitted'])} with constants refitted, " if "refitted" in error else ""
     lines.append(
-        f"Held-out error: {_mrad(error['nominal'])} as stated by the owner, {_mrad(error['refitted'])} with constants "
-        f"refitted, {_mrad(error['with_effects'])} with the recommended model; "
-        f"noise floor {_mrad(error['noise_floor'])}."
+        f"Held-out error: {_mrad(error['nominal'])} as stated by the owner, {refitted}"
+        f"{_mrad(error['with_effects'])} with the recommended model; noise floor {_mrad(error['noise_floor'])}."
     )
     if experiment is not None:
         lines.append(f"To decide, play {result['next_experiment']}: {expected(experiment)}")

@@ -92,11 +92,19 @@ def compare(
     parameters = nominal_parameters(recording, model)
     postures = fitted_postures(recording, parameters, step) if model is not None else no_postures(recording)
     simulated = replay_each(recording, parameters, postures, engine, step)
+    if floor is None:
+        floor = noise_floor(recording, step_size_error(recording, parameters, postures, simulated, step))
+    band = simulate_band(recording, model, simulations, spread or {}, step, seed) if simulations else None
+    return describe(recording, model, simulated, floor, band)
+
+
+def describe(
+    recording: Recording, model: ModelFile | None, simulated: list[Simulated], floor: NoiseFloor, band: Band | None
+) -> Comparison:
+    """What simulations of the trials, one each, leave of the measurement, and where."""
     trials, joints = recording.trials, recording.joints
     errors = residuals(trials, [one.position for one in simulated])
     summary = summarise(errors, joints)
-    if floor is None:
-        floor = noise_floor(recording, step_size_error(recording, parameters, postures, simulated, step))
     table = regimes(trials, errors, joints)
     return Comparison(
         recording=recording,
@@ -111,7 +119,7 @@ def compare(
         whiteness=whiteness(trials, errors, joints),
         cross_correlations=cross_correlations(trials, errors, joints),
         stretches=_stretches(recording, errors, floor),
-        band=simulate_band(recording, model, simulations, spread or {}, step, seed) if simulations else None,
+        band=band,
     )
 
 

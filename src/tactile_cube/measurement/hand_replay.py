@@ -12,6 +12,7 @@ from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand.model import JOINTS_PER_FINGER
 from tactile_cube.measurement.parameters import Parameters
 from tactile_cube.measurement.recording import DESCRIPTION, Recording
 from tactile_cube.measurement.replay import Simulated
@@ -39,6 +40,12 @@ class Contact:
             constants = contact_catalogue()[name].apply(constants, values)
         return constants
 
+    def without_neutral(self) -> frozenset[tuple[str, str, float]]:
+        """(effect, parameter, value) of all that differs from the world of the paper."""
+        neutral = {(name, p.name): p.neutral for name in self.values for p in contact_catalogue()[name].parameters}
+        every = [(name, key, value) for name, values in self.values.items() for key, value in values.items()]
+        return frozenset(one for one in every if one[2] != neutral[one[:2]])
+
     def changed(self, effect: str, **values: float) -> Contact:
         """The same with other values of one effect."""
         return Contact({**self.values, effect: {**self.values.get(effect, {}), **values}})
@@ -51,7 +58,11 @@ def contact_of(model: ModelFile | None) -> Contact:
 
 
 class HandReplay:
-    """One world for all trials with an object of a recording."""
+    """One world for all trials with an object of a recording.
+
+    Attributes:
+        finger_of: which finger each joint of the recording belongs to (joints,).
+    """
 
     def __init__(
         self,
@@ -77,6 +88,7 @@ class HandReplay:
         self.recording, self.hand = recording, hand
         self._order = [recording.joints.index(name) for name in hand.joint_names]
         self._back = np.argsort(self._order)
+        self.finger_of = self._back // JOINTS_PER_FINGER
         self._parameters = parameters
         substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
         options = SimulationOptions(dt=recording.step / substeps, substeps=substeps, solver_iterations=iterations)

@@ -23,14 +23,15 @@ class NoiseFloor:
     Attributes:
         overall: pooled over joints.
         joints: joint by joint.
-        source: `repeats` (measured) or `guess` (nothing was repeated).
+        source: `repeats` (measured), `guess` (nothing was repeated), or `contact` (how well a world with the true
+            effects follows a grasp).
         repeats: how many trials had a repeat.
         step_size: the part that comes from the simulator's time step, joint by joint; empty if not included.
     """
 
     overall: float
     joints: dict[str, float]
-    source: Literal["repeats", "guess"]
+    source: Literal["repeats", "guess", "contact"]
     repeats: int
     step_size: dict[str, float]
 

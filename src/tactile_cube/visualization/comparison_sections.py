@@ -11,6 +11,15 @@ from tactile_cube.visualization.report import Block, Callout, Figure, Listing, S
 MOST_OVERLAYS = 6
 MOST_CORRELATIONS = 8
 MOST_WARNINGS = 4
+FLOORS = {
+    "repeats": "The noise floor is the scatter of trials that repeated one command, together with the error of the "
+    "simulator's own time step.",
+    "guess": "Nothing was repeated, so the noise floor is a guess from the fast part of the signals and the sensor's "
+    "resolution, together with the error of the simulator's own time step.",
+    "contact": "The noise floor is what the world leaves of a grasp when all contact effects are true: drives are "
+    "known to some 10 % only, and the contact solver stops early. Each trial has the joint offsets and the place of "
+    "the object that suit it.",
+}
 
 
 def recording_section(recording: Recording, model: ModelFile | None) -> Section:
@@ -51,16 +60,9 @@ def error_section(comparison: Comparison) -> Section:
         step = floor.step_size.get(joint, 0.0)
         rows.append((joint, mrad(error), mrad(floor.joints[joint]), f"{error / floor.joints[joint]:.2f}", mrad(step)))
     rows.append(("all", mrad(comparison.errors.overall), mrad(floor.overall), f"{comparison.ratio:.2f}", ""))
-    source = (
-        "The noise floor is the scatter of trials that repeated one command"
-        if floor.source == "repeats"
-        else "Nothing was repeated, so the noise floor is a guess from the fast part of the signals and the "
-        "sensor's resolution"
-    )
     text = [
-        f"{source}, together with the error of the simulator's own time step. A perfect model would score 1 in the "
-        "column 'error / floor'; a model that scores 3 leaves something out that is three times as large as the "
-        "noise."
+        f"{FLOORS[floor.source]} A perfect model would score 1 in the column 'error / floor'; a model that scores 3 "
+        "leaves something out that is three times as large as the noise."
     ]
     header = ("joint", "error (RMS)", "noise floor", "error / floor", "of it time step")
     guess = [Callout("The noise floor is a guess: repeat each kind of trial to measure it.", "warn")]
@@ -164,4 +166,6 @@ def method_section() -> Section:
 
 def floor_source(floor: NoiseFloor) -> str:
     """Where the noise floor comes from, in words."""
+    if floor.source == "contact":
+        return "what a world with the true effects leaves of a grasp"
     return f"from {floor.repeats} repeats" if floor.source == "repeats" else "a guess: nothing was repeated"

@@ -13,7 +13,8 @@ def summary(comparison: Comparison) -> str:
         lines.append(f"{joint:<16}{1e3 * error:>9.3f}{1e3 * floor:>9.3f}{error / floor:>11.2f}")
     overall, floor = comparison.errors.overall, comparison.floor.overall
     lines.append(f"{'all':<16}{1e3 * overall:>9.3f}{1e3 * floor:>9.3f}{comparison.ratio:>11.2f}")
-    lines += ["", f"noise floor: {floor_source(comparison.floor)}, with the simulator's own time step"]
+    step = ", with the simulator's own time step" if comparison.floor.step_size else ""
+    lines += ["", f"noise floor: {floor_source(comparison.floor)}{step}"]
     if comparison.band is not None:
         inside = 100 * comparison.band.inside
         lines.append(

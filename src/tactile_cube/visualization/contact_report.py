@@ -13,8 +13,9 @@ from tactile_cube.visualization.report import Listing, Report, Section, Table
 
 EXPLANATION = (
     "The hand holds a known load and loosens its grip until the load slips. Each trial was simulated in the world that "
-    "training uses, with the joint offsets and the place of the load that suit it; a trial's value is the one with "
-    "which the simulated load slips when the real one did."
+    "training uses, with the joint offsets and the place of the load that suit it. An initialisation's value is the "
+    "one with which its trials are followed best: the simulated load slips when the real one did. The scatter of "
+    "these values makes the interval."
 )
 
 
@@ -22,21 +23,23 @@ def contact_sections(found: ContactIdentification) -> list[Section]:
     """What was found of fingertips and object."""
     effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
     rows = [
-        (effect, one.trial, str(one.initialisation), f"{one.value:.4g}", "" if one.telling else "does not show it")
-        for (effect, _), said in found.fit.opinions.items()
+        (effect, parameter, str(one.initialisation), f"{one.value:.4g}", "" if one.telling else "does not show it")
+        for (effect, parameter), said in found.fit.opinions.items()
         for one in said
     ]
-    table = Table(("effect", "trial", "initialisation", "value", ""), rows)
+    table = Table(("effect", "parameter", "initialisation", "value", ""), rows)
     stages = {key: one.overall for key, one in found.stages.items()} | {"noise_floor": found.noise_floor}
     joints = {key: one.joints for key, one in found.stages.items()}
     return [
         staircase_section(stages, joints),
         *effect_section(effects),
-        Section("What each trial says", (EXPLANATION,), [table]),
+        Section("What each initialisation says", (EXPLANATION,), [table]),
     ]
 
 
-def contact_diagnosis_report(result: Mapping[str, Any], name: str, command: str) -> Report:
+def contact_diagnosis_report(
+    result: Mapping[str, Any], name: str, command: str, recording: str, model_path: str
+) -> Report:
     """The page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
     tone, said = VERDICTS[result["verdict"]]
     names = (" or " if result["verdict"] == "ambiguous" else " and ").join(one["name"] for one in result["effects"])
@@ -47,10 +50,35 @@ def contact_diagnosis_report(result: Mapping[str, Any], name: str, command: str)
         sections=[
             staircase_section(result["error"], result["error_joints"]),
             *effect_section(result["effects"]),
-            *ranking_section(result["ranking"]),
+            *ranking_section([_ranked(row) for row in result["ranking"]]),
+            _next_section(result, recording, model_path),
         ],
         footer=f"Made by tactile_cube in {result['seconds']:.0f} s: {command}",
     )
+
+
+def _ranked(row: Mapping[str, Any]) -> dict[str, Any]:
+    """One effect that was tried, for people."""
+    return {
+        "effect": row["effects"],
+        "held-out error [mrad]": 1e3 * row["held_out_error"],
+        "share of it that it takes off": row["gain"],
+        "p (no better than without)": row["p_value"],
+    }
+
+
+def _next_section(result: Mapping[str, Any], recording: str, model_path: str) -> Section:
+    """What to type or to record after a diagnosis."""
+    names = ",".join(one["name"] for one in result["effects"])
+    train = f"python -m tactile_cube.train +experiment=finetune model={model_path}"
+    fit = f"python -m tactile_cube.identify recording={recording} effects=[{names}]"
+    said, lines = {
+        "adequate": ("Train in the world as it is stated:", [train]),
+        "missing_effect": ("Fit exactly this on all trials, and train with the result:", [fit, train]),
+        "ambiguous": ("Record more loads and initialisations and diagnose again, or see what each would be:", [fit]),
+        "unknown_effect": ("Record free motion too: the drivetrain may lack something that the grasps show.", []),
+    }[result["verdict"]]
+    return Section("What to do next", [said], [Listing(lines, code=True)] if lines else [])
 
 
 def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:

@@ -34,7 +34,9 @@ def write_contact_diagnosis(found: ContactDiagnosis, model: ModelFile, folder: P
     write_model(model, folder / "model.yaml")
     result = found.as_json() | {"seconds": round(seconds, 2)}
     (folder / "diagnosis.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
-    write_report(contact_diagnosis_report(result, model.rig, model.provenance.command), folder / "report.html")
+    path, made = str(folder / "model.yaml"), model.provenance
+    page = contact_diagnosis_report(result, model.rig, made.command, made.recording, path)
+    write_report(page, folder / "report.html")
     print(answer(result, None))
     print(f"report: {folder / 'report.html'}")
     print(f"model: {folder / 'model.yaml'}\ndiagnosis: {folder / 'diagnosis.json'}")

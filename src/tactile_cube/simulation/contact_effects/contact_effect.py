@@ -22,7 +22,6 @@ class ContactEffect:
         constant: the field of EpisodeConstants that it changes.
         added: its values are added to what is stated of the object; otherwise they replace the constant.
         shown_by: the kinds of trial that show it best; others are used where a recording has none of these.
-        like_offset: joint offsets look like it, so that it shows only in what several initialisations have in common.
     """
 
     name: ClassVar[str]
@@ -30,7 +29,6 @@ class ContactEffect:
     constant: ClassVar[str]
     added: ClassVar[bool] = False
     shown_by: ClassVar[tuple[str, ...]] = ("hold",)
-    like_offset: ClassVar[bool] = False
 
     @classmethod
     def apply(cls, constants: EpisodeConstants, values: Mapping[str, float]) -> EpisodeConstants:

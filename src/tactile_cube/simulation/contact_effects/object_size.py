@@ -5,12 +5,11 @@ from tactile_cube.simulation.contact_effects.contact_effect import ContactEffect
 
 
 class ObjectSize(ContactEffect):
-    """Length added to each edge."""
+    """Length added to each edge; joint offsets look much like it, so that small ones do not show."""
 
     name = "object_size"
     constant = "cube_size"
     added = True
-    like_offset = True
     parameters = (
         Parameter(
             "excess", "m", neutral=0.0, low=-0.01, high=0.01, typical=0.003, source="website: cubes differ by 5 mm"

@@ -1,0 +1,171 @@
+"""Run record, diagnose and identify on grasps with a hidden contact effect and judge what they answer.
+
+    python tests/blind/judge_contact.py --draws 20 --first-seed 100
+
+Every draw adds one line to verdicts.jsonl in `--out` as soon as it is judged; the same command goes on where it
+stopped, and writes contact_identification.md beside it. Seeds below 100 are for tuning.
+
+| hidden | right | acceptable | wrong |
+|---|---|---|---|
+| nothing | `adequate` | | everything else (a false alarm) |
+| an effect | `missing_effect`, that one alone | `ambiguous` with it in the set, `unknown_effect` | the rest |
+
+`adequate` for an effect with which the held-out error falls by less than SHOWN is `invisible`, which is acceptable:
+joint offsets and the place of the object absorb it. Whether the stated 95 % interval holds the truth is judged apart.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+FIRST_SEED = 100
+NOTHING = "nothing"
+SHOWN = 0.15  # share of the held-out error that the true effect must take off to be visible
+# Bounds of the hidden values: half and double of what is typical, and beyond what the stated world has.
+RANGES: dict[str, dict[str, tuple[float, float]]] = {
+    NOTHING: {},
+    "lateral_friction": {"coefficient": (0.3, 0.7)},
+    "spinning_friction": {"radius": (0.006, 0.05)},
+    "tip_compliance": {"compliance": (2e-4, 1.5e-3)},
+    "object_mass": {"excess": (0.03, 0.1)},
+    "object_com": {"x": (-0.02, 0.02), "y": (-0.02, 0.02), "z": (-0.02, 0.02)},
+    "object_size": {"excess": (0.003, 0.008)},
+}
+SIGNED = ("object_size",)  # with either sign
+
+
+def hidden(seed: int) -> tuple[str, dict[str, float]]:
+    """What a draw hides: each effect in turn, its values at random (friction by factors)."""
+    name = list(RANGES)[seed % len(RANGES)]
+    rng = np.random.default_rng(seed)
+    values = {
+        key: float(np.exp(rng.uniform(*np.log([low, high])))) if low > 0 else float(rng.uniform(low, high))
+        for key, (low, high) in RANGES[name].items()
+    }
+    sign = rng.choice([-1.0, 1.0]) if name in SIGNED else 1.0
+    return name, {key: round(sign * value, 6) for key, value in values.items()}
+
+
+def run(verb: str, *words: str) -> tuple[str, float]:
+    """One public verb as a user types it; what it printed, and how long it took [s]."""
+    begin = time.perf_counter()
+    command = [sys.executable, "-m", f"tactile_cube.{verb}", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}")
+    return done.stdout, time.perf_counter() - begin
+
+
+def judge(seed: int, folder: Path) -> dict[str, Any]:
+    """Record, diagnose, and identify what was hidden (the last to see whether the interval holds it)."""
+    name, values = hidden(seed)
+    place = folder / f"draw_{seed}"
+    said = ", ".join(f"{key}={value}" for key, value in values.items())
+    told = [] if name == NOTHING else [f'source.hidden=["{name}: {said}"]']
+    if not (place / "recording" / "recording.yaml").exists():
+        run("record", "source=grasp", f"out={place / 'recording'}", f"seed={seed}", "source.validation=false",
+            f"hydra.run.dir={place / 'record'}", *told)  # fmt: skip
+    words = [f"recording={place / 'recording'}", f"seed={seed}"]
+    _, seconds = run("diagnose", *words, f"hydra.run.dir={place / 'diagnose'}")
+    diagnosis = json.loads((place / "diagnose" / "diagnosis.json").read_text())
+    line = {"seed": seed, "name": name, "values": values, "diagnose_seconds": round(seconds)}
+    line |= {key: diagnosis[key] for key in ("verdict", "effects", "error")}
+    if name != NOTHING:
+        _, seconds = run("identify", *words, f"effects=[{name}]", f"hydra.run.dir={place / 'identify'}")
+        found = json.loads((place / "identify" / "identification.json").read_text())
+        line |= {"estimate": found["contact"]["effects"][0]["parameters"], "identify_error": found["error"]}
+        line |= {"identify_seconds": round(seconds), "silent": found["contact"]["silent"]}
+    return line
+
+
+def score(line: dict[str, Any]) -> tuple[str, str]:
+    """Right, acceptable or wrong, and why."""
+    names = [one["name"] for one in line["effects"]]
+    verdict, truth = line["verdict"], line["name"]
+    if truth == NOTHING:
+        return ("right", "nothing hidden") if verdict == "adequate" else ("wrong", "false alarm")
+    if verdict == "missing_effect" and names == [truth]:
+        return "right", "named"
+    if verdict == "ambiguous":
+        return ("acceptable", "in the set") if truth in names else ("wrong", "not in the set")
+    if verdict == "unknown_effect":
+        return "acceptable", "not sure"
+    if verdict == "adequate":
+        error = line["identify_error"]
+        visible = error["with_effects"] < (1 - SHOWN) * error["nominal"]
+        return ("wrong", "missed") if visible else ("acceptable", "invisible")
+    return "wrong", "another effect" if truth not in names else "an effect too many"
+
+
+def covered(line: dict[str, Any]) -> list[bool]:
+    """For each hidden value whether the stated interval holds it."""
+    return [line["estimate"][key]["low"] <= v <= line["estimate"][key]["high"] for key, v in line["values"].items()]
+
+
+def markdown(lines: list[dict[str, Any]], command: str) -> str:
+    """The page."""
+    lines = sorted(lines, key=lambda line: line["seed"])
+    outcomes = Counter(score(line)[0] for line in lines)
+    inside = [one for line in lines if line["values"] for one in covered(line)]
+    page = [
+        "# Blind identification of contact effects",
+        "",
+        f"Command: `{command}`. What is right, acceptable and wrong stands at the top of that file.",
+        "",
+        f"- {len(lines)} draws: {outcomes['right']} right, {outcomes['acceptable']} acceptable, "
+        f"{outcomes['wrong']} wrong",
+        f"- hidden values within the interval that identify states: {sum(inside)} of {len(inside)}",
+        "",
+        "Held-out error: of what is stated, and with the true effect fitted [mrad].",
+        "",
+        "| seed | hidden | answer | judged | identify says [95 % interval] | holds the truth | held-out error |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    return "\n".join([*page, *map(_row, lines), ""])
+
+
+def _row(line: dict[str, Any]) -> str:
+    values = ", ".join(f"{key} {value:.4g}" for key, value in line["values"].items())
+    names = (" or " if line["verdict"] == "ambiguous" else " + ").join(one["name"] for one in line["effects"])
+    outcome, why = score(line)
+    cells = [line["seed"], f"{line['name']} {values}".strip(), f"{line['verdict']}{': ' if names else ''}{names}"]
+    cells.append(f"{outcome} ({why})")
+    if not line["values"]:
+        return f"| {' | '.join(map(str, cells))} | - | - | {1e3 * line['error']['nominal']:.2f} |"
+    said = [f"{key} {e['value']:.3g} [{e['low']:.3g}, {e['high']:.3g}]" for key, e in line["estimate"].items()]
+    held, error = ["yes" if one else "no" for one in covered(line)], line["identify_error"]
+    cells += [", ".join(said), ", ".join(held), f"{1e3 * error['nominal']:.2f} -> {1e3 * error['with_effects']:.2f}"]
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def main() -> None:
+    """Judge the draws that are not judged yet."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draws", type=int, default=20)
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--out", type=Path, default=Path("outputs/blind_contact"))
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    file = args.out / "verdicts.jsonl"
+    lines = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    wanted = range(args.first_seed, args.first_seed + args.draws)
+    command = f"python tests/blind/judge_contact.py --draws {args.draws} --first-seed {args.first_seed}"
+    for seed in [seed for seed in wanted if seed not in {line["seed"] for line in lines}]:
+        lines.append(judge(seed, args.out))
+        with file.open("a") as all_lines:
+            all_lines.write(json.dumps(lines[-1]) + "\n")
+        print(_row(lines[-1]), flush=True)
+    page = markdown([line for line in lines if line["seed"] in wanted], command)
+    (args.out / "contact_identification.md").write_text(page)
+    print(page)
+
+
+if __name__ == "__main__":
+    main()
