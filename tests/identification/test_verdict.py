@@ -76,6 +76,13 @@ def test_an_effect_that_leaves_much_unexplained_is_not_named() -> None:
     assert decide(findings(20.0, explanation("backlash", 9.0))).kind == "unknown_effect"
 
 
+def test_an_effect_that_leaves_no_more_than_repeats_differ_is_named_if_it_explains_nearly_all() -> None:
+    tipping = findings(100.0, explanation("torque_saturation", 4.5, 100.0))
+    assert decide(tipping).kind == "unknown_effect"
+    assert decide(tipping, as_repeats=True).kind == "missing_effect"
+    assert decide(findings(20.0, explanation("backlash", 9.0)), as_repeats=True).kind == "unknown_effect"
+
+
 def test_joints_are_unexplained_while_their_error_stays_above_the_noise() -> None:
     assert unexplained_joints(explanation("backlash", 9.0), ("q1", "q2")) == ["q1"]
 

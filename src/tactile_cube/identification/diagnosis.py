@@ -97,28 +97,30 @@ def diagnose(
     noise = sensor_noise(recording)
     search = Search(fitted_part, held_out, noise, effects, say)
     findings = search.run()
-    verdict = decide(findings)
-    say(f"verdict {verdict.kind}: {verdict.chosen.label}")
+    verdict, floor = decide(findings), noise_floor(recording)
     problem = Problem(search.shooting, search.all_stretches)
     fitted = final_fit(problem, fitted_part, verdict.chosen.fit.model)
-    rivals = tuple((one, final_fit(problem, fitted_part, one.fit.model)) for one in verdict.rivals)
-    experiment = None
-    if rivals:
-        models = {verdict.chosen.label: fitted.model} | {one.label: fit.model for one, fit in rivals}
-        experiment = next_experiment(search.shooting, recording, models, noise, seed)
     stages = {
         "nominal": search.start_held_out,
         "refitted": findings.base.judgement.model,
         "with_effects": with_offsets(fitted.model, verdict.chosen.judgement.model),
     }
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
+    if floor.source == "repeats" and summaries["with_effects"].overall <= floor.overall:
+        verdict = decide(findings, as_repeats=True)
+    say(f"verdict {verdict.kind}: {verdict.chosen.label}")
+    rivals = tuple((one, final_fit(problem, fitted_part, one.fit.model)) for one in verdict.rivals)
+    experiment = None
+    if rivals:
+        models = {verdict.chosen.label: fitted.model} | {one.label: fit.model for one, fit in rivals}
+        experiment = next_experiment(search.shooting, recording, models, noise, seed)
     return Diagnosis(
         verdict=verdict,
         findings=findings,
         fitted=fitted,
         rivals=rivals,
         stages=summaries,
-        floor=noise_floor(recording),
+        floor=floor,
         unexplained=_unexplained(search, verdict, findings.base),
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],

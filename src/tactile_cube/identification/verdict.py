@@ -32,14 +32,20 @@ class Verdict:
     rivals: tuple[Explanation, ...] = ()
 
 
-def decide(findings: Findings) -> Verdict:
-    """The answer to what a search has found."""
+def decide(findings: Findings, as_repeats: bool = False) -> Verdict:
+    """The answer to what a search has found.
+
+    Args:
+        findings: of the search.
+        as_repeats: simulated freely, the recommended explanation is no further from the held-out trials than the
+            machine is from itself in repeats. Where it can tip over, a few segments are far off all the same.
+    """
     base = findings.base
     if not findings.levels:
         return Verdict("adequate" if base.error <= ADEQUATE else "unknown_effect", base)
     found = [one for level in findings.levels for one in level]
     chosen = simplest(found)
-    near = chosen.explained(base) > EXPLAINED and chosen.error < TOLERATED_IF_EXPLAINED
+    near = chosen.explained(base) > EXPLAINED and (chosen.error < TOLERATED_IF_EXPLAINED or as_repeats)
     if chosen.error > TOLERATED and not near:
         return Verdict("unknown_effect", chosen)
     rivals = find_rivals(chosen, found)
