@@ -18,7 +18,6 @@ import argparse
 import json
 import subprocess
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -53,14 +52,13 @@ def hidden(seed: int) -> tuple[str, dict[str, float]]:
     return name, {key: round(sign * value, 6) for key, value in values.items()}
 
 
-def run(verb: str, *words: str) -> tuple[str, float]:
-    """One public verb as a user types it; what it printed, and how long it took [s]."""
-    begin = time.perf_counter()
-    command = [sys.executable, "-m", f"tactile_cube.{verb}", *words]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
+def run(verb: str, folder: Path, makes: Path, *words: str) -> Path:
+    """One public verb as a user types it, unless what it makes is there already."""
+    command = [sys.executable, "-m", f"tactile_cube.{verb}", *words, f"hydra.run.dir={folder}"]
+    done = None if makes.exists() else subprocess.run(command, capture_output=True, text=True, check=False)
+    if done is not None and done.returncode != 0:
         raise SystemExit(f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}")
-    return done.stdout, time.perf_counter() - begin
+    return makes
 
 
 def judge(seed: int, folder: Path) -> dict[str, Any]:
@@ -69,19 +67,17 @@ def judge(seed: int, folder: Path) -> dict[str, Any]:
     place = folder / f"draw_{seed}"
     said = ", ".join(f"{key}={value}" for key, value in values.items())
     told = [] if name == NOTHING else [f'source.hidden=["{name}: {said}"]']
-    if not (place / "recording" / "recording.yaml").exists():
-        run("record", "source=grasp", f"out={place / 'recording'}", f"seed={seed}", "source.validation=false",
-            f"hydra.run.dir={place / 'record'}", *told)  # fmt: skip
-    words = [f"recording={place / 'recording'}", f"seed={seed}"]
-    _, seconds = run("diagnose", *words, f"hydra.run.dir={place / 'diagnose'}")
-    diagnosis = json.loads((place / "diagnose" / "diagnosis.json").read_text())
-    line = {"seed": seed, "name": name, "values": values, "diagnose_seconds": round(seconds)}
-    line |= {key: diagnosis[key] for key in ("verdict", "effects", "error")}
+    recording, diagnosed, identified = (place / verb for verb in ("recording", "diagnose", "identify"))
+    settings = ["source=grasp", f"out={recording}", f"seed={seed}", "source.validation=false"]
+    run("record", place / "record", recording / "recording.yaml", *settings, *told)
+    words = [f"recording={recording}", f"seed={seed}"]
+    diagnosis = json.loads(run("diagnose", diagnosed, diagnosed / "diagnosis.json", *words).read_text())
+    line = {"seed": seed, "name": name, "values": values}
+    line |= {key: diagnosis[key] for key in ("verdict", "effects", "error", "seconds")}
     if name != NOTHING:
-        _, seconds = run("identify", *words, f"effects=[{name}]", f"hydra.run.dir={place / 'identify'}")
-        found = json.loads((place / "identify" / "identification.json").read_text())
+        answer = run("identify", identified, identified / "identification.json", *words, f"effects=[{name}]")
+        found = json.loads(answer.read_text())
         line |= {"estimate": found["contact"]["effects"][0]["parameters"], "identify_error": found["error"]}
-        line |= {"identify_seconds": round(seconds), "silent": found["contact"]["silent"]}
     return line
 
 
