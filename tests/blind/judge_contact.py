@@ -10,8 +10,8 @@ stopped, and writes contact_identification.md beside it. Seeds below 100 are for
 | nothing | `adequate` | | everything else (a false alarm) |
 | an effect | `missing_effect`, that one alone | `ambiguous` with it in the set, `unknown_effect` | the rest |
 
-`adequate` for an effect with which the held-out error falls by less than SHOWN is `invisible`, which is acceptable:
-joint offsets and the place of the object absorb it. Whether the stated 95 % interval holds the truth is judged apart.
+`adequate` for a hidden effect is wrong; the reason tells whether identify, told the effect, sees nothing of it either
+(the held-out error falls by less than SHOWN). Whether the stated 95 % interval holds the truth is judged apart.
 """
 
 import argparse
@@ -24,9 +24,11 @@ from typing import Any
 
 import numpy as np
 
+from tactile_cube.simulation.contact_effects import contact_catalogue
+
 FIRST_SEED = 100
 NOTHING = "nothing"
-SHOWN = 0.15  # share of the held-out error that the true effect must take off to be visible
+SHOWN = 0.15  # share of the held-out error that an effect must take off to be seen
 # Bounds of the hidden values: half and double of what is typical, and beyond what the stated world has.
 RANGES: dict[str, dict[str, tuple[float, float]]] = {
     NOTHING: {},
@@ -96,7 +98,7 @@ def score(line: dict[str, Any]) -> tuple[str, str]:
     if verdict == "adequate":
         error = line["identify_error"]
         visible = error["with_effects"] < (1 - SHOWN) * error["nominal"]
-        return ("wrong", "missed") if visible else ("acceptable", "invisible")
+        return "wrong", "missed" if visible else "missed, identify sees nothing of it either"
     return "wrong", "another effect" if truth not in names else "an effect too many"
 
 
@@ -110,6 +112,9 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
     lines = sorted(lines, key=lambda line: line["seed"])
     outcomes = Counter(score(line)[0] for line in lines)
     inside = [one for line in lines if line["values"] for one in covered(line)]
+    empty = sum(
+        _says_nothing(line["name"], key, one) for line in lines for key, one in line.get("estimate", {}).items()
+    )
     page = [
         "# Blind identification of contact effects",
         "",
@@ -117,7 +122,8 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
         "",
         f"- {len(lines)} draws: {outcomes['right']} right, {outcomes['acceptable']} acceptable, "
         f"{outcomes['wrong']} wrong",
-        f"- hidden values within the interval that identify states: {sum(inside)} of {len(inside)}",
+        f"- hidden values within the interval that identify states: {sum(inside)} of {len(inside)}, "
+        f"of which {empty} intervals are all that was searched and say nothing",
         "",
         "Held-out error: of what is stated, and with the true effect fitted [mrad].",
         "",
@@ -125,6 +131,12 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
         "|---|---|---|---|---|---|---|",
     ]
     return "\n".join([*page, *map(_row, lines), ""])
+
+
+def _says_nothing(effect: str, parameter: str, estimate: dict[str, Any]) -> bool:
+    """Whether an interval is the whole range of its parameter."""
+    (p,) = (one for one in contact_catalogue()[effect].parameters if one.name == parameter)
+    return bool(estimate["low"] <= p.low and estimate["high"] >= p.high)
 
 
 def _row(line: dict[str, Any]) -> str:
