@@ -1,5 +1,6 @@
 """Friction that was put into a simulated hand comes back from a recording of it, within the stated interval."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -72,6 +73,12 @@ def test_friction_comes_back_within_its_interval(
 def test_the_error_falls_on_initialisations_that_the_fit_never_saw(found: ContactIdentification) -> None:
     assert found.held_out
     assert found.stages["with_effects"].overall < 0.65 * found.stages["nominal"].overall
+
+
+def test_the_answer_is_plain_json(found: ContactIdentification) -> None:
+    answer = json.loads(json.dumps(found.as_json()))
+    assert answer["silent"] == []
+    assert all(one["telling"] for one in answer["initialisations"]["lateral_friction coefficient"])
 
 
 def test_the_model_file_names_values_intervals_and_units(found: ContactIdentification, recording: Recording) -> None:

@@ -68,10 +68,9 @@ def fit_contact(
         value = first_value(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown)
         contact = unknown.put(contact, _neutral(unknown) if value is None else value)
         say(f"{unknown.label}: about {contact.values[unknown.effect.name][unknown.parameter.name]:.2g}")
-    if len(wanted) > 1:
-        for unknown in wanted:
-            costs = narrowed(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown, _value(contact, unknown))
-            contact = unknown.put(contact, best_of(costs))
+    for unknown in _of_the_same_trials(wanted):
+        costs = narrowed(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown, _value(contact, unknown))
+        contact = unknown.put(contact, best_of(costs))
     opinions: dict[tuple[str, str], list[Opinion]] = {}
     estimates: dict[tuple[str, str], Estimate] = {}
     for unknown in wanted:
@@ -120,6 +119,12 @@ def _initialisations(trials: Sequence[ContactTrial]) -> list[list[ContactTrial]]
     for one in trials:
         groups.setdefault(one.trial.initialisation, []).append(one)
     return list(groups.values())
+
+
+def _of_the_same_trials(wanted: Sequence[Unknown]) -> list[Unknown]:
+    """Those of which others show in the same trials, so that one must be near before the next is judged."""
+    kinds = [one.effect.shown_by for one in wanted]
+    return [one for one in wanted if kinds.count(one.effect.shown_by) > 1]
 
 
 def evenly(trials: Sequence[ContactTrial], count: int) -> list[ContactTrial]:

@@ -76,7 +76,7 @@ def opinion(trials: Sequence[ContactTrial], contact: Contact, unknown: Unknown, 
     found = best_of(costs)
     rises = [max((cost for value, cost in costs.items() if side * (value - found) > 0), default=costs[found])
              for side in (-1, 1)]  # fmt: skip
-    telling = min(rises) - costs[found] > np.log(TELLING) * len(trials) or _at_neutral(unknown, found)
+    telling = bool(min(rises) - costs[found] > np.log(TELLING) * len(trials)) or _at_neutral(unknown, found)
     name = " ".join(one.trial.name for one in trials)
     return Opinion(name, trials[0].trial.initialisation, found, telling, float(np.exp(costs[found] / len(trials))))
 
