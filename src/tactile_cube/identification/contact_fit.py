@@ -18,7 +18,8 @@ from tactile_cube.simulation.contact_effects import ContactEffect
 CONFIDENCE = 0.95
 FEW = 3  # trials of a first look
 # What a world in steps of 2 ms and 30 iterations shares in all initialisations, so that their scatter does not show it:
-# of frictions the logarithm, of the rest in their unit. Seen on recordings made in steps of 1 ms.
+# of frictions the logarithm, of the rest in their unit. Lateral friction and mass were seen on recordings made in steps
+# of 1 ms, one each; the others are guesses.
 SOLVER = {
     "lateral_friction": 0.03,
     "spinning_friction": 0.03,
