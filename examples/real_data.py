@@ -21,7 +21,10 @@ SOURCES = {
     "bam_xl330": ["source=bam_xl330", "source.file={data}/bam_xl330/xl330.npz"],
     "shadow_lfj3": ["source=shadow_lfj3", "source.file={data}/shadow_lfj3/lfj3_openloop.npz"],
 }
-NAMED = {"shadow_lfj3": ["viscous_friction@LFJ3", "position_torque@LFJ3", "actuator_lag@LFJ3"]}
+NAMED = {
+    "bam_xl330": ["load_dependent_friction@servo", "torque_saturation@servo"],
+    "shadow_lfj3": ["viscous_friction@LFJ3", "position_torque@LFJ3", "actuator_lag@LFJ3"],
+}
 """Effects that the literature on a machine names, fitted beside what the diagnosis finds by itself."""
 
 
