@@ -166,8 +166,8 @@ def _table1_section(table1: Mapping[str, Mapping[int, Curve]]) -> list[str]:
     """The paper's Table I: how long until the fingers regrasp."""
     head = (
         f"`{TABLE_1}`, which goes on where it was when it is called again. Steps until the mean angle of the last 50 "
-        "training episodes exceeds 2 rad; with `>`: not until then. A gait shows here how to regrasp and is imitated where "
-        "it pays (docs/results/curriculum); the paper's runs find out by themselves."
+        "training episodes exceeds 2 rad; with `>`: not until then. A gait shows here how to regrasp and is imitated "
+        "where it pays (docs/results/curriculum); the paper's runs find out by themselves."
     )
     return ["## Table I: steps until regrasping", head, sweep_table(table1, tuple(PAPER_TABLE_1))]
 
