@@ -16,9 +16,9 @@ def run(folder: Path, name: str, angle: float, hours: float = 0.1) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    run(tmp_path, "task.filter_time=0.5-task=table-seed0", 2.5, 0.10)
-    run(tmp_path, "task.filter_time=0.5-task=table-seed1", 2.1, 0.30)
-    run(tmp_path, "task.filter_time=0.5-task=table-seed2", 1.5)
+    run(tmp_path, "task.filter_time=0.5-task=table-seed0", 3.5, 0.10)
+    run(tmp_path, "task.filter_time=0.5-task=table-seed1", 3.1, 0.30)
+    run(tmp_path, "task.filter_time=0.5-task=table-seed2", 2.5)
     run(tmp_path, "agent.n_step=1-seed0", 1.2)
     return tmp_path
 
@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> Path:
 def test_seeds_of_a_setting_share_a_line(folder: Path) -> None:
     line = next(row for row in sweep_table(read_sweep(folder)).splitlines() if "task=table" in row)
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells == ["task=table, T_s 0.5 s", "0.3, 0.4, 0.3, 0.4", "0.030, 0.030, > 0.030 (at 1.5 rad)", "0.300"]
+    assert cells == ["task=table, T_s 0.5 s", "0.3, 0.4, 0.3, 0.4", "0.030, 0.030, > 0.030 (at 2.5 rad)", "0.300"]
 
 
 def test_what_never_regrasps_has_no_cost(folder: Path) -> None:

@@ -7,10 +7,10 @@ from tactile_cube.evaluation.training_curve import cpu_hours, curriculum_ends, r
 
 METRICS = """steps,final_angle,episodes,T_s,gravity,simulating_hours,learning_hours
 0,,0,0.12,0.05,0,0
-1000,2.5,10,0.12,0.05,0.1,0.1
+1000,3.5,10,0.12,0.05,0.1,0.1
 2000,1.0,60,0.3,0.5,0.2,0.2
-3000,2.5,90,0.5,1,0.3,0.4
-4000,3,120,0.5,1,0.4,0.5
+3000,3.1,90,0.5,1,0.3,0.4
+4000,3.5,120,0.5,1,0.4,0.5
 """
 
 
@@ -23,7 +23,7 @@ def test_begin_and_end_of_the_curriculum_are_found(tmp_path: Path) -> None:
     assert curriculum_ends(read_curve(write_metrics(tmp_path), "seed 0")) == [2000, 3000]
 
 
-def test_regrasping_begins_when_a_full_window_exceeds_two_radians(tmp_path: Path) -> None:
+def test_regrasping_begins_when_a_full_window_exceeds_three_radians(tmp_path: Path) -> None:
     curve = read_curve(write_metrics(tmp_path), "seed 0")
     row = regrasping_begins(curve)
     assert row == 3
@@ -31,7 +31,7 @@ def test_regrasping_begins_when_a_full_window_exceeds_two_radians(tmp_path: Path
 
 
 def test_a_run_that_never_regrasps_has_no_beginning(tmp_path: Path) -> None:
-    text = METRICS.replace("2.5,90", "1.9,90").replace("3,120", "1.9,120")
+    text = METRICS.replace("3.1,90", "2.9,90").replace("3.5,120", "2.9,120")
     assert regrasping_begins(read_curve(write_metrics(tmp_path, text), "x")) is None
 
 

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.summary import Summary
-from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, curriculum_ends
-from tactile_cube.evaluation.verdict import REGRASP_ANGLE
+from tactile_cube.evaluation.training_curve import ANGLE, REGRASPING, STEPS, Curve, curriculum_ends
 
 CURRICULUM = ("T_s", "gravity")
 MAP_COLUMNS = 3
@@ -36,10 +35,8 @@ def write_learning_curves(curves: Sequence[Curve], path: Path, title: str) -> No
     for curve in curves:
         million = [step / 1e6 for step in curve.columns[STEPS]]
         angle.plot(million, curve.columns[ANGLE], label=curve.label, linewidth=1.2)
-    angle.axhline(REGRASP_ANGLE, color="grey", linestyle="--", linewidth=0.8)
-    angle.annotate(
-        "regrasping", (1, REGRASP_ANGLE), xycoords=("axes fraction", "data"), ha="right", va="bottom", size=8
-    )
+    angle.axhline(REGRASPING, color="grey", linestyle="--", linewidth=0.8)
+    angle.annotate("regrasping", (1, REGRASPING), xycoords=("axes fraction", "data"), ha="right", va="bottom", size=8)
     angle.set(ylabel="mean final angle [rad]", title=title)
     angle.legend(fontsize=8)
     angle.grid(alpha=0.3)
