@@ -67,7 +67,7 @@ def test_the_answer_has_the_keys_of_diagnosis_json() -> None:
     assert entry["heldout_gain"] > 0.5
     assert entry["p_value"] < 0.05
     assert set(entry["parameters"]["coefficient"]) == {"value", "low", "high", "unit"}
-    assert set(result["error"]) == {"nominal", "with_effects", "noise_floor"}
+    assert set(result["error"]) == {"nominal", "refitted", "with_effects", "noise_floor"}
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,8 @@ class ContactDiagnosis:
                 for tried in self.tried
                 for one in tried
             ],
-            "error": overall | {"noise_floor": self.noise_floor},
+            # grasps refit no constants of the drives: the stated error stands for the refitted one
+            "error": overall | {"refitted": overall["nominal"], "noise_floor": self.noise_floor},
             "error_joints": {key: summary.joints for key, summary in self.stages.items()},
             "noise_floor_source": "contact",
             "unexplained": [],

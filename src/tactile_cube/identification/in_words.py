@@ -19,15 +19,15 @@ HELD = "Nothing is missing that these grasps show: the world follows them about 
 
 def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     """A few lines for the terminal, from the content of diagnosis.json."""
-    held = result.get("noise_floor_source") == "contact" and result["verdict"] == "adequate"
-    lines = [HELD if held else OPENING[result["verdict"]]]
+    grasps = result.get("noise_floor_source") == "contact"
+    lines = [HELD if grasps and result["verdict"] == "adequate" else OPENING[result["verdict"]]]
     lines += [_effect(entry) for entry in result["effects"]]
     if partial := result.get("partial_effects"):
         lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
         lines += [_effect(entry) for entry in partial]
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     error = result["error"]
-    refitted = f"{_mrad(error['refitted'])} with constants refitted, " if "refitted" in error else ""
+    refitted = f"{_mrad(error['refitted'])} with constants refitted, " if not grasps else ""
     lines.append(
         f"Held-out error: {_mrad(error['nominal'])} as stated by the owner, {refitted}"
         f"{_mrad(error['with_effects'])} with the recommended model; noise floor {_mrad(error['noise_floor'])}."

@@ -48,7 +48,7 @@ def contact_diagnosis_report(
         answer=f"{said}: {names}." if names else said,
         tone=tone,
         sections=[
-            staircase_section(result["error"], result["error_joints"]),
+            staircase_section({k: v for k, v in result["error"].items() if k != "refitted"}, result["error_joints"]),
             *effect_section(result["effects"]),
             *ranking_section([_ranked(row) for row in result["ranking"]]),
             _next_section(result, recording, model_path),
