@@ -16,6 +16,7 @@ from tactile_cube.visualization.comparison_episode import trial_starts, write_co
 from tactile_cube.visualization.comparison_report import comparison_report
 from tactile_cube.visualization.comparison_summary import markdown, summary
 from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
+from tactile_cube.visualization.diagnosis_sections import staircase_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report
 from tests.measurement.small_rig import write
 
@@ -157,3 +158,12 @@ def test_the_rerun_recording_is_written_with_all_trials(comparison: Comparison, 
     write_comparison(comparison, tmp_path / "c.rrd", markdown(comparison))
     assert (tmp_path / "c.rrd").stat().st_size > 10_000
     assert trial_starts(comparison) == [0.0, comparison.recording.trials[0].duration + 1.0]
+
+
+@pytest.mark.parametrize(("joints", "header"), [(3, "j2"), (12, "as stated by the owner")])
+def test_the_error_table_has_many_joints_in_its_rows(joints: int, header: str) -> None:
+    errors = {f"j{k}": 1e-3 * k for k in range(joints)}
+    section = staircase_section({"nominal": 1e-3}, {"nominal": errors, "with_effects": errors})
+    (table,) = (block for block in section.blocks if isinstance(block, Table))
+    assert header in table.header
+    assert len(table.rows) == (2 if joints == 3 else 12)

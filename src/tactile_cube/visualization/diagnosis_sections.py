@@ -11,6 +11,7 @@ from tactile_cube.visualization.report import Figure, Listing, Section, Table
 from tactile_cube.visualization.svg import PALETTE, SIMULATED, Axes, Band, Line, line_chart
 from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_chart
 
+WIDE = 6  # joints from which on a table has them in its rows
 STAGES = {
     "nominal": "as stated by the owner",
     "refitted": "known constants refitted",
@@ -34,8 +35,11 @@ def staircase_section(stages: Mapping[str, float | None], joints: Mapping[str, M
     blocks: list[Figure | Table] = [Figure(bar_chart(bars, "mrad", None if floor is None else 1e3 * floor), caption)]
     if joints:
         names = list(next(iter(joints.values())))
-        rows = [(STAGES.get(stage, stage), *(mrad(row[name]) for name in names)) for stage, row in joints.items()]
-        blocks.append(Table(("", *names), rows))
+        steps = [STAGES.get(stage, stage) for stage in joints]
+        cells = [[mrad(row[name]) for name in names] for row in joints.values()]
+        if len(names) > WIDE:
+            names, steps, cells = steps, names, [list(column) for column in zip(*cells, strict=True)]
+        blocks.append(Table(("", *names), [(step, *row) for step, row in zip(steps, cells, strict=True)]))
     return Section("How the error falls", (), blocks)
 
 
