@@ -153,7 +153,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         "noise_floor": {
             "overall": floor.overall,
             "joints": floor.joints,
-            "source": floor.source,
+            "source": "repeats" if floor.source == "repeats" else "guess",  # scripts know these two
             "repeats": floor.repeats,
             "step_size": floor.step_size,
         },
