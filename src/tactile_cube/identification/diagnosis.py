@@ -25,6 +25,7 @@ from tactile_cube.measurement.replay import Engine
 from tactile_cube.measurement.split import held_out_split
 
 SHOWN_SHAPES = 6
+FOLLOWS_SIGNALS = 0.25  # share of what is left that a black box explains, from which on something else is missing
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,10 @@ def diagnose(
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
     if floor.source == "repeats" and summaries["with_effects"].overall <= floor.overall:
         verdict = decide(findings, as_repeats=True)
+    unexplained = _unexplained(search, verdict, findings.base)
+    if verdict.kind != "unknown_effect" and any(one.black_box > FOLLOWS_SIGNALS for one in unexplained):
+        verdict = replace(verdict, kind="unknown_effect", rivals=())
+        unexplained = _unexplained(search, verdict, findings.base)
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
     rivals = tuple((one, final_fit(problem, fitted_part, one.fit.model)) for one in verdict.rivals)
     experiment = None
@@ -121,7 +126,7 @@ def diagnose(
         rivals=rivals,
         stages=summaries,
         floor=floor,
-        unexplained=_unexplained(search, verdict, findings.base),
+        unexplained=unexplained,
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
     )

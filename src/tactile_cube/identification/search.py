@@ -15,6 +15,7 @@ from tactile_cube.identification.evidence import Judgement, gain, judge, p_value
 from tactile_cube.identification.explanation import FLOOR, NEARLY, Explanation
 from tactile_cube.identification.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.model import Model
+from tactile_cube.identification.other_starts import other_starts
 from tactile_cube.identification.problem import Problem
 from tactile_cube.identification.residual_starts import residual_candidates
 from tactile_cube.identification.screening import Score, screen
@@ -32,6 +33,7 @@ SIGNIFICANT = 0.01  # p-value, corrected for the number of candidates
 LARGE_GAIN, SIGNIFICANT_IF_LARGE = 0.25, 0.05  # the same for a share that no chance explains: short recordings
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
 BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
+RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the most promising of these values
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
 FAR_BEHIND_AT_FLOOR = 1.5  # the same where the best one explains nearly everything
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
@@ -138,6 +140,7 @@ class Search:
         chosen = with_groups(self.last_scores)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
         raced = self.race(frozen, chosen)[:FINALISTS]
+        raced = [*(self.restarted(frozen, *pair) for pair in raced[:RESTARTED]), *raced[RESTARTED:]]
         special = [one for pair in raced for one in self.special(frozen, *pair)]
         return [self.finish(parent, candidate, fitted) for candidate, fitted in (*raced, *special)]
 
@@ -158,9 +161,32 @@ class Search:
         self.tell(leaders)
         if not leaders:
             return []
-        best = leaders[0][1].cost
-        at_floor = best < NEARLY**2 * np.count_nonzero(self.problem.weight)
-        return [pair for pair in leaders if pair[1].cost <= (FAR_BEHIND_AT_FLOOR if at_floor else FAR_BEHIND) * best]
+        behind = FAR_BEHIND_AT_FLOOR if self.at_floor(leaders[0][1]) else FAR_BEHIND
+        return [pair for pair in leaders if pair[1].cost <= behind * leaders[0][1].cost]
+
+    def restarted(self, frozen: Fit, candidate: Candidate, fitted: Fit) -> tuple[Candidate, Fit]:
+        """Far from the floor, a fit from the best of many values around those found, if it comes lower.
+
+        Where a joint sticks and slips the error has more than one valley, and many simulations at once cost little.
+        """
+        if self.at_floor(fitted):
+            return candidate, fitted
+        models = other_starts(candidate, fitted.model)
+        if not models:
+            return candidate, fitted
+        costs = [self.problem.cost(self.problem.residual(one)).sum() for one in self.problem.predictions(models)]
+        unknowns = fitted.unknowns[len(frozen.unknowns) :]
+        nearest = [models[k] for k in np.argsort(costs)[:PROBED]]
+        probed = [fit(self.problem, one, unknowns, BRIEF, frozen) for one in nearest]
+        best = self.continued(frozen, min(probed, key=lambda one: one.cost))
+        if best.cost < fitted.cost:
+            self.tell([(candidate, best)])
+            return candidate, best
+        return candidate, fitted
+
+    def at_floor(self, fitted: Fit) -> bool:
+        """Whether a fit with little free explains nearly everything."""
+        return bool(fitted.cost < NEARLY**2 * np.count_nonzero(self.problem.weight))
 
     def tell(self, refitted: Sequence[tuple[Candidate, Fit]]) -> None:
         """Show the fitted errors in units of the sensor noise."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from tactile_cube.identification.candidates import Candidate
 from tactile_cube.identification.evidence import gain, p_value, worse
 from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.search import SMALLEST_GAIN, Findings
@@ -14,6 +15,7 @@ Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete
 EXPLAINED, TOLERATED_IF_EXPLAINED = 0.98, 4.0  # share of the excess error, and the error, that a near miss may have
 LIKELY = 0.05  # p-value at which a richer explanation stays in the race
+DETAIL = 0.002  # of what an effect explains, below which more numbers for it follow something else
 ADEQUATE = 1.3  # error / sensor noise of a model to which nothing significant can be added
 
 
@@ -55,8 +57,21 @@ def decide(findings: Findings, as_repeats: bool = False) -> Verdict:
 def simplest(found: Sequence[Explanation]) -> Explanation:
     """The explanation with the fewest effects, then numbers, among those that are as good as the best."""
     best = min(found, key=lambda e: e.judgement.costs.sum())
-    equal = [e for e in found if not worse(e.judgement, best.judgement)]
+    equal = [e for e in found if not worse(e.judgement, best.judgement) or _but_for_a_detail(e, best)]
     return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
+
+
+def _but_for_a_detail(simple: Explanation, best: Explanation) -> bool:
+    """Whether more numbers for the last effect explain next to nothing of what it explains, and of what is left.
+
+    Over many samples the least deviation of anything else in the model is significant.
+    """
+    if len(simple.effects) != len(best.effects) or simple.size >= best.size:
+        return False
+    if named_by(simple.effects[:-1]) != named_by(best.effects[:-1]):
+        return False
+    small = best.gain - simple.gain < DETAIL * best.gain
+    return small and gain(simple.judgement, best.judgement) < SMALLEST_GAIN
 
 
 def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:
@@ -80,7 +95,12 @@ def _richer_earned(other: Explanation, chosen: Explanation) -> bool:
 
 def named(explanation: Explanation) -> frozenset[tuple[str, str]]:
     """The (effect, joint) pairs of an explanation, whatever their form."""
-    return frozenset((c.effect.name, joint) for c in explanation.effects for joint in c.joints)
+    return named_by(explanation.effects)
+
+
+def named_by(effects: Sequence[Candidate]) -> frozenset[tuple[str, str]]:
+    """The same of single effects."""
+    return frozenset((c.effect.name, joint) for c in effects for joint in c.joints)
 
 
 def unexplained_joints(chosen: Explanation, joints: tuple[str, ...]) -> list[str]:
