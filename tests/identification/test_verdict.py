@@ -74,14 +74,14 @@ def test_a_richer_effect_is_a_rival_only_if_it_does_noticeably_better() -> None:
 
 def test_more_numbers_that_follow_a_detail_of_something_else_do_not_win() -> None:
     bias = explanation("torque_bias", 1.003)  # significantly worse over six thousand samples, and yet the whole of it
-    verdict = decide(findings(20.0, explanation("asymmetric_friction", 0.997), bias))
+    verdict = decide(findings(20.0, explanation("stribeck_friction", 0.997), bias))
     assert (verdict.kind, verdict.chosen.effects[0].effect.name) == ("missing_effect", "torque_bias")
 
 
 def test_more_numbers_that_explain_a_real_part_win() -> None:
     bias = explanation("torque_bias", 1.4)
-    verdict = decide(findings(20.0, explanation("asymmetric_friction", 1.0), bias))
-    assert (verdict.kind, verdict.chosen.effects[0].effect.name) == ("missing_effect", "asymmetric_friction")
+    verdict = decide(findings(20.0, explanation("stribeck_friction", 1.0), bias))
+    assert (verdict.kind, verdict.chosen.effects[0].effect.name) == ("missing_effect", "stribeck_friction")
 
 
 def test_an_effect_that_leaves_much_unexplained_is_not_named() -> None:
