@@ -27,8 +27,35 @@ class EasyTrial:
             off += abs(np.log(value / truth)) if truth > 0 else abs(value - truth)
         return 1e-3 * self.noise + 1e-2 * off
 
+    freedom = 12
+
+    def surprise(self, contact: Contact) -> float:
+        """Of offsets that a grip needs for another size than the true one."""
+        size = self.truth.get(("object_size", "excess"), 0.0)
+        excess = contact.values.get("object_size", {}).get("excess", 0.0)
+        return float(self.freedom + ((excess - size) / 1e-3) ** 2)
+
     def cost(self, contact: Contact) -> float:
         return float(np.mean(self.residual(contact) ** 2) / 1e-6)
+
+
+class GrippedTrial(EasyTrial):
+    """Joint offsets make up for every size of the object."""
+
+    def residual(self, contact: Contact) -> np.ndarray:
+        return 1e-3 * self.noise
+
+
+class LoadedTrial(EasyTrial):
+    """Gives way in proportion to three numbers that no joint shows apart."""
+
+    truth_xyz = np.array([-0.006, 0.011, 0.004])
+
+    def residual(self, contact: Contact) -> np.ndarray:
+        values = contact.values.get("object_com", {})
+        off = np.array([values.get(key, 0.0) for key in "xyz"]) - self.truth_xyz
+        mixed = np.random.default_rng(7).normal(size=(len(JOINTS), 3))
+        return 1e-4 * self.noise + 0.3 * mixed @ off
 
 
 def friction(kind: str, initialisation: int, lateral: float = 0.9, spinning: float = 0.1) -> EasyTrial:

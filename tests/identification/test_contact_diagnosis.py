@@ -5,7 +5,7 @@ from tactile_cube.drivetrain.model_file import ModelFile, Provenance
 from tactile_cube.identification.contact_diagnosis import ContactDiagnosis, ContactSearch, verdict_of, with_contact
 from tactile_cube.measurement.error import ErrorSummary
 from tactile_cube.measurement.hand_replay import Contact
-from tests.identification.easy_contact import EasyTrial, friction
+from tests.identification.easy_contact import EasyTrial, GrippedTrial, friction
 
 
 def search(lateral: float = 0.9, spinning: float = 0.1) -> ContactSearch:
@@ -28,6 +28,15 @@ def test_the_effects_that_are_missing_are_found_and_no_others(truth: dict[str, f
     found = search(**truth)
     assert [one.effect.name for one in found.found] == names
     assert verdict_of(found, 1e-3) == ("missing_effect" if names else "adequate")
+
+
+@pytest.mark.parametrize(("size", "names"), [(0.0, []), (0.006, ["object_size"])])
+def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list[str]) -> None:
+    trials = [GrippedTrial("hold", k, {("object_size", "excess"): size}, {}) for k in range(4)]
+    found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
+    found.run(Contact({}))
+    assert [one.effect.name for one in found.found] == names
+    assert found.rivals == []
 
 
 def test_what_no_effect_explains_is_unknown() -> None:

@@ -5,8 +5,14 @@ from tactile_cube.identification.contact_fit import fit_contact, summarise
 from tactile_cube.identification.contact_search import NARROWINGS, Opinion, first_value, narrowed, opinion
 from tactile_cube.identification.contact_unknown import unknowns
 from tactile_cube.measurement.hand_replay import Contact
-from tactile_cube.simulation.contact_effects import LateralFriction, ObjectCom, SpinningFriction, TipCompliance
-from tests.identification.easy_contact import friction
+from tactile_cube.simulation.contact_effects import (
+    LateralFriction,
+    ObjectCom,
+    ObjectSize,
+    SpinningFriction,
+    TipCompliance,
+)
+from tests.identification.easy_contact import GrippedTrial, LoadedTrial, friction
 
 LATERAL = unknowns([LateralFriction])[0]
 
@@ -83,3 +89,24 @@ def test_each_effect_is_fitted_on_the_kind_of_trial_that_shows_it() -> None:
     assert fit.contact.values["lateral_friction"]["coefficient"] == pytest.approx(0.6, rel=0.05)
     assert fit.contact.values["spinning_friction"]["radius"] == pytest.approx(0.03, rel=0.05)
     assert fit.silent() == []
+
+
+def test_numbers_that_show_only_together_are_found_together() -> None:
+    trials = [LoadedTrial("hold", k, {}, {}) for k in range(3)]
+    fit = fit_contact(trials, [ObjectCom], Contact({}), lambda line: None)  # type: ignore[arg-type]
+    found = [fit.contact.values["object_com"][key] for key in "xyz"]
+    np.testing.assert_allclose(found, LoadedTrial.truth_xyz, atol=2e-4)
+    assert fit.silent() == []
+
+
+def test_a_trial_without_load_tells_nothing_of_the_centre_of_mass() -> None:
+    trials = [friction("hold", k) for k in range(3)]
+    fit = fit_contact(trials, [ObjectCom], Contact({}), lambda line: None)  # type: ignore[arg-type]
+    assert fit.silent() == ["object_com x", "object_com y", "object_com z"]
+    assert fit.estimates["object_com", "x"].low == -0.03
+
+
+def test_a_size_is_the_one_that_needs_the_smallest_offsets() -> None:
+    trials = [GrippedTrial("hold", k, {("object_size", "excess"): 0.0035}, {}) for k in range(3)]
+    fit = fit_contact(trials, [ObjectSize], Contact({}), lambda line: None)  # type: ignore[arg-type]
+    assert fit.contact.values["object_size"]["excess"] == pytest.approx(0.0035, abs=4e-4)

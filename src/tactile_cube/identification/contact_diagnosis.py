@@ -12,7 +12,8 @@ from scipy import stats
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
 from tactile_cube.identification.contact_fit import evenly, fit_contact, shown_by
-from tactile_cube.identification.contact_search import best_of, first_value, narrowed, pooled_cost
+from tactile_cube.identification.contact_search import best_of, first_value, narrowed, pooled_cost, surprises
+from tactile_cube.identification.contact_together import solved
 from tactile_cube.identification.contact_trial import SIGMA, ContactTrial
 from tactile_cube.identification.contact_unknown import unknowns
 from tactile_cube.measurement.bench import with_object
@@ -45,8 +46,8 @@ class Tried:
         effect: class of the effect.
         contact: values, those of effects found before included.
         error: RMS on held-out trials [rad].
-        gain: share of the error that it takes off.
-        p_value: that it takes off nothing, by the signs and sizes over trials and joints.
+        gain: share of the error of the trials that show it that it takes off, or of the joint offsets that they need.
+        p_value: that it takes off nothing.
     """
 
     effect: type[ContactEffect]
@@ -54,6 +55,11 @@ class Tried:
     error: float
     gain: float
     p_value: float
+
+    @property
+    def by_offsets(self) -> bool:
+        """Whether it shows in the joint offsets and not in the error."""
+        return self.effect.shows_in == "offsets"
 
 
 @dataclass(frozen=True)
@@ -109,7 +115,13 @@ class ContactDiagnosis:
             "effects": entries if self.verdict in ("missing_effect", "ambiguous") else [],
             "unexplained_joints": [],
             "ranking": [
-                {"effects": one.effect.name, "held_out_error": one.error, "gain": one.gain, "p_value": one.p_value}
+                {
+                    "effects": one.effect.name,
+                    "held_out_error": one.error,
+                    "gain": one.gain,
+                    "p_value": one.p_value,
+                    "shows_in": one.effect.shows_in,
+                }
                 for tried in self.tried
                 for one in tried
             ],
@@ -223,31 +235,59 @@ class ContactSearch:
             left = [effect for effect in contact_catalogue().values() if effect not in known]
             tried = sorted((self._try(effect, contact, before) for effect in left), key=lambda one: one.error)
             self.tried.append(tried)
-            best = tried[0]
-            if best.gain < GAIN or best.p_value > P_VALUE:
+            helps = [one for one in tried if one.gain >= GAIN]
+            # offsets that are alike for another reason are no rival of an effect that lowers the error
+            helps = [one for one in helps if not one.by_offsets] or helps
+            if not helps or helps[0].p_value > (P_VALUE / len(tried) if helps[0].by_offsets else P_VALUE):
                 return
+            best = helps[0]
             self.found.append(best)
-            self.rivals = [one for one in tried[1:] if one.gain >= GAIN and one.error < (1 + AS_GOOD) * best.error]
+            self.rivals = [one for one in helps[1:] if one.error < (1 + AS_GOOD) * best.error]
             contact, before = best.contact, _squares(self.judges, best.contact)
 
     def _try(self, effect: type[ContactEffect], contact: Contact, before: Array) -> Tried:
         """The effect at the values that suit the trials best, coarse unless they promise something."""
-        trials = _some_of_each_kind(shown_by(self.trials, effect), LOOKED)
-        start = pooled_cost(trials, contact)
-        for unknown in unknowns([effect]):
-            value = first_value(trials[:1], contact, unknown)
+        stated, by_offsets = contact, effect.shows_in == "offsets"
+        trials = (
+            shown_by(self.trials, effect) if by_offsets else _some_of_each_kind(shown_by(self.trials, effect), LOOKED)
+        )
+        start = pooled_cost(trials, contact, effect)
+        if effect.shows_in == "load":
+            contact, _ = solved(trials, contact, unknowns([effect]))
+        for unknown in unknowns([effect]) if effect.shows_in != "load" else []:
+            value = first_value(trials if by_offsets else trials[:1], contact, unknown)
             if value is not None:
                 contact = unknown.put(contact, value)
                 contact = unknown.put(contact, best_of(narrowed(trials, contact, unknown, value, ROUGHLY)))
-        if start - pooled_cost(trials, contact) < len(trials) * np.log(PROMISE):
+        if start - pooled_cost(trials, contact, effect) < len(trials) * np.log(PROMISE):
             self.say(f"{effect.name}: takes nothing off the error")
             return Tried(effect, contact, float(np.sqrt(before.mean())), 0.0, 1.0)
         after = _squares(self.judges, contact)
-        gain = 1 - float(np.sqrt(after.mean() / before.mean()))
-        better = (np.sqrt(before) - np.sqrt(after)).ravel()
-        p_value = float(stats.wilcoxon(better, alternative="greater").pvalue) if np.any(better) else 1.0
-        self.say(f"{effect.name}: takes {100 * gain:.0f} % off the held-out error")
-        return Tried(effect, contact, float(np.sqrt(after.mean())), gain, p_value)
+        error = float(np.sqrt(after.mean()))
+        if by_offsets:
+            gain, p_value = offsets_gained([*trials, *shown_by(self.judges, effect)], stated, contact)
+            self.say(f"{effect.name}: takes {100 * gain:.0f} % off the joint offsets that the grips need")
+            return Tried(effect, contact, error, gain, p_value)
+        telling = [one in shown_by(self.judges, effect) for one in self.judges]
+        old, new = np.sqrt(before[telling]), np.sqrt(after[telling])
+        gain = 1 - float(np.sqrt(np.mean(new**2) / np.mean(old**2)))
+        p_value = (
+            float(stats.wilcoxon((old - new).ravel(), alternative="greater").pvalue) if np.any(old != new) else 1.0
+        )
+        self.say(f"{effect.name}: takes {100 * gain:.0f} % off the held-out error of the trials that show it")
+        return Tried(effect, contact, error, gain, p_value)
+
+
+def offsets_gained(trials: Sequence[ContactTrial], before: Contact, after: Contact) -> tuple[float, float]:
+    """Share by which an effect makes the joint offsets smaller that trials need, and the p-value that it does not.
+
+    The F test of one more number, which holds whatever the spread of the offsets is. It has trials to fit and held-out
+    ones together: a single held-out initialisation may need less offset by chance.
+    """
+    first, last = (sum(surprises(trials, contact).values()) for contact in (before, after))
+    freedom = sum({one.trial.initialisation: one.freedom for one in trials}.values())
+    ratio = max(first - last, 0.0) / (last / freedom)
+    return 1 - float(np.sqrt(last / first)), float(stats.f.sf(ratio, 1, freedom))
 
 
 def verdict_of(search: ContactSearch, left: float) -> Verdict:

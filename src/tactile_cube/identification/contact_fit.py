@@ -9,7 +9,16 @@ import numpy as np
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import Estimate
-from tactile_cube.identification.contact_search import NARROWINGS, Opinion, best_of, first_value, narrowed, opinion
+from tactile_cube.identification.contact_search import (
+    NARROWINGS,
+    Opinion,
+    best_of,
+    first_value,
+    narrowed,
+    opinion,
+    opinion_of,
+)
+from tactile_cube.identification.contact_together import solved
 from tactile_cube.identification.contact_trial import ContactTrial
 from tactile_cube.identification.contact_unknown import Unknown, unknowns
 from tactile_cube.measurement.hand_replay import Contact
@@ -65,28 +74,42 @@ def fit_contact(
         say: takes progress lines.
     """
     contact, wanted = start, unknowns(list(effects))
+    together = [effect for effect in effects if effect.shows_in == "load"]
     for unknown in wanted:
+        if unknown.effect.shows_in == "load":
+            contact = unknown.put(contact, _neutral(unknown))
+            continue
         value = first_value(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown)
         contact = unknown.put(contact, _neutral(unknown) if value is None else value)
         say(f"{unknown.label}: about {contact.values[unknown.effect.name][unknown.parameter.name]:.2g}")
-    for unknown in _of_the_same_trials(wanted):
+    for effect in together:
+        contact, _ = solved(evenly(shown_by(trials, effect), FEW), contact, unknowns([effect]))
+    for unknown in _of_the_same_trials([one for one in wanted if one.effect not in together]):
         costs = narrowed(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown, _value(contact, unknown))
         contact = unknown.put(contact, best_of(costs))
     opinions: dict[tuple[str, str], list[Opinion]] = {}
     estimates: dict[tuple[str, str], Estimate] = {}
-    for unknown in wanted:
-        key = (unknown.effect.name, unknown.parameter.name)
-        groups = _initialisations(shown_by(trials, unknown.effect))
-        opinions[key] = []
-        for group in groups:
-            said = opinion(evenly(group, ASKED), contact, unknown, _value(contact, unknown))
-            opinions[key].append(said)
-            telling = "" if said.telling else ", but does not show it"
-            say(f"{unknown.label}: initialisation {said.initialisation} says {said.value:.3g}{telling}")
-        estimates[key] = summarise(unknown, opinions[key])
-        contact = unknown.put(contact, estimates[key].value)
-        say(f"{unknown.label}: {in_words(estimates[key])}")
+    for effect in effects:
+        groups = [evenly(group, ASKED) for group in _initialisations(shown_by(trials, effect))]
+        at_once = [_opinions(group, contact, unknowns([effect])) for group in groups] if effect in together else []
+        for k, unknown in enumerate(unknowns([effect])):
+            key = (effect.name, unknown.parameter.name)
+            opinions[key] = []
+            for g, group in enumerate(groups):
+                said = at_once[g][k] if at_once else opinion(group, contact, unknown, _value(contact, unknown))
+                opinions[key].append(said)
+                telling = "" if said.telling else ", but does not show it"
+                say(f"{unknown.label}: initialisation {said.initialisation} says {said.value:.3g}{telling}")
+            estimates[key] = summarise(unknown, opinions[key])
+            contact = unknown.put(contact, estimates[key].value)
+            say(f"{unknown.label}: {in_words(estimates[key])}")
     return ContactFit(contact, estimates, opinions)
+
+
+def _opinions(trials: Sequence[ContactTrial], contact: Contact, wanted: Sequence[Unknown]) -> list[Opinion]:
+    """What the trials of one initialisation say of all parameters of an effect, found together."""
+    found, known = solved(trials, contact, wanted)
+    return [opinion_of(trials, found, _value(found, one), shows) for one, shows in zip(wanted, known, strict=True)]
 
 
 def shown_by(trials: Sequence[ContactTrial], effect: type[ContactEffect]) -> list[ContactTrial]:

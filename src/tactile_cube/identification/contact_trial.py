@@ -61,6 +61,15 @@ class ContactTrial:
         """Measured minus simulated position (n, joints) [rad], the nuisance fitted."""
         return self._fitted(contact)[1]
 
+    def surprise(self, contact: Contact) -> float:
+        """Squared distance of joint offsets and the box's place from what is expected, in standard deviations."""
+        return float(np.sum((self._fitted(contact)[0] / self._spread) ** 2))
+
+    @property
+    def freedom(self) -> int:
+        """Numbers that nobody knows of it."""
+        return len(self._free)
+
     def nuisance(self, contact: Contact) -> Array:
         """Joint offsets (joints,) [rad] and displacement of the box in the rig's frame (3,) [m] that suit a contact."""
         return self._fitted(contact)[0]

@@ -62,7 +62,8 @@ def _ranked(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "effect": row["effects"],
         "held-out error [mrad]": 1e3 * row["held_out_error"],
-        "share of it that it takes off": row["gain"],
+        "share that it takes off": row["gain"],
+        "of": "offsets that the grips need" if row["shows_in"] == "offsets" else "the error where it shows",
         "p (no better than without)": row["p_value"],
     }
 

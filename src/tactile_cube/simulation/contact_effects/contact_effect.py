@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -22,6 +22,8 @@ class ContactEffect:
         constant: the field of EpisodeConstants that it changes.
         added: its values are added to what is stated of the object; otherwise they replace the constant.
         shown_by: the kinds of trial that show it best; others are used where a recording has none of these.
+        shows_in: how: "slips" (when something slips, each number by itself), "load" (how far the fingers give way, all
+            its numbers together), "offsets" (the joint offsets that a grip would need, alike in all initialisations).
     """
 
     name: ClassVar[str]
@@ -29,6 +31,7 @@ class ContactEffect:
     constant: ClassVar[str]
     added: ClassVar[bool] = False
     shown_by: ClassVar[tuple[str, ...]] = ("hold",)
+    shows_in: ClassVar[Literal["slips", "load", "offsets"]] = "slips"
 
     @classmethod
     def apply(cls, constants: EpisodeConstants, values: Mapping[str, float]) -> EpisodeConstants:

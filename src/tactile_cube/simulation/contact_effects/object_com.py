@@ -12,6 +12,7 @@ class ObjectCom(ContactEffect):
     name = "object_com"
     constant = "cube_com"
     added = True
+    shows_in = "load"
     parameters = (
         Parameter("x", "m", neutral=0.0, low=-0.03, high=0.03, typical=0.01, source=_SOURCE),
         Parameter("y", "m", neutral=0.0, low=-0.03, high=0.03, typical=0.01, source=_SOURCE),
