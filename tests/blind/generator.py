@@ -25,6 +25,8 @@ from rig import RIGS, Rig
 Array = NDArray[np.float64]
 CYCLE = ("none", "named", "named", "unnamed", "named", "named", "two", "named")
 """Which kind of truth each seed hides, in turn."""
+ATTEMPTS = 4
+"""Worlds that a seed may draw until one runs through all its trials; some effects drive their joint."""
 VISIBLE = 1.5
 """A visible effect moves its joint by at least this multiple of the sensor noise, refitted constants removed."""
 CONSTANTS = {
@@ -224,10 +226,10 @@ def names_for(seed: int, rng: np.random.Generator) -> tuple[str, list[str]]:
 
 
 def draw(
-    seed: int, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None
+    seed: int, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None, redrawn: int = 0
 ) -> tuple[World, Bench, dict[str, Any]]:
     """The world, the bench and the truth of one seed; `names` and `kind` force what is hidden and where."""
-    rng = np.random.default_rng([seed, 20231212])
+    rng = np.random.default_rng([seed, 20231212, redrawn] if redrawn else [seed, 20231212])
     label, chosen = names_for(seed, rng)
     if names is not None:
         label, chosen = "forced", names
@@ -331,11 +333,11 @@ def repeat_scatter(tables: dict[str, tuple[int, str, pl.DataFrame]], joints: lis
     return float(np.sqrt(squares / count))
 
 
-def write(
-    seed: int, out: Path, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None
-) -> dict[str, Any]:
-    """Draw the seed and write `out`/recording and `out`/truth.json; returns the truth."""
-    world, bench, truth = draw(seed, seconds, names, kind)
+Tables = dict[str, tuple[int, str, pl.DataFrame]]
+
+
+def perform(seed: int, world: World, bench: Bench) -> tuple[Tables, Tables]:
+    """The trials, file -> (initialisation, kind, table), and unseen ones of the last initialisation."""
     rng = np.random.default_rng([seed, 7])
     n, samples = len(world.rig.actuated), int(bench.seconds * bench.rate)
     offsets = rng.uniform(-1, 1, (bench.initialisations, n)) * np.deg2rad(rng.uniform(0.5, 3.0))
@@ -355,6 +357,20 @@ def write(
             tables[f"trials/{kind_of}_{init}.parquet"] = (init, kind_of, record(init, command))
     last = bench.initialisations - 1
     unseen = {f"{kind_of}.parquet": (last, kind_of, record(last, command)) for kind_of, command in fresh.items()}
+    return tables, unseen
+
+
+def write(
+    seed: int, out: Path, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None
+) -> dict[str, Any]:
+    """Draw the seed and write `out`/recording and `out`/truth.json; returns the truth."""
+    for redrawn in range(ATTEMPTS):
+        world, bench, truth = draw(seed, seconds, names, kind, redrawn)
+        tables, unseen = perform(seed, world, bench)
+        if all(np.isfinite(table.to_numpy()).all() for _, _, table in (*tables.values(), *unseen.values())):
+            break
+    else:
+        raise RuntimeError(f"seed {seed}: no finite recording in {ATTEMPTS} attempts")
     _save(out / "recording", world, bench, tables)
     _save(out / "recording" / "validation", world, bench, unseen)
     truth["repeat_scatter"] = repeat_scatter(tables, world.rig.actuated)

@@ -90,6 +90,14 @@ def test_the_same_seed_writes_the_same_recording(folder: Path, tmp_path: Path) -
     assert all(pl.read_parquet(folder / f).equals(pl.read_parquet(tmp_path / f)) for f in files)
 
 
+def test_a_world_that_runs_away_is_drawn_again(tmp_path: Path) -> None:
+    truth = generator.write(90003, tmp_path, 8.0)  # negative damping in its first world
+    assert truth["effects"][0]["name"] == "position_velocity_product"
+    tables = [pl.read_parquet(file).to_numpy() for file in tmp_path.rglob("*.parquet")]
+    assert tables
+    assert all(np.isfinite(table).all() for table in tables)
+
+
 def _truth(*effects: tuple[str, str], catalogue: bool = True) -> dict[str, Any]:
     keys = {"any_joint": False, "in_catalogue": catalogue, "distinct": 5.0, "signal": 5.0}
     made = [{"name": n, "joints": [j], "absorbed": n in hidden.ABSORBED, **keys} for n, j in effects]
