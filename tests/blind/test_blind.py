@@ -91,7 +91,7 @@ def test_the_same_seed_writes_the_same_recording(folder: Path, tmp_path: Path) -
 
 
 def test_a_world_that_runs_away_is_drawn_again(tmp_path: Path) -> None:
-    truth = generator.write(90003, tmp_path, 8.0)  # negative damping in its first world
+    truth = generator.write(90003, tmp_path)  # negative damping in its first world
     assert truth["effects"][0]["name"] == "position_velocity_product"
     tables = [pl.read_parquet(file).to_numpy() for file in tmp_path.rglob("*.parquet")]
     assert tables
