@@ -59,5 +59,6 @@ def test_where_torques_are_commanded_a_saturation_starts_among_them(tmp_path: Pa
     found = candidates(recording, [find_effect("torque_saturation")])
     largest = max(np.abs(t.command[:, 0]).max() for t in recording.trials)
     starts = [c.form["limit"] for c in found if c.joints == ("a",)]
-    assert len(starts) == 5
+    assert len(starts) == 9
     assert all(0.2 * largest < start <= largest for start in starts)
+    np.testing.assert_allclose(np.diff(np.log(starts)), np.log(starts[1] / starts[0]))  # no wide gap between any two

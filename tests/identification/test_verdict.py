@@ -73,14 +73,25 @@ def test_a_richer_effect_is_a_rival_only_if_it_does_noticeably_better() -> None:
 
 
 def test_more_numbers_that_follow_a_detail_of_something_else_do_not_win() -> None:
-    bias = explanation("torque_bias", 1.003)  # significantly worse over six thousand samples, and yet the whole of it
-    verdict = decide(findings(20.0, explanation("stribeck_friction", 0.997), bias))
-    assert (verdict.kind, verdict.chosen.effects[0].effect.name) == ("missing_effect", "torque_bias")
+    coulomb = explanation("coulomb_friction", 1.003)  # significantly worse over six thousand samples, and yet the whole
+    verdict = decide(findings(20.0, explanation("stribeck_friction", 0.997), coulomb))
+    assert (verdict.kind, verdict.chosen.effects[0].effect.name) == ("missing_effect", "coulomb_friction")
+
+
+def test_another_effect_is_no_detail_however_little_it_explains() -> None:
+    verdict = decide(findings(20.0, explanation("payload", 0.997), explanation("torque_gain", 1.003)))
+    assert verdict.chosen.effects[0].effect.name == "payload"
+
+
+def test_an_effect_with_a_number_more_is_a_rival_unless_it_contains_the_chosen_one() -> None:
+    verdict = decide(findings(20.0, explanation("torque_gain", 1.0), explanation("payload", 1.0)))
+    assert verdict.kind == "ambiguous"
+    assert [one.effects[0].effect.name for one in verdict.rivals] == ["payload"]
 
 
 def test_more_numbers_that_explain_a_real_part_win() -> None:
-    bias = explanation("torque_bias", 1.4)
-    verdict = decide(findings(20.0, explanation("stribeck_friction", 1.0), bias))
+    coulomb = explanation("coulomb_friction", 1.4)
+    verdict = decide(findings(20.0, explanation("stribeck_friction", 1.0), coulomb))
     assert (verdict.kind, verdict.chosen.effects[0].effect.name) == ("missing_effect", "stribeck_friction")
 
 

@@ -15,7 +15,8 @@ from tactile_cube.measurement.recording import Recording
 Array = NDArray[np.float64]
 EffectClass = type[Effect]
 MOST_SHOWN = 4  # fitted parameters that a label lists
-LEVELS = (0.5, 0.75, 0.9, 0.97, 0.997)  # of the torques that a recording asks for, where a saturation starts
+USUAL, SELDOM, OFTEN = 0.9, 0.999, 0.5  # quantiles of the torques that a recording asks for
+LEVELS = 9  # between often and seldom, by equal factors, where a saturation starts
 CUBIC = (0.01, 0.1, 1.0)  # parts of the usual torque at which a cubic spring takes over
 DEAD = (0.1, 0.4)  # parts of the usual torque at which a dead zone of the torque starts
 
@@ -117,8 +118,8 @@ class _Seen:
                 np.abs(kp * (trial.command - trial.position)[:, joint] - kd * trial.velocity()[:, joint])
                 for trial in recording.trials
             ]
-        self.torques = np.maximum(np.quantile(np.concatenate(torques), LEVELS), 1e-6)
-        self.usual_torque = float(self.torques[LEVELS.index(0.9)])
+        often, usual, seldom = np.maximum(np.quantile(np.concatenate(torques), (OFTEN, USUAL, SELDOM)), 1e-6)
+        self.torques, self.usual_torque = np.geomspace(often, seldom, LEVELS), float(usual)
 
     def cubic_stiffness(self, compliance: float) -> list[float]:
         """Stiffness [N m/rad^3] of a cubic spring that bends as far as a linear one at parts of the usual torque."""

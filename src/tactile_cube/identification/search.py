@@ -37,6 +37,7 @@ RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the 
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
 FAR_BEHIND_AT_FLOOR = 2.0  # the same where the best one explains nearly everything
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
+DETAIL, COMPLETE_ENOUGH = 0.001, 1.3  # share of the base error that is a detail of an explanation with such an error
 COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
 RESIZED = (0.2, 6.0)  # factors of the first look that are believed
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
@@ -250,7 +251,11 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation)
     enough = SIGNIFICANT_IF_LARGE if explanation.gain > LARGE_GAIN else SIGNIFICANT
     if explanation.gain < SMALLEST_GAIN or explanation.p_value > enough:
         return False
-    if not parent.effects or explanation.error <= FLOOR:
+    if not parent.effects:
+        return True
+    if parent.error < COMPLETE_ENOUGH and parent.error**2 - explanation.error**2 < DETAIL * base.error**2:
+        return False
+    if explanation.error <= FLOOR:
         return True
     share = explanation.explained(parent)
     if parent.explained(base) < REAL_PART:

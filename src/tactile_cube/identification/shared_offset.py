@@ -16,7 +16,7 @@ from tactile_cube.measurement.recording import Recording
 
 EFFECT = "position_offset"
 LEAST = 0.012  # [rad] joint offsets below this are ordinary
-UNLIKELY = 0.01  # probability, over all joints, of such offsets by initialising alone at which they are still ordinary
+UNLIKELY = 0.001  # probability, over all joints, of such offsets by initialising alone at which they are still ordinary
 
 
 def shared_offset(base: Explanation, fitted: Recording, effects: Sequence[type[Effect]]) -> Explanation | None:

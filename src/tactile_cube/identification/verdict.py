@@ -57,32 +57,41 @@ def decide(findings: Findings, as_repeats: bool = False) -> Verdict:
 def simplest(found: Sequence[Explanation]) -> Explanation:
     """The explanation with the fewest effects, then numbers, among those that are as good as the best."""
     best = min(found, key=lambda e: e.judgement.costs.sum())
-    equal = [e for e in found if not worse(e.judgement, best.judgement) or _but_for_a_detail(e, best)]
+    equal = [e for e in found if not worse(e.judgement, best.judgement)]
+    equal += [e for e in found if any(_but_for_a_detail(e, richer) for richer in equal)]
     return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
 
 
-def _but_for_a_detail(simple: Explanation, best: Explanation) -> bool:
-    """Whether more numbers for the last effect explain next to nothing of what it explains, and of what is left.
+def _but_for_a_detail(simple: Explanation, richer: Explanation) -> bool:
+    """Whether the last effect is a special case of the richer one's, which explains next to nothing more.
 
     Over many samples the least deviation of anything else in the model is significant.
     """
-    if len(simple.effects) != len(best.effects) or simple.size >= best.size:
+    if not _contains(richer, simple):
         return False
-    if named_by(simple.effects[:-1]) != named_by(best.effects[:-1]):
+    small = richer.gain - simple.gain < DETAIL * richer.gain
+    return small and gain(simple.judgement, richer.judgement) < SMALLEST_GAIN
+
+
+def _contains(richer: Explanation, simple: Explanation) -> bool:
+    """Whether two explanations differ in the last effect alone, and one's is a special case of the other's."""
+    if not simple.effects or named_by(simple.effects[:-1]) != named_by(richer.effects[:-1]):
         return False
-    small = best.gain - simple.gain < DETAIL * best.gain
-    return small and gain(simple.judgement, best.judgement) < SMALLEST_GAIN
+    last, special = richer.effects[-1], simple.effects[-1]
+    return special.effect.name in last.effect.contains and special.joints == last.joints
 
 
 def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:
-    """Explanations by as many other effects that are as good, and richer ones that are better."""
+    """Explanations by as many other effects that are as good: with at most a number more, or else clearly better.
+
+    Of laws that contain the chosen one only those that are clearly better: they always follow data as well.
+    """
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
         if len(named(other)) > len(named(chosen)) or named(other) == named(chosen):
             continue
-        if (other.size <= chosen.size or _richer_earned(other, chosen)) and not worse(
-            other.judgement, chosen.judgement
-        ):
+        simple = other.size <= chosen.size + 1 and not _contains(other, chosen)
+        if (simple or _richer_earned(other, chosen)) and not worse(other.judgement, chosen.judgement):
             rivals.setdefault(named(other), other)
     return tuple(rivals.values())
 

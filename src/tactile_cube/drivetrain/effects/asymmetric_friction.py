@@ -12,6 +12,7 @@ class AsymmetricFriction(Effect):
 
     name = "asymmetric_friction"
     stage = Stage.FRICTION
+    contains = ("coulomb_friction",)
     parameters = (
         Parameter(
             "difference",

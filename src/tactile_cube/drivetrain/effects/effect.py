@@ -102,6 +102,8 @@ class Effect:
 
     Empty: one form, all parameters at their typical values.
     """
+    contains: ClassVar[tuple[str, ...]] = ()
+    """Names of simpler effects that this one becomes at some of its values, so that it always follows data as well."""
     acts_on_torque: ClassVar[bool] = False
     """Whether the effect has a `torque_law` beside its `law`."""
 

@@ -14,6 +14,7 @@ class FrictionDrift(Effect):
 
     name = "friction_drift"
     stage = Stage.FRICTION
+    contains = ("coulomb_friction",)
     parameters = (
         Parameter("change", unit="N m", neutral=0.0, low=-0.5, high=0.5, typical=0.02, source="-20 to -50 % over 20 K"),
         Parameter(

@@ -16,6 +16,7 @@ class PreslidingFriction(Effect):
 
     name = "presliding_friction"
     stage = Stage.FRICTION
+    contains = ("coulomb_friction",)
     parameters = (
         Parameter("breakaway", unit="rad", neutral=0.0, low=0.0, high=0.1, typical=0.003, source="0.05 mrad to 1 deg"),
         Parameter(

@@ -14,6 +14,7 @@ class StiffeningElasticity(Effect):
 
     name = "stiffening_elasticity"
     stage = Stage.DEFLECTION
+    contains = ("elasticity",)
     parameters = (
         Parameter(
             "compliance",

@@ -14,6 +14,7 @@ class StribeckFriction(Effect):
 
     name = "stribeck_friction"
     stage = Stage.FRICTION
+    contains = ("coulomb_friction",)
     parameters = (
         Parameter("excess", "N m", 0.0, 0.0, 0.5, 0.04, "+10-50 % of the Coulomb friction"),
         Parameter("velocity", "rad/s", 0.15, 0.01, 1.0, 0.15, "0.05-0.3 rad/s"),
