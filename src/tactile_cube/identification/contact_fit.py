@@ -28,13 +28,13 @@ CONFIDENCE = 0.95
 FEW = 3  # trials of a first look
 # What a world in steps of 2 ms and 30 iterations shares in all initialisations, so that their scatter does not show it:
 # of frictions the logarithm, of the rest in their unit. Lateral friction and mass were seen on recordings made in steps
-# of 1 ms, one each; the others are guesses.
+# of 1 ms, one each, the centre of mass on two; the others are guesses.
 SOLVER = {
     "lateral_friction": 0.03,
     "spinning_friction": 0.03,
     "tip_compliance": 1e-4,
     "object_mass": 0.01,
-    "object_com": 2e-3,
+    "object_com": 1e-2,
     "object_size": 1e-3,
 }
 ASKED = 2  # trials of each initialisation, with loads as different as there are

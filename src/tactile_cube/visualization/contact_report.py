@@ -63,7 +63,7 @@ def _ranked(row: Mapping[str, Any]) -> dict[str, Any]:
         "effect": row["effects"],
         "held-out error [mrad]": 1e3 * row["held_out_error"],
         "share that it takes off": row["gain"],
-        "of": "offsets that the grips need" if row["shows_in"] == "offsets" else "the error where it shows",
+        "of": "the error, or the offsets that grips need" if row["shows_in"] == "offsets" else "the error",
         "p (no better than without)": row["p_value"],
     }
 
