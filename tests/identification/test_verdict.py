@@ -7,6 +7,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.candidates import Candidate, forms
+from tactile_cube.identification.diagnosis import Unexplained, follows_signals
 from tactile_cube.identification.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.gauss_newton import Fit
@@ -104,6 +105,12 @@ def test_an_effect_that_leaves_no_more_than_repeats_differ_is_named_if_it_explai
     assert decide(tipping).kind == "unknown_effect"
     assert decide(tipping, as_repeats=True).kind == "missing_effect"
     assert decide(findings(20.0, explanation("backlash", 9.0)), as_repeats=True).kind == "unknown_effect"
+
+
+def test_what_a_black_box_still_explains_is_not_noise() -> None:
+    assert not follows_signals([])
+    assert not follows_signals([Unexplained("q1", [], 0.1), Unexplained("q2", [], 0.0)])
+    assert follows_signals([Unexplained("q1", [], 0.0), Unexplained("q2", [], 0.45)])
 
 
 def test_joints_are_unexplained_while_their_error_stays_above_the_noise() -> None:

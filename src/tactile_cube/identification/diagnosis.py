@@ -110,7 +110,7 @@ def diagnose(
     if floor.source == "repeats" and summaries["with_effects"].overall <= floor.overall:
         verdict = decide(findings, as_repeats=True)
     unexplained = _unexplained(search, verdict, findings.base)
-    if verdict.kind != "unknown_effect" and any(one.black_box > FOLLOWS_SIGNALS for one in unexplained):
+    if verdict.kind != "unknown_effect" and follows_signals(unexplained):
         verdict = replace(verdict, kind="unknown_effect", rivals=())
         unexplained = _unexplained(search, verdict, findings.base)
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
@@ -130,6 +130,11 @@ def diagnose(
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
     )
+
+
+def follows_signals(unexplained: Sequence[Unexplained]) -> bool:
+    """Whether what is left is a function of the signals, and so no noise: what was named is not the whole of it."""
+    return any(one.black_box > FOLLOWS_SIGNALS for one in unexplained)
 
 
 def with_offsets(model: Model, judged: Model) -> Model:
