@@ -100,6 +100,11 @@ def test_an_effect_that_leaves_much_unexplained_is_not_named() -> None:
     assert decide(findings(20.0, explanation("backlash", 9.0))).kind == "unknown_effect"
 
 
+def test_an_effect_that_explains_half_of_little_is_not_named() -> None:
+    assert decide(findings(1.9, explanation("backlash", 1.5, 1.9))).kind == "unknown_effect"
+    assert decide(findings(1.9, explanation("backlash", 1.1, 1.9))).kind == "missing_effect"
+
+
 def test_an_effect_that_leaves_no_more_than_repeats_differ_is_named_if_it_explains_nearly_all() -> None:
     tipping = findings(100.0, explanation("torque_saturation", 4.5, 100.0))
     assert decide(tipping).kind == "unknown_effect"

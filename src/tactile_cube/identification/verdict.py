@@ -14,6 +14,7 @@ from tactile_cube.identification.search import SMALLEST_GAIN, Findings
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete
 EXPLAINED, TOLERATED_IF_EXPLAINED = 0.98, 4.0  # share of the excess error, and the error, that a near miss may have
+MOST = 0.9  # share of the excess error that has to be explained unless the error is as good as none
 LIKELY = 0.05  # p-value at which a richer explanation stays in the race
 DETAIL = 0.002  # of what an effect explains, below which more numbers for it follow something else
 ADEQUATE = 1.3  # error / sensor noise of a model to which nothing significant can be added
@@ -48,7 +49,8 @@ def decide(findings: Findings, as_repeats: bool = False) -> Verdict:
     found = [one for level in findings.levels for one in level]
     chosen = simplest(found)
     near = chosen.explained(base) > EXPLAINED and (chosen.error < TOLERATED_IF_EXPLAINED or as_repeats)
-    if chosen.error > TOLERATED and not near:
+    far = chosen.error > ADEQUATE and chosen.explained(base) < MOST
+    if far or (chosen.error > TOLERATED and not near):
         return Verdict("unknown_effect", chosen)
     rivals = find_rivals(chosen, found)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
