@@ -184,7 +184,7 @@ def picture(summary: dict[str, Any], path: Path) -> None:
     canvas = Figure(figsize=(8.0, 1.8 + 0.5 * len(rows)), layout="constrained")
     axes = canvas.add_subplot()
     axes.imshow(counts, cmap="Blues", vmin=0)
-    axes.set_xticks(range(len(COLUMNS)), [column.replace(", ", ",\n") for column in COLUMNS])
+    axes.set_xticks(range(len(COLUMNS)), [column.replace(", ", ",\n").replace("_", "_\n") for column in COLUMNS])
     axes.set_yticks(range(len(rows)), rows)
     axes.set_title(f"Blind diagnosis, {summary['draws']} draws: hidden (rows) and answered (columns)", fontsize=10)
     most = max((max(row) for row in counts), default=1)
