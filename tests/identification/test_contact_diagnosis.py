@@ -36,6 +36,7 @@ def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list
     found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
     found.run(Contact({}))
     assert [one.effect.name for one in found.found] == names
+    assert [one.gain_of for one in found.found] == ["offsets"] * len(names)  # and not of the error, which stays
     assert found.rivals == []
 
 

@@ -16,6 +16,7 @@ from tactile_cube.identification.contact_search import best_of, first_value, nar
 from tactile_cube.identification.contact_together import solved
 from tactile_cube.identification.contact_trial import SIGMA, ContactTrial
 from tactile_cube.identification.contact_unknown import unknowns
+from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.error import ErrorSummary, summarise
 from tactile_cube.measurement.hand_replay import Contact, HandReplay, contact_of
@@ -49,6 +50,7 @@ class Tried:
         gain: share of the error of the trials that show it that it takes off, or of the joint offsets that they need,
             whichever is larger.
         p_value: that it takes off nothing.
+        gain_of: which of these.
     """
 
     effect: type[ContactEffect]
@@ -56,11 +58,7 @@ class Tried:
     error: float
     gain: float
     p_value: float
-
-    @property
-    def by_offsets(self) -> bool:
-        """Whether it shows in the joint offsets and not in the error."""
-        return self.effect.shows_in == "offsets"
+    gain_of: Literal["error", "offsets"] = "error"
 
 
 @dataclass(frozen=True)
@@ -121,7 +119,7 @@ class ContactDiagnosis:
                     "held_out_error": one.error,
                     "gain": one.gain,
                     "p_value": one.p_value,
-                    "shows_in": one.effect.shows_in,
+                    "gain_of": one.gain_of,
                 }
                 for tried in self.tried
                 for one in tried
@@ -144,6 +142,7 @@ class ContactDiagnosis:
             "joints": ["object"],
             "parameters": {key: e.model_dump() for key, e in (coarse | exact).items()},
             "heldout_gain": one.gain,
+            "gain_of": one.gain_of,
             "p_value": one.p_value,
             "rivals": rivals,
         }
@@ -238,8 +237,8 @@ class ContactSearch:
             self.tried.append(tried)
             helps = [one for one in tried if one.gain >= GAIN]
             # offsets that are alike for another reason are no rival of an effect that lowers the error
-            helps = [one for one in helps if not one.by_offsets] or helps
-            if not helps or helps[0].p_value > (P_VALUE / len(tried) if helps[0].by_offsets else P_VALUE):
+            helps = [one for one in helps if one.gain_of == "error"] or helps
+            if not helps or helps[0].p_value > (P_VALUE / len(tried) if helps[0].gain_of == "offsets" else P_VALUE):
                 return
             best = helps[0]
             self.found.append(best)
@@ -261,13 +260,12 @@ class ContactSearch:
         p_value = (
             float(stats.wilcoxon((old - new).ravel(), alternative="greater").pvalue) if np.any(old != new) else 1.0
         )
-        of = "held-out error of the trials that show it"
+        found = Tried(effect, contact, error, gain, p_value)
         if effect.shows_in == "offsets":
             offsets = offsets_gained([*trials, *shown_by(self.judges, effect)], stated, contact)
-            of = f"{of}, {100 * offsets[0]:.0f} % off the joint offsets that the grips need"
-            gain, p_value = max((gain, p_value), offsets)
-        self.say(f"{effect.name}: takes {100 * gain:.0f} % off the {of}")
-        return Tried(effect, contact, error, gain, p_value)
+            found = max(found, Tried(effect, contact, error, *offsets, "offsets"), key=lambda one: one.gain)
+        self.say(f"{effect.name}: takes {100 * found.gain:.0f} % off {GAIN_OF[found.gain_of]}")
+        return found
 
     def _looked_at(self, effect: type[ContactEffect]) -> list[ContactTrial]:
         """A few trials that show the effect; all of them where the offsets of all initialisations have to tell."""

@@ -14,6 +14,7 @@ OPENING = {
     "ambiguous": "An effect is missing, but this recording cannot tell these apart:",
     "unknown_effect": "Something is missing that no effect of the catalogue explains.",
 }
+GAIN_OF = {"error": "the held-out error", "offsets": "the joint offsets that the grips need"}
 HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tactile_cube.identification.contact_identification import ContactIdentification
+from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.visualization.diagnosis_report import VERDICTS
 from tactile_cube.visualization.diagnosis_sections import effect_section, ranking_section, staircase_section
 from tactile_cube.visualization.numbers import mrad
@@ -63,7 +64,7 @@ def _ranked(row: Mapping[str, Any]) -> dict[str, Any]:
         "effect": row["effects"],
         "held-out error [mrad]": 1e3 * row["held_out_error"],
         "share that it takes off": row["gain"],
-        "of": "the error, or the offsets that grips need" if row["shows_in"] == "offsets" else "the error",
+        "of": GAIN_OF[row["gain_of"]],
         "p (no better than without)": row["p_value"],
     }
 

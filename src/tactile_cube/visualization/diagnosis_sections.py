@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.residual_shape import Shape
 from tactile_cube.measurement.comparison import Comparison
@@ -56,8 +57,8 @@ def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
             intervals.append(Interval(label, one["value"], one["low"], one["high"], one["unit"]))
         if "heldout_gain" in effect:
             lines.append(
-                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the error on held-out "
-                f"trials (p {p_value(effect['p_value'])})"
+                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off "
+                f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {p_value(effect['p_value'])})"
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
     blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
