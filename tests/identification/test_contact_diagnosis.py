@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.model_file import ModelFile, Provenance
-from tactile_cube.identification.contact_diagnosis import ContactDiagnosis, ContactSearch, verdict_of, with_contact
+from tactile_cube.identification.contact_choice import ContactSearch
+from tactile_cube.identification.contact_diagnosis import ContactDiagnosis, verdict_of, with_contact
 from tactile_cube.measurement.error import ErrorSummary
 from tactile_cube.measurement.hand_replay import Contact
 from tests.identification.easy_contact import EasyTrial, GrippedTrial, friction

@@ -183,3 +183,12 @@ def test_one_effect_that_does_as_well_beats_two() -> None:
     both = replace(one, effects=(*one.effects, *explanation("torque_bias", 1.0).effects))
     found = Findings(findings(20.0).base, judged(40.0), ((both,), (one,)), ())
     assert decide(found).chosen is one
+
+
+def test_next_to_nothing_of_the_whole_is_no_second_effect() -> None:
+    for before, found, second in ((22.0, 1.14, 1.09), (3.0, 1.25, 1.05)):
+        base = Explanation((), FIT, judged(before), 1.0, 0.0)
+        parent = explanation("load_dependent_friction", found, before)
+        delay = explanation("command_delay", second, found)
+        both = replace(delay, effects=(*parent.effects, *delay.effects))
+        assert worthwhile(both, parent, base) is (before < 10)

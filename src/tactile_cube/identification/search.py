@@ -37,7 +37,7 @@ RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the 
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
 FAR_BEHIND_AT_FLOOR = 2.0  # the same where the best one explains nearly everything
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
-DETAIL, COMPLETE_ENOUGH = 0.001, 1.3  # share of the base error that is a detail of an explanation with such an error
+SMALL_PART, LITTLE = 0.001, 1.3  # share of the base error that is a detail, and the error from which on it may be
 COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
 RESIZED = (0.2, 6.0)  # factors of the first look that are believed
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
@@ -170,9 +170,7 @@ class Search:
 
         Where a joint sticks and slips the error has more than one valley, and many simulations at once cost little.
         """
-        if self.at_floor(fitted):
-            return candidate, fitted
-        models = other_starts(candidate, fitted.model)
+        models = [] if self.at_floor(fitted) else other_starts(candidate, fitted.model)
         if not models:
             return candidate, fitted
         costs = [self.problem.cost(self.problem.residual(one)).sum() for one in self.problem.predictions(models)]
@@ -180,10 +178,10 @@ class Search:
         nearest = [models[k] for k in np.argsort(costs)[:PROBED]]
         probed = [fit(self.problem, one, unknowns, BRIEF, frozen) for one in nearest]
         best = self.continued(frozen, min(probed, key=lambda one: one.cost))
-        if best.cost < fitted.cost:
-            self.tell([(candidate, best)])
-            return candidate, best
-        return candidate, fitted
+        if best.cost >= fitted.cost:
+            return candidate, fitted
+        self.tell([(candidate, best)])
+        return candidate, best
 
     def at_floor(self, fitted: Fit) -> bool:
         """Whether a fit with little free explains nearly everything."""
@@ -247,13 +245,14 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation)
 
     Significantly, and by more than a few per cent; a further effect has to complete the explanation, or to do most of
     what is left while that is a real part of the whole, or so much that it cannot be a detail of the effect before.
+    What is next to nothing beside the whole is a detail too, where there is little left anyway.
     """
     enough = SIGNIFICANT_IF_LARGE if explanation.gain > LARGE_GAIN else SIGNIFICANT
     if explanation.gain < SMALLEST_GAIN or explanation.p_value > enough:
         return False
     if not parent.effects:
         return True
-    if parent.error < COMPLETE_ENOUGH and parent.error**2 - explanation.error**2 < DETAIL * base.error**2:
+    if parent.error < LITTLE and parent.error**2 - explanation.error**2 < SMALL_PART * base.error**2:
         return False
     if explanation.error <= FLOOR:
         return True
