@@ -27,6 +27,9 @@ def judged(error: float, seed: int = 0) -> Judgement:
     return Judgement(MODEL, costs, np.full(60, 100), NOTHING, np.array([error, 1.0]))
 
 
+JOINTS = ("q1", "q2")
+
+
 def explanation(name: str, error: float, base: float = 20.0, seed: int = 0) -> Explanation:
     effect = find_effect(name)
     candidate = Candidate(effect, ("q1",), forms(effect)[0])
@@ -127,24 +130,34 @@ def test_a_further_effect_needs_a_real_part_of_the_error() -> None:
     first = explanation("command_delay", 2.0)
     tiny = replace(explanation("torque_bias", 1.9), gain=0.1)
     completing = replace(explanation("torque_bias", 1.05), gain=0.7)
-    assert not worthwhile(tiny, first, base)
-    assert worthwhile(completing, first, base)
+    assert not worthwhile(tiny, first, base, JOINTS)
+    assert worthwhile(completing, first, base, JOINTS)
 
 
 def test_a_large_share_needs_less_significance_than_a_small_one() -> None:
     base = Explanation((), FIT, judged(2.4), 1.0, 0.0)
     found = replace(explanation("backlash", 1.4, 2.4), p_value=0.03)
-    assert worthwhile(replace(found, gain=0.6), base, base)
-    assert not worthwhile(replace(found, gain=0.1), base, base)
-    assert not worthwhile(replace(found, gain=0.6, p_value=0.1), base, base)
+    assert worthwhile(replace(found, gain=0.6), base, base, JOINTS)
+    assert not worthwhile(replace(found, gain=0.1), base, base, JOINTS)
+    assert not worthwhile(replace(found, gain=0.6, p_value=0.1), base, base, JOINTS)
 
 
 def test_a_second_effect_that_a_large_remainder_needs_is_no_detail_of_the_first() -> None:
     base = Explanation((), FIT, judged(300.0), 1.0, 0.0)
     stop, small = explanation("joint_stop", 14.0), explanation("joint_stop", 3.5)
-    assert worthwhile(replace(explanation("stribeck_friction", 2.5), gain=0.97), stop, base)
-    assert not worthwhile(replace(explanation("stribeck_friction", 8.0), gain=0.7), stop, base)
-    assert not worthwhile(replace(explanation("stribeck_friction", 1.3), gain=0.9), small, base)
+    assert worthwhile(replace(explanation("stribeck_friction", 2.5), gain=0.97), stop, base, JOINTS)
+    assert not worthwhile(replace(explanation("stribeck_friction", 8.0), gain=0.7), stop, base, JOINTS)
+    assert not worthwhile(replace(explanation("stribeck_friction", 1.3), gain=0.9), small, base, JOINTS)
+
+
+@pytest.mark.parametrize(("own", "enough"), [(1.02, True), (1.4, False)])
+def test_a_second_effect_may_complete_its_own_joint_while_another_stays_rough(own: float, enough: bool) -> None:
+    base = Explanation((), FIT, judged(300.0), 1.0, 0.0)
+    stop = replace(explanation("joint_stop", 1.9), judgement=replace(judged(1.9), joint_errors=np.array([1.7, 2.2])))
+    after = replace(judged(1.4), joint_errors=np.array([1.7, own]))
+    gear = replace(explanation("torque_gain", 1.4), judgement=after, gain=0.5)
+    gear = replace(gear, effects=(replace(gear.effects[0], joints=("q2",)),))
+    assert worthwhile(gear, stop, base, JOINTS) is enough
 
 
 @pytest.mark.parametrize(("better", "significant"), [(0.9, True), (1.0, False)])
@@ -191,4 +204,4 @@ def test_next_to_nothing_of_the_whole_is_no_second_effect() -> None:
         parent = explanation("load_dependent_friction", found, before)
         delay = explanation("command_delay", second, found)
         both = replace(delay, effects=(*parent.effects, *delay.effects))
-        assert worthwhile(both, parent, base) is (before < 10)
+        assert worthwhile(both, parent, base, JOINTS) is (before < 10)

@@ -9,11 +9,12 @@ from tests.drivetrain.rigs import wheel
 KP, STIFFNESS = 3.0, 20.0
 PLAIN = KP / (KP + STIFFNESS)
 DELAY, LAG = find_effect("command_delay"), find_effect("actuator_lag")
+BACKLASH = find_effect("backlash")
 
 
 @pytest.fixture(scope="module")
 def plant() -> Plant:
-    return Plant([wheel()], dt=0.002, effects=(DELAY, LAG), joint_names=["q"])
+    return Plant([wheel()], dt=0.002, effects=(DELAY, LAG, BACKLASH), joint_names=["q"])
 
 
 def position_ratio(plant: Plant, *effects: object) -> float:
@@ -43,3 +44,7 @@ def test_a_lag_lets_a_part_of_the_jump_pass(plant: Plant) -> None:
 
 def test_behind_a_delay_the_jump_comes_later_but_as_large(plant: Plant) -> None:
     assert position_ratio(plant, DELAY("q", delay=0.02)) == pytest.approx(PLAIN)
+
+
+def test_what_a_motor_follows_freely_within_a_gap_is_no_part_of_the_ratio(plant: Plant) -> None:
+    assert position_ratio(plant, BACKLASH("q", play=0.0, gap=0.02)) == pytest.approx(PLAIN)

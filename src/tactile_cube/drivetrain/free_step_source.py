@@ -4,6 +4,9 @@ The names in capitals are offsets into the memory, see `memory_layout`; C chains
 """
 
 FREE_STEP = '''
+UNSURE = 0.025  # [s] to either side of a segment's start, from which its measured speed is read
+
+
 @inner
 def free_step(command, memory):
     """One step of the mechanism without contacts: semi-implicit Euler, as Bullet."""
@@ -60,29 +63,60 @@ def roll(commands, length, history, substeps, memory, rows, out):
 
 
 @inner
-def start_segment(position, speed, nudge, trial, memory):
+def note_free(memory, free):
+    """Marks the joints that their sensors do not show, within a gap of the transmission."""
+    for a in range(C * n):
+        if signals_of(a // n, memory)[GAP, a % n] == 2.0:
+            free[a] = 1.0
+
+
+@inner
+def look_ahead(commands, memory, trial, free):
+    """Notes free joints in the steps to come, if any joint has a gap at all."""
+    gaps = 0.0
+    for a in range(C * n):
+        gaps += signals_of(a // n, memory)[GAP, a % n]
+    if gaps > 0.0:
+        trial[:] = memory
+        for command in commands:
+            free_step(command, trial)
+            note_free(trial, free)
+
+
+@inner
+def start_segment(position, speed, nudge, free, trial, memory):
     """Puts the sensor to its measured position and the joints to their measured speed; effects keep their past.
 
-    `trial` has made the coming step already, which says how far the sensor is from the joint.
+    `trial` has made the coming step already, which says how far the sensor is from the joint. A joint that is `free` of
+    its sensor around the start goes on as it was.
     """
     for a in range(C * n):
         column = a % n
         x = signals_of(a // n, trial)
-        memory[Q + a] = position[a] - (x[MOTOR_POSITION, column] - x[POSITION, column]) + nudge[a]
-        memory[V + a] = speed[a] + nudge[C * n + a]
+        if free[a] == 0.0:
+            memory[Q + a] = position[a] - (x[MOTOR_POSITION, column] - x[POSITION, column])
+            memory[V + a] = speed[a]
+        memory[Q + a] += nudge[a]
+        memory[V + a] += nudge[C * n + a]
 
 
 @inner
 def roll_segments(commands, length, history, substeps, segment, position, speed, nudge, memory, rows, out):
     reading = min(int(memory[READING]), substeps - 1)
-    trial = memory.copy()
+    trial, free = memory.copy(), np.zeros(C * n)
+    around = round(UNSURE / memory[DT])
     for k in range(history + length):
         if k >= history and (k - history) % segment == 0:
             part = (k - history) // segment
+            if part > 0:
+                look_ahead(commands[k : k + around], memory, trial, free)
             for _ in range(4 if part == 0 else 1):  # the first start's torque is a guess at first
                 trial[:] = memory
                 free_step(commands[k], trial)
-                start_segment(position[part], speed[part], nudge, trial, memory)
+                start_segment(position[part], speed[part], nudge, free, trial, memory)
+            free[:] = 0.0
+        elif (k - history) % segment >= segment - around:
+            note_free(memory, free)
         for s in range(substeps):
             if k < history:
                 listen(commands[k], memory)

@@ -45,10 +45,14 @@ def drive(x, c, dt, memory):
         x[MOTOR_POSITION, j] = x[POSITION, j]
         x[ANGLE, j] = x[POSITION, j] + memory[ANGLE_OFFSET + c * n + j]
     effects_velocity_sensor(x, c, dt, memory)
+    for j in range(n):
+        damped = memory[KD + c * n + j] * x[MEASURED_VELOCITY, j] / memory[KP + c * n + j]
+        x[LEAD, j] = x[COMMAND, j] - x[POSITION, j] - damped
+        x[GAP, j] = 0.0
     effects_position_sensor_ahead(x, c, dt, memory)
     for j in range(n):
         a = c * n + j
-        ahead = x[MOTOR_POSITION, j] - x[POSITION, j]  # of sensor laws without a memory: known now, not a step late
+        ahead = x[MOTOR_POSITION, j] - x[POSITION, j]  # of sensor laws that need no torque: known now, not a step late
         x[CONTROLLER_TORQUE, j] = impedance_torque(
             x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j],
             memory[KP + a], memory[KD + a], memory[COMPLIANCE + a] + memory[EXTRA_COMPLIANCE + a],

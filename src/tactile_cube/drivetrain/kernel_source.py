@@ -64,8 +64,12 @@ def _laws(effects: Sequence[type[Effect]]) -> str:
     return "\n".join(
         f'{law}_{index} = inner(import_module("{effect.__module__}").{effect.__qualname__}.{law})'
         for index, effect in enumerate(effects)
-        for law in ("law", "torque_law")
-        if (effect.stage is not Stage.MECHANISM if law == "law" else effect.acts_on_torque)
+        for law, there in (
+            ("law", effect.stage is not Stage.MECHANISM),
+            ("torque_law", effect.acts_on_torque),
+            ("ahead_law", effect.acts_ahead),
+        )
+        if there
     )
 
 
@@ -80,10 +84,12 @@ def _stage_source(stage: Stage, effects: Sequence[type[Effect]], layout: MemoryL
 
 
 def _ahead_source(effects: Sequence[type[Effect]], layout: MemoryLayout) -> str:
-    """Laws of the position sensor that remember nothing: they can be asked before the torque is known."""
+    """Laws of the position sensor that can be asked before the torque is known: remembering nothing, or made for it."""
     lines = ["", "@inner", "def effects_position_sensor_ahead(x, c, dt, memory):"]
     for index, effect in enumerate(effects):
-        if effect.stage is Stage.POSITION_SENSOR and effect.state_size(ANY_STEP) == 0:
+        if effect.acts_ahead:
+            lines += _effect_lines(index, effect, layout, "ahead_law")
+        elif effect.stage is Stage.POSITION_SENSOR and effect.state_size(ANY_STEP) == 0:
             lines += _effect_lines(index, effect, layout)
     return "\n".join([*lines, "    return", ""])
 

@@ -37,4 +37,8 @@ DAMPING = 15
 """Slope of the torque on the joint against its present speed: what acts at the middle of a step [N m s/rad]."""
 ANGLE = 16
 """Angle of the mechanism [rad]: POSITION and what the joint's initialisation read too little."""
-ROWS = 17
+LEAD = 17
+"""q_d - q_m - K_D / K_P dq [rad] of a motor that carries no torque: zero where the controller lets it stand."""
+GAP = 18
+"""Where the motor stands in its transmission: 0 there is no gap, 1 on a flank, 2 free, so that it does not show q."""
+ROWS = 19

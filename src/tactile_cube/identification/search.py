@@ -106,7 +106,7 @@ class Search:
             found = [(parent, e) for parent in beam for e in self.extend(parent)]
             if not scores:
                 scores = tuple(self.last_scores)
-            better = [e for parent, e in found if worthwhile(e, parent, base)]
+            better = [e for parent, e in found if worthwhile(e, parent, base, self.fitted.joints)]
             if not better:
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
@@ -240,11 +240,12 @@ class Search:
         return explanation
 
 
-def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation) -> bool:
+def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation, joints: Sequence[str]) -> bool:
     """Whether an effect earns its place.
 
-    Significantly, and by more than a few per cent; a further effect has to complete the explanation, or to do most of
-    what is left while that is a real part of the whole, or so much that it cannot be a detail of the effect before.
+    Significantly, and by more than a few per cent; a further effect has to complete the explanation, or that of the
+    joints where it acts, or to do most of what is left while that is a real part of the whole, or so much that it
+    cannot be a detail of the effect before.
     What is next to nothing beside the whole is a detail too, where there is little left anyway.
     """
     enough = SIGNIFICANT_IF_LARGE if explanation.gain > LARGE_GAIN else SIGNIFICANT
@@ -254,12 +255,19 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation)
         return True
     if parent.error < LITTLE and parent.error**2 - explanation.error**2 < SMALL_PART * base.error**2:
         return False
-    if explanation.error <= FLOOR:
+    if explanation.error <= FLOOR or completes_its_joints(explanation, parent, joints):
         return True
     share = explanation.explained(parent)
     if parent.explained(base) < REAL_PART:
         return share > COMPLETED
     return parent.error > FAR_FROM_FLOOR and share > NEARLY_ALL
+
+
+def completes_its_joints(explanation: Explanation, parent: Explanation, joints: Sequence[str]) -> bool:
+    """Whether the last effect takes the error of the joints where it acts down to the floor."""
+    places = [joints.index(joint) for joint in explanation.effects[-1].joints]
+    before, after = (one.judgement.joint_errors[places] for one in (parent, explanation))
+    return bool(before.max() > LITTLE and after.max() <= FLOOR)
 
 
 def without_effect(explanation: Explanation, place: int) -> Model:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION
+from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.stretches import Stretches, steps_per_row
-from tactile_cube.measurement.jump_ratio import jump_ratio
+from tactile_cube.measurement.jump_ratio import gaps, jump_ratio
 from tactile_cube.measurement.known_force import force_torque
+from tactile_cube.measurement.read_out import free_way
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.replay import CLAMPED
 
@@ -65,7 +66,9 @@ class Shooting:
         memory = self._memory(model, stretches)
         count, fine = len(stretches), stretches.substeps
         felt, _ = jump_ratio(self.plant, memory[0], stretches.commands[0, stretches.history * fine])
-        signals = np.zeros((count, out.shape[1] * fine, 2, out.shape[2]))
+        gap = gaps(self.plant, memory[0])
+        rows = np.array([MOTOR_POSITION, COMMAND, *([LEAD] if gap.any() else [])])
+        signals = np.zeros((count, out.shape[1] * fine, len(rows), out.shape[2]))
         self.plant.kernel.segments_batch(
             stretches.commands,
             np.arange(count),
@@ -77,12 +80,14 @@ class Shooting:
             stretches.speed,
             np.tile(nudge, (count, 1)),
             memory,
-            np.array([MOTOR_POSITION, COMMAND]),
+            rows,
             0,
             count,
             signals,
         )
-        out[:] = signals[:, ::fine, 0] - felt * _jumps(signals[:, :, 1], stretches)
+        jump = _jumps(signals[:, :, 1], stretches)
+        free = free_way(signals[:, ::fine, 2], jump, gap) if gap.any() else 0.0
+        out[:] = signals[:, ::fine, 0] - free - felt * (jump - free)
 
     def _memory(self, model: Model, stretches: Stretches) -> Array:
         """One block (S, size) for each stretch, at rest at its start."""

@@ -27,8 +27,25 @@ def half_jumps(acting: Array, substeps: int) -> Array:
     return np.asarray(jumps[::substeps])
 
 
+def free_way(lead: Array, jump: Array, gap: Array) -> Array:
+    """The part of a jump of the command that a motor makes freely, within the gap of a transmission.
+
+    Args:
+        lead: (..., joints) signal LEAD after the jump [rad].
+        jump: (..., joints) of the command [rad].
+        gap: (joints,) widths, 0 without a gap [rad].
+    """
+    half = 0.5 * gap
+    return np.asarray(np.clip(lead, -half, half) - np.clip(lead - jump, -half, half))
+
+
 def read_out(
-    position: Array, torque: Array, jump: Array, ratios: tuple[Array, Array], torque_limit: Array
+    position: Array,
+    torque: Array,
+    jump: Array,
+    ratios: tuple[Array, Array],
+    torque_limit: Array,
+    free: Array | float = 0.0,
 ) -> tuple[Array, Array]:
     """Position [rad] and torque [N m] under the command that a log's instant feels.
 
@@ -38,9 +55,10 @@ def read_out(
         jump: (T, joints) the simulated command less the one that the log feels [rad].
         ratios: (joints,) jump of position [1] and of torque [N m/rad] per jump of the command, see `jump_ratio`.
         torque_limit: (joints,) [N m]; a torque at its limit does not jump.
+        free: (T, joints) the part of the jump that the motor follows without torque [rad], see `free_way`.
 
     Returns:
         position and torque, (T, joints): without the jump in torque and in the drive's deflection.
     """
-    felt = np.where(np.abs(torque) < 0.999 * torque_limit, jump, 0.0)
-    return position - ratios[0] * felt, torque - ratios[1] * felt
+    felt = np.where(np.abs(torque) < 0.999 * torque_limit, jump - free, 0.0)
+    return position - free - ratios[0] * felt, torque - ratios[1] * felt

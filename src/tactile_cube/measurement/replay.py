@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import COMMAND, MOTOR_POSITION, POSITION, TORQUE, catalogue, resolve
+from tactile_cube.drivetrain.effects import COMMAND, LEAD, MOTOR_POSITION, POSITION, TORQUE, catalogue, resolve
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
-from tactile_cube.measurement.jump_ratio import jump_ratio
+from tactile_cube.measurement.jump_ratio import gaps, jump_ratio
 from tactile_cube.measurement.known_force import force_torque
 from tactile_cube.measurement.parameters import TORQUE_MODE_GAIN, Parameters
-from tactile_cube.measurement.read_out import half_jumps, impulses, read_out
+from tactile_cube.measurement.read_out import free_way, half_jumps, impulses, read_out
 from tactile_cube.measurement.recording import Recording
 from tactile_cube.measurement.trial import Trial
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tactile_cube.simulation.rig import RigWorld
 
 Array = NDArray[np.float64]
-SIGNALS = np.array([MOTOR_POSITION, TORQUE, COMMAND])
+SIGNALS = np.array([MOTOR_POSITION, TORQUE, COMMAND, LEAD])
 Engine = Literal["fast", "pybullet"]
 HISTORY = 0.15  # [s] of the first command played before the trial, for effects with a memory
 START_WINDOW = 0.02  # [s] over which the state at the start is read
@@ -109,7 +109,10 @@ class Replay:
         before = memory.copy()
         rollout_batch(commands, np.arange(len(trials)), rows, history, 1, memory, SIGNALS, out)
         ratios = [jump_ratio(self.plant, before[b], commands[b, 0]) for b in range(len(trials))]
-        return [self._read(trial, out[b, : rows[b]], ratios[b], parameters) for b, trial in enumerate(trials)]
+        widths = [gaps(self.plant, one) for one in before]
+        return [
+            self._read(trial, out[b, : rows[b]], ratios[b], widths[b], parameters) for b, trial in enumerate(trials)
+        ]
 
     def _commands(self, trial: Trial, history: int, rows: int) -> Array:
         """Commands of every step as positions [rad], the first one held before the trial and the last one after it."""
@@ -117,14 +120,17 @@ class Replay:
         fine = impulses(trial.command / scale, self.substeps)
         return np.pad(fine, ((history, rows - len(fine)), (0, 0)), mode="edge")
 
-    def _read(self, trial: Trial, signals: Array, ratios: tuple[Array, Array], parameters: Parameters) -> Simulated:
+    def _read(
+        self, trial: Trial, signals: Array, ratios: tuple[Array, Array], gap: Array, parameters: Parameters
+    ) -> Simulated:
         """What the log would show of the signals of all steps ((n + 1) substeps, signals, joints)."""
-        position, torque = np.moveaxis(signals[:: self.substeps, :2], 1, 0)
+        position, torque, _, lead = np.moveaxis(signals[:: self.substeps], 1, 0)
         jump = half_jumps(signals[:, 2], self.substeps)
+        free = free_way(lead, jump, gap)
         # Either way the drive still feels the old command: a loop reads first and commands then.
         shown = slice(None, -1) if self.recording.read == "before" else slice(1, None)
         limit = self._constants(trial, parameters)["torque_limit"]
-        return Simulated(*read_out(position[shown], torque[shown], jump[shown], ratios, limit))
+        return Simulated(*read_out(position[shown], torque[shown], jump[shown], ratios, limit, free[shown]))
 
     def _memory(self, trial: Trial, parameters: Parameters) -> Array:
         own = self._constants(trial, parameters)

@@ -61,6 +61,8 @@ def run(effect: type[Effect], values: dict[str, float]) -> tuple[np.ndarray, np.
     for seed in range(6):
         x = signals(seed)
         before.append(x[effect.stage.value, 1])
+        if effect.acts_ahead:
+            effect.ahead_law(x.copy(), 1, p, s, DT)
         x[effect.stage.value, 1] = effect.law(x, 1, p, s, DT)
         if effect.acts_on_torque:
             x[12, 1] += effect.torque_law(x, 1, p, s, DT) - x[9, 1]

@@ -106,6 +106,8 @@ class Effect:
     """Names of simpler effects that this one becomes at some of its values, so that it always follows data as well."""
     acts_on_torque: ClassVar[bool] = False
     """Whether the effect has a `torque_law` beside its `law`."""
+    acts_ahead: ClassVar[bool] = False
+    """Whether the effect has an `ahead_law` beside its `law`."""
 
     def __init__(self, joint: str, **values: float) -> None:
         """Place the effect on `joint`; parameters not given take their typical value.
@@ -143,6 +145,11 @@ class Effect:
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """The new motor torque of joint j [N m], for effects that act there too; arguments as of `law`."""
+        raise NotImplementedError
+
+    @staticmethod
+    def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """The part of a POSITION_SENSOR law [rad] that is known before the torque, which feels it without delay."""
         raise NotImplementedError
 
     @staticmethod
