@@ -9,7 +9,9 @@ and never inside it, FOLDER/truth.json. Nothing here comes from the package unde
 import argparse
 import dataclasses
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -272,9 +274,16 @@ def draw(
     return best[1:]
 
 
-def _table(world: World, bench: Bench, command: Array, start: Array, rng: np.random.Generator) -> pl.DataFrame:
+def _engine(name: str) -> Callable[..., tuple[Array, Array, Array]]:
+    """What moves the measured rig: `own` (physics.py) or `mujoco`."""
+    return simulate if name == "own" else import_module(f"{name}_physics").simulate  # type: ignore[no-any-return]
+
+
+def _table(
+    world: World, bench: Bench, command: Array, start: Array, rng: np.random.Generator, engine: str
+) -> pl.DataFrame:
     """One trial as its log: sensors with noise and resolution, some rows lost."""
-    position, torque, _ = simulate(world.rig, world.plant, command, bench.rate, start, bench.settle)
+    position, torque, _ = _engine(engine)(world.rig, world.plant, command, bench.rate, start, bench.settle)
     position = position + bench.noise * rng.normal(size=position.shape)
     position = np.round(position / bench.resolution) * bench.resolution
     torque = torque + 0.002 * rng.normal(size=torque.shape)
@@ -336,7 +345,7 @@ def repeat_scatter(tables: dict[str, tuple[int, str, pl.DataFrame]], joints: lis
 Tables = dict[str, tuple[int, str, pl.DataFrame]]
 
 
-def perform(seed: int, world: World, bench: Bench) -> tuple[Tables, Tables]:
+def perform(seed: int, world: World, bench: Bench, engine: str = "own") -> tuple[Tables, Tables]:
     """The trials, file -> (initialisation, kind, table), and unseen ones of the last initialisation."""
     rng = np.random.default_rng([seed, 7])
     n, samples = len(world.rig.actuated), int(bench.seconds * bench.rate)
@@ -349,7 +358,7 @@ def perform(seed: int, world: World, bench: Bench) -> tuple[Tables, Tables]:
         there.plant.offset[:] += offsets[init]
         command = command.astype(np.float32).astype(float)
         start = command[0] - there.plant.offset + bench.start_error * rng.uniform(-1, 1, n)
-        return _table(there, bench, command, start, rng)
+        return _table(there, bench, command, start, rng, engine)
 
     tables = {}
     for init in range(bench.initialisations):
@@ -361,12 +370,17 @@ def perform(seed: int, world: World, bench: Bench) -> tuple[Tables, Tables]:
 
 
 def write(
-    seed: int, out: Path, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None
+    seed: int,
+    out: Path,
+    seconds: float | None = None,
+    names: list[str] | None = None,
+    kind: str | None = None,
+    engine: str = "own",
 ) -> dict[str, Any]:
     """Draw the seed and write `out`/recording and `out`/truth.json; returns the truth."""
     for redrawn in range(ATTEMPTS):
         world, bench, truth = draw(seed, seconds, names, kind, redrawn)
-        tables, unseen = perform(seed, world, bench)
+        tables, unseen = perform(seed, world, bench, engine)
         if all(np.isfinite(table.to_numpy()).all() for _, _, table in (*tables.values(), *unseen.values())):
             break
     else:

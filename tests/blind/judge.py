@@ -51,10 +51,10 @@ def validation_error(recording: Path, model: Path, out: Path) -> float | None:
     return None if answer is None else float(answer["error"]["overall"])
 
 
-def judge(seed: int, folder: Path, seconds: float | None, keep: bool) -> dict[str, Any]:
+def judge(seed: int, folder: Path, seconds: float | None, keep: bool, engine: str = "own") -> dict[str, Any]:
     """Generate, diagnose, compare and judge one seed."""
     place = folder / f"draw_{seed}"
-    truth = write(seed, place, seconds)
+    truth = write(seed, place, seconds, engine=engine)
     started = time.perf_counter()
     diagnosis = run_verb(
         "diagnose", place / "diagnose", f"recording={place / 'recording'}", "engine=fast", "rerun=false"
@@ -254,6 +254,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--seconds", type=float, help="length of every trial (default: drawn)")
+    parser.add_argument("--engine", choices=("own", "mujoco"), default="own", help="what moves the measured rigs")
     parser.add_argument("--keep", action="store_true", help="keep recordings and answers")
     args = parser.parse_args()
     for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -265,8 +266,10 @@ def main() -> None:
     command += f" --first-seed {args.first_seed}" * (args.first_seed != FIRST_SEED) + (
         f" --seconds {args.seconds:g}" if args.seconds else ""
     )
+    command += f" --engine {args.engine}" * (args.engine != "own")
     with ThreadPoolExecutor(args.jobs) as pool:
-        for future in as_completed([pool.submit(judge, s, args.out, args.seconds, args.keep) for s in wanted]):
+        submitted = [pool.submit(judge, s, args.out, args.seconds, args.keep, args.engine) for s in wanted]
+        for future in as_completed(submitted):
             line = future.result()
             with (args.out / "verdicts.jsonl").open("a") as lines:
                 lines.write(json.dumps(line) + "\n")

@@ -361,7 +361,42 @@ def _friction_level(p, m, i, t, q, v, load, acceleration):
 
 
 @njit(cache=True)
-def _log(p, q, held, filtered, state, position, torque, joint):
+def follow(p, i, q, v, target, step, held, filtered, state, relay):
+    """One step of joint i's drive: the command that it holds, its filtered speed, its torque, and a hidden relay."""
+    most = p[RATE_LIMIT, i] * step
+    held[i] += min(max(target - held[i], -most), most)
+    filtered[i] = v if p[VELOCITY_LAG, i] <= 0 else filtered[i] + (v - filtered[i]) * step / p[VELOCITY_LAG, i]
+    error = held[i] - q - p[OFFSET, i]
+    error -= p[TRANSMISSION, i] * np.sin(p[TRANSMISSION_ORDER, i] * q + p[TRANSMISSION_PHASE, i])
+    if p[LAG, i] > 0.0:
+        stretch = _deflection(state[i], p[STIFFNESS, i], p[CUBIC_STIFFNESS, i])
+        wanted = p[KP, i] * (error - stretch) - p[KD, i] * filtered[i]
+        wanted = min(max(wanted, -p[TORQUE_LIMIT, i]), p[TORQUE_LIMIT, i])
+        state[i] += (wanted - state[i]) * step / p[LAG, i]
+    else:
+        state[i] = _drive(p, i, error, filtered[i])[0]
+    edge = p[RELAY_CENTRE, i] + (-0.5 if relay[i] > 0 else 0.5) * p[RELAY_WIDTH, i]
+    relay[i] = 1.0 if q > edge else -1.0
+
+
+@njit(cache=True)
+def load_on_joint(p, m, i, t, q, v, step, state, relay, bristle, felt):
+    """Torque on joint i but for gravity and dry friction, and the level of that, without its asymmetry."""
+    load = p[GAIN, i] * state[i] + p[BIAS, i]
+    for j in range(q.shape[0]):
+        load += m[CROSSTALK, i, j] * state[j]
+    torque = load + _joint_torques(p, m, i, t, q, v, relay)
+    level = _friction_level(p, m, i, t, q, v, load, felt[i])
+    if p[PRESLIDING, i] > 0.0:
+        way = 1.0 if v[i] >= 0 else -1.0
+        bristle[i] = way + (bristle[i] - way) * np.exp(-abs(v[i]) * step / p[PRESLIDING, i])
+        torque -= level * bristle[i]
+        level = 0.0
+    return torque, level
+
+
+@njit(cache=True)
+def read_sensors(p, q, held, filtered, state, position, torque, joint):
     """What the sensors say at the end of the interval in which a command was in force."""
     for i in range(q.shape[0]):
         error = held[i] - q[i] - p[OFFSET, i]
@@ -383,41 +418,16 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, m, co
     q = start.copy()
     v, acceleration, impulse = np.zeros(n), np.zeros(n), np.zeros(n)
     held, state, filtered, bristle, relay = command[0].copy(), np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n)
-    torque, load, low, high, felt = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    torque, low, high, felt = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     lead = round(settle / step)
     for k in range(-lead, samples * per):
         t = k * step
         qm, vm = q + 0.5 * step * v, v + 0.5 * step * acceleration
         for i in range(n):
             late = int(np.floor((t - p[DELAY, i]) * rate + 1e-6))
-            target = command[min(max(late, 0), samples - 1), i]
-            most = p[RATE_LIMIT, i] * step
-            held[i] += min(max(target - held[i], -most), most)
-            filtered[i] = (
-                vm[i] if p[VELOCITY_LAG, i] <= 0 else filtered[i] + (vm[i] - filtered[i]) * step / p[VELOCITY_LAG, i]
-            )
-            error = held[i] - qm[i] - p[OFFSET, i]
-            error -= p[TRANSMISSION, i] * np.sin(p[TRANSMISSION_ORDER, i] * qm[i] + p[TRANSMISSION_PHASE, i])
-            if p[LAG, i] > 0.0:
-                stretch = _deflection(state[i], p[STIFFNESS, i], p[CUBIC_STIFFNESS, i])
-                wanted = p[KP, i] * (error - stretch) - p[KD, i] * filtered[i]
-                wanted = min(max(wanted, -p[TORQUE_LIMIT, i]), p[TORQUE_LIMIT, i])
-                state[i] += (wanted - state[i]) * step / p[LAG, i]
-            else:
-                state[i] = _drive(p, i, error, filtered[i])[0]
-            edge = p[RELAY_CENTRE, i] + (-0.5 if relay[i] > 0 else 0.5) * p[RELAY_WIDTH, i]
-            relay[i] = 1.0 if qm[i] > edge else -1.0
+            follow(p, i, qm[i], vm[i], command[min(max(late, 0), samples - 1), i], step, held, filtered, state, relay)
         for i in range(n):
-            load[i] = p[GAIN, i] * state[i] + p[BIAS, i]
-            for j in range(n):
-                load[i] += m[CROSSTALK, i, j] * state[j]
-            torque[i] = load[i] + _joint_torques(p, m, i, t, qm, vm, relay)
-            level = _friction_level(p, m, i, t, qm, vm, load[i], felt[i])
-            if p[PRESLIDING, i] > 0.0:
-                way = 1.0 if vm[i] >= 0 else -1.0
-                bristle[i] = way + (bristle[i] - way) * np.exp(-abs(vm[i]) * step / p[PRESLIDING, i])
-                torque[i] -= level * bristle[i]
-                level = 0.0
+            torque[i], level = load_on_joint(p, m, i, t, qm, vm, step, state, relay, bristle, felt)
             low[i], high[i] = -step * level * (1.0 - p[ASYMMETRY, i]), step * level * (1.0 + p[ASYMMETRY, i])
         mass, bias = mass_and_bias(axes, origins, coms, masses, inertias, gravity, select @ qm + shift, select @ vm)
         inverse, reduced_bias = _reduced(mass, bias, select, p[REFLECTED_INERTIA])
@@ -431,7 +441,7 @@ def _run(axes, origins, coms, masses, inertias, gravity, select, shift, p, m, co
             position[:] = np.nan
             break
         if k >= 0 and (k + 1) % per == 0:
-            _log(p, q, held, filtered, state, position[k // per], torque_out[k // per], joint_out[k // per])
+            read_sensors(p, q, held, filtered, state, position[k // per], torque_out[k // per], joint_out[k // per])
     return position, torque_out, joint_out
 
 

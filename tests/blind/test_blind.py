@@ -50,6 +50,19 @@ def test_a_joint_sticks_without_creeping_and_slips_at_its_friction() -> None:
     assert moved[-1, 0] > 0.005
 
 
+@pytest.mark.parametrize(("kind", "name"), [("finger", "torque_crosstalk"), ("pendulum", "stribeck_friction")])
+def test_both_engines_measure_the_same(kind: str, name: str) -> None:
+    pytest.importorskip("mujoco")
+    import mujoco_physics
+
+    world = generator.draw(1, QUICK, [name], kind)[0]
+    command = np.linspace(world.low, world.high, 200)
+    held = np.tile(command[:1], (200, 1))
+    own, still = (simulate(world.rig, world.plant, c, 500.0, command[0])[0] for c in (command, held))
+    other = mujoco_physics.simulate(world.rig, world.plant, command, 500.0, command[0], step=1e-4)[0]
+    assert np.abs(own - other).max() < 1e-3 < 0.1 < np.abs(own - still).max()
+
+
 @pytest.mark.parametrize("name", ["stribeck_friction", "command_delay", "backlash", "cogging", "joint_stop"])
 def test_a_hidden_effect_moves_the_joint_beyond_the_noise(name: str) -> None:
     assert generator.draw(1, QUICK, [name], "pendulum")[2]["visible"]
