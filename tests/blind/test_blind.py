@@ -160,7 +160,7 @@ def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
         (out / "model.yaml").write_text("")
         return {**_answer("adequate"), "error": {"overall": 3e-4}}
 
-    def written(seed: int, out: Path, seconds: float | None) -> dict[str, Any]:
+    def written(seed: int, out: Path, seconds: float | None, engine: str) -> dict[str, Any]:
         judged.append(seed)
         (out / "recording").mkdir(parents=True)
         return {"seed": seed, **_truth()}
