@@ -38,5 +38,11 @@ def test_a_stop_is_recognised(side: str, edge: float, sign: float) -> None:
     assert stop.form["stiffness"] == pytest.approx(12.0, rel=0.2)
 
 
+def test_a_bias_is_recognised() -> None:
+    found = found_in(lambda q: -0.015 + 0.002 * np.sin(9.0 * q))
+    (bias,) = (c for c in found if c.effect.name == "torque_bias")
+    assert bias.form["bias"] == pytest.approx(-0.015, abs=0.001)
+
+
 def test_a_single_detent_is_neither() -> None:
     assert found_in(lambda q: -0.05 * (q - 0.5) / 0.1 * np.exp(0.5 - 0.5 * ((q - 0.5) / 0.1) ** 2)) == []

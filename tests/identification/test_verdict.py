@@ -136,10 +136,10 @@ def test_a_further_effect_needs_a_real_part_of_the_error() -> None:
 
 def test_a_large_share_needs_less_significance_than_a_small_one() -> None:
     base = Explanation((), FIT, judged(2.4), 1.0, 0.0)
-    found = replace(explanation("backlash", 1.4, 2.4), p_value=0.03)
+    found = replace(explanation("backlash", 1.4, 2.4), p_value=6e-4)
     assert worthwhile(replace(found, gain=0.6), base, base, JOINTS)
     assert not worthwhile(replace(found, gain=0.1), base, base, JOINTS)
-    assert not worthwhile(replace(found, gain=0.6, p_value=0.1), base, base, JOINTS)
+    assert not worthwhile(replace(found, gain=0.6, p_value=0.01), base, base, JOINTS)
 
 
 def test_a_second_effect_that_a_large_remainder_needs_is_no_detail_of_the_first() -> None:
@@ -205,3 +205,11 @@ def test_next_to_nothing_of_the_whole_is_no_second_effect() -> None:
         delay = explanation("command_delay", second, found)
         both = replace(delay, effects=(*parent.effects, *delay.effects))
         assert worthwhile(both, parent, base, JOINTS) is (before < 10)
+
+
+def test_one_effect_that_explains_everything_needs_less_significance() -> None:
+    base = Explanation((), FIT, judged(1.15), 1.0, 0.0)
+    whole, part = explanation("elasticity", 1.02, 1.15), explanation("elasticity", 1.12, 1.15)
+    assert worthwhile(replace(whole, p_value=6e-3, gain=0.2), base, base, JOINTS)
+    assert not worthwhile(replace(part, p_value=6e-3, gain=0.05), base, base, JOINTS)
+    assert not worthwhile(replace(whole, p_value=6e-3, gain=0.2), part, base, JOINTS)

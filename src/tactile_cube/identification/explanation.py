@@ -20,7 +20,7 @@ class Explanation:
         effects: candidates in the order in which they were added.
         fit: on the fitted trials.
         judgement: on the held-out trials.
-        p_value: of the last effect, corrected for the number of candidates.
+        p_value: of the last effect, corrected for the number of effects that were judged beside it.
         gain: held-out share that the last effect explains.
     """
 

@@ -29,9 +29,11 @@ Array = NDArray[np.float64]
 FAR_FROM_FLOOR = 4.0  # error / sensor noise of an explanation that is none by itself
 NEARLY_ALL = 0.9  # share of what it leaves that a further effect then has to explain
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
-SIGNIFICANT = 0.01  # p-value, corrected for the number of candidates
-LARGE_GAIN, SIGNIFICANT_IF_LARGE = 0.25, 0.05  # the same for a share that no chance explains: short recordings
+SIGNIFICANT = 2e-4  # p-value, corrected for the number of effects that were judged on the held-out trials
+LARGE_GAIN, SIGNIFICANT_IF_LARGE = 0.25, 1e-3  # the same for a share that no chance explains: short recordings
+SIGNIFICANT_IF_ALL = 0.01  # the same for one effect that explains everything
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
+VARIANTS = 1  # further forms or places of these effects that come along
 BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
 RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the most promising of these values
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
@@ -140,10 +142,11 @@ class Search:
         self.last_scores = screen(self.problem, frozen, wanted, [placed(c, self.fitted) for c in wanted])
         chosen = with_groups(self.last_scores)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
-        raced = self.race(frozen, chosen)[:FINALISTS]
+        raced = of_each(self.race(frozen, chosen), FINALISTS)
         raced = [*(self.restarted(frozen, *pair) for pair in raced[:RESTARTED]), *raced[RESTARTED:]]
         special = [one for pair in raced for one in self.special(frozen, *pair)]
-        return [self.finish(parent, candidate, fitted) for candidate, fitted in (*raced, *special)]
+        judged = (*raced, *special)
+        return [self.finish(parent, candidate, fitted, len(judged)) for candidate, fitted in judged]
 
     def special(self, frozen: Fit, candidate: Candidate, fitted: Fit) -> list[tuple[Candidate, Fit]]:
         """Simpler laws that a fitted profile looks like, fitted, but for those that stay far behind it."""
@@ -157,7 +160,7 @@ class Search:
     def race(self, frozen: Fit, chosen: Sequence[Candidate]) -> list[tuple[Candidate, Fit]]:
         """Refit briefly, then the leaders at length; those that stay far behind drop out. Best first."""
         brief = sorted((self.refit(frozen, candidate, BRIEF) for candidate in chosen), key=lambda pair: pair[1].cost)
-        leaders = [(c, self.continued(frozen, f)) for c, f in brief[:RACED]]
+        leaders = [(c, self.continued(frozen, f)) for c, f in of_each(brief, RACED)]
         leaders.sort(key=lambda pair: pair[1].cost)
         self.tell(leaders)
         if not leaders:
@@ -209,10 +212,10 @@ class Search:
         model, unknowns = candidate.added_to(model or frozen.model, placed(candidate, self.fitted))
         return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
 
-    def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit) -> Explanation:
-        """Fit everything and judge on the held-out trials."""
+    def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit, judged: int) -> Explanation:
+        """Fit everything and judge on the held-out trials, of which so many effects are judged."""
         fitted, judgement = self.settled(refitted.model)
-        corrected = min(1.0, p_value(parent.judgement, judgement) * len(self.candidates))
+        corrected = min(1.0, p_value(parent.judgement, judgement) * judged)
         explanation = Explanation(
             (*parent.effects, candidate), fitted, judgement, corrected, gain(parent.judgement, judgement)
         )
@@ -249,6 +252,8 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation,
     What is next to nothing beside the whole is a detail too, where there is little left anyway.
     """
     enough = SIGNIFICANT_IF_LARGE if explanation.gain > LARGE_GAIN else SIGNIFICANT
+    if explanation.complete and not parent.effects:
+        enough = SIGNIFICANT_IF_ALL
     if explanation.gain < SMALLEST_GAIN or explanation.p_value > enough:
         return False
     if not parent.effects:
@@ -297,6 +302,17 @@ def resized(score: Score) -> Candidate:
     if more or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
         return score.candidate
     return replace(score.candidate, form={name: min(max(score.factor * start, known.low), known.high)})
+
+
+def of_each(pairs: Sequence[tuple[Candidate, Fit]], count: int) -> list[tuple[Candidate, Fit]]:
+    """The best of each of the `count` best effects, and `VARIANTS` more, still in their order.
+
+    Forms and places of one effect that follow the data alike would else leave no room for another that does so too.
+    """
+    names = list(dict.fromkeys(candidate.effect.name for candidate, _ in pairs))[:count]
+    first = [next(k for k, (candidate, _) in enumerate(pairs) if candidate.effect.name == name) for name in names]
+    others = [k for k in range(len(pairs)) if k not in first][: VARIANTS + count - len(first)]
+    return [pairs[k] for k in sorted([*first, *others])]
 
 
 def with_groups(scores: Sequence[Score]) -> list[Candidate]:

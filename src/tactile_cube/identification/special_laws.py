@@ -1,4 +1,4 @@
-"""Simpler laws that a fitted profile over the position looks like: a ripple or a stop is no arbitrary torque.
+"""Simpler laws that a fitted profile over the position looks like: a ripple, a stop or a bias is no arbitrary torque.
 
 A profile with free control torques imitates them all, and its fit converges where theirs, started from the residual of
 a model without them, may not. So they start anew from what the profile shows.
@@ -43,6 +43,8 @@ def special_candidates(candidate: Candidate, term: Term, effects: Sequence[type[
                 starts = _ripples(angles, torques, form, FINEST * np.pi / spacing)
             elif "stiffness" in form and ("upper" in form or "lower" in form):
                 starts = _stops(angles, torques, form, "upper" if "upper" in form else "lower")
+            elif tuple(form) == ("bias",):
+                starts = _levels(torques)
             else:
                 continue
             found += [Candidate(effect, candidate.joints, start) for start in starts]
@@ -72,6 +74,12 @@ def _stops(angles: Array, torques: Array, form: Mapping[str, float], side: str) 
         if numbers[0] > 0.0:
             trials.append((share, {**form, side: float(edge), "stiffness": numbers[0]}))
     return _best(trials)
+
+
+def _levels(torques: Array) -> list[Mapping[str, float]]:
+    """A torque that is the same everywhere."""
+    share = 1.0 - float(np.var(torques)) / max(float(np.mean(torques**2)), 1e-15)
+    return _best([(share, {"bias": float(torques.mean())})])
 
 
 def _explained(columns: Array, torques: Array, plain: Array) -> tuple[list[float], float]:
