@@ -46,6 +46,7 @@ PROMISING = 0.03  # share of the best first-order gain that a candidate needs to
 SEGMENTS = 132  # enough data to search on, 52.8 s; the final fit takes all
 DEEPEST = 3  # effects in combination
 BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
+RETRIED = 2  # first effects left behind that are pursued after all where the search ends far from the floor
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,9 @@ class Search:
         self.start = nominal_model(fitted)
         self.start_held_out = nominal_model(held_out)
         self.postures = dict(self.start_held_out.posture)
+        self.last_scores: list[Score] = []
+        self.last_behind: list[tuple[Candidate, Fit]] = []
+        self.left_behind: list[tuple[Candidate, Fit]] = []
 
     def run(self) -> Findings:
         """The whole search."""
@@ -108,6 +112,7 @@ class Search:
             found = [(parent, e) for parent in beam for e in self.extend(parent)]
             if not scores:
                 scores = tuple(self.last_scores)
+                self.left_behind = list(self.last_behind)
             better = [e for parent, e in found if worthwhile(e, parent, base, self.fitted.joints)]
             if not better:
                 break
@@ -115,9 +120,23 @@ class Search:
             better[0] = self.pruned(better[0])
             levels.append(tuple(better))
             beam = tuple(e for e in better[:BEAM] if e.judgement.costs.sum() < CLOSE * better[0].judgement.costs.sum())
+        if levels and min(e.error for level in levels for e in level) > FAR_FROM_FLOOR:
+            levels += [level] if (level := self.second_thoughts(base)) else []
         if not levels and base.error <= FLOOR and (shared := shared_offset(base, self.fitted, self.effects)):
             levels.append((shared,))
         return Findings(base, nominal, tuple(levels), scores)
+
+    def second_thoughts(self, base: Explanation) -> tuple[Explanation, ...]:
+        """Pairs that begin with an effect which was left behind: alone, each of two may look worse than a third one."""
+        found: list[Explanation] = []
+        for candidate, fitted in of_each(self.left_behind, RETRIED)[:RETRIED]:
+            if any(e.error < FAR_FROM_FLOOR for e in found):
+                break
+            self.say(f"far from the noise; what if it begins with {candidate.label}?")
+            first = self.finish(base, candidate, fitted, RETRIED)
+            pairs = [e for e in self.extend(first) if worthwhile(e, first, base, self.fitted.joints)]
+            found += [self.pruned(e) for e in sorted(pairs, key=lambda e: e.error)[:1]]
+        return tuple(found)
 
     def fit_base(self) -> Explanation:
         """Refit what the model already has."""
@@ -166,6 +185,7 @@ class Search:
         if not leaders:
             return []
         behind = FAR_BEHIND_AT_FLOOR if self.at_floor(leaders[0][1]) else FAR_BEHIND
+        self.last_behind = [pair for pair in leaders if pair[1].cost > behind * leaders[0][1].cost]
         return [pair for pair in leaders if pair[1].cost <= behind * leaders[0][1].cost]
 
     def restarted(self, frozen: Fit, candidate: Candidate, fitted: Fit) -> tuple[Candidate, Fit]:
