@@ -9,7 +9,7 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.candidates import Candidate, _mirrored, candidates
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.screening import Score
-from tactile_cube.identification.search import resized
+from tactile_cube.identification.shortlist import resized
 from tactile_cube.measurement.recording import read_recording
 from tests.measurement.small_rig import write
 

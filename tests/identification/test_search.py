@@ -6,10 +6,11 @@ import pytest
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.candidates import Candidate, forms
 from tactile_cube.identification.explanation import Explanation
-from tactile_cube.identification.search import Search, of_each
+from tactile_cube.identification.search import Search
+from tactile_cube.identification.shortlist import of_each
 from tests.identification.test_verdict import explanation
 
-FIT = object()  # stands for a fit: the choice goes by order alone
+FIT = SimpleNamespace(cost=0.0)  # stands for a fit: the choice goes by order alone
 
 
 @pytest.mark.parametrize(
@@ -47,7 +48,9 @@ class Rehearsal(Search):
 
 def test_a_pair_is_found_through_the_effect_that_alone_looked_worse() -> None:
     search = Rehearsal({"cogging": (200.0, 190.0), "nonlinear_drag": (150.0, 1.05), "viscous_friction": (180.0, 1.0)})
-    search.left_behind.sort(key=lambda pair: pair[0].effect.name != "cogging")
-    (pair,) = search.second_thoughts(explanation("torque_bias", 300.0, 300.0))
+    base = explanation("torque_bias", 300.0, 300.0)
+    base = replace(base, fit=replace(base.fit, cost=1.0))
+    (pair,) = search.second_thoughts(base)
     assert [c.effect.name for c in pair.effects] == ["nonlinear_drag", "torque_saturation"]
     assert len(search.said) == 2, "what comes after a pair at the noise is not tried"
+    assert search.second_thoughts(replace(base, fit=replace(base.fit, cost=0.0))) == (), "they leave too much alone"

@@ -12,8 +12,9 @@ from tactile_cube.identification.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.gauss_newton import Fit
 from tactile_cube.identification.model import Model
-from tactile_cube.identification.search import Findings, worthwhile
+from tactile_cube.identification.search import Findings
 from tactile_cube.identification.verdict import decide, unexplained_joints
+from tactile_cube.identification.worth import worthwhile
 
 MODEL = Model({}, (), {})
 NOTHING = np.zeros((0, 0))

@@ -21,32 +21,23 @@ from tactile_cube.identification.residual_starts import residual_candidates
 from tactile_cube.identification.screening import Score, screen
 from tactile_cube.identification.shared_offset import shared_offset
 from tactile_cube.identification.shooting import Shooting
+from tactile_cube.identification.shortlist import of_each, with_groups
 from tactile_cube.identification.special_laws import special_candidates
 from tactile_cube.identification.stretches import Stretches, cut
+from tactile_cube.identification.worth import FAR_FROM_FLOOR, worthwhile
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
-FAR_FROM_FLOOR = 4.0  # error / sensor noise of an explanation that is none by itself
-NEARLY_ALL = 0.9  # share of what it leaves that a further effect then has to explain
-SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
-SIGNIFICANT = 2e-4  # p-value, corrected for the number of effects that were judged on the held-out trials
-LARGE_GAIN, SIGNIFICANT_IF_LARGE = 0.25, 1e-3  # the same for a share that no chance explains: short recordings
-SIGNIFICANT_IF_ALL = 0.01  # the same for one effect that explains everything
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
-VARIANTS = 1  # further forms or places of these effects that come along
 BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
 RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the most promising of these values
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
 FAR_BEHIND_AT_FLOOR = 2.0  # the same where the best one explains nearly everything
-REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
-SMALL_PART, LITTLE = 0.001, 1.3  # share of the base error that is a detail, and the error from which on it may be
-COMPLETED = 0.6  # share of the remaining excess error that a further effect has to explain, unless it reaches the floor
-RESIZED = (0.2, 6.0)  # factors of the first look that are believed
-PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 SEGMENTS = 132  # enough data to search on, 52.8 s; the final fit takes all
 DEEPEST = 3  # effects in combination
 BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
 RETRIED = 2  # first effects left behind that are pursued after all where the search ends far from the floor
+LEFT = 0.5  # share of the squared error that they may leave alone
 
 
 @dataclass(frozen=True)
@@ -56,7 +47,7 @@ class Findings:
     Attributes:
         base: the refitted base model.
         nominal: the model before any fit, judged on the held-out trials.
-        levels: explanations with 1, 2, ... effects, best first.
+        levels: explanations with 1, 2, ... effects, best first; at the end pairs that second thoughts found.
         scores: screening of the first level, best first.
     """
 
@@ -129,7 +120,8 @@ class Search:
     def second_thoughts(self, base: Explanation) -> tuple[Explanation, ...]:
         """Pairs that begin with an effect which was left behind: alone, each of two may look worse than a third one."""
         found: list[Explanation] = []
-        for candidate, fitted in of_each(self.left_behind, RETRIED)[:RETRIED]:
+        promising = [pair for pair in self.left_behind if pair[1].cost < LEFT * base.fit.cost]
+        for candidate, fitted in of_each(promising, RETRIED)[:RETRIED]:
             if any(e.error < FAR_FROM_FLOOR for e in found):
                 break
             self.say(f"far from the noise; what if it begins with {candidate.label}?")
@@ -263,38 +255,6 @@ class Search:
         return explanation
 
 
-def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation, joints: Sequence[str]) -> bool:
-    """Whether an effect earns its place.
-
-    Significantly, and by more than a few per cent; a further effect has to complete the explanation, or that of the
-    joints where it acts, or to do most of what is left while that is a real part of the whole, or so much that it
-    cannot be a detail of the effect before.
-    What is next to nothing beside the whole is a detail too, where there is little left anyway.
-    """
-    enough = SIGNIFICANT_IF_LARGE if explanation.gain > LARGE_GAIN else SIGNIFICANT
-    if explanation.complete and not parent.effects:
-        enough = SIGNIFICANT_IF_ALL
-    if explanation.gain < SMALLEST_GAIN or explanation.p_value > enough:
-        return False
-    if not parent.effects:
-        return True
-    if parent.error < LITTLE and parent.error**2 - explanation.error**2 < SMALL_PART * base.error**2:
-        return False
-    if explanation.error <= FLOOR or completes_its_joints(explanation, parent, joints):
-        return True
-    share = explanation.explained(parent)
-    if parent.explained(base) < REAL_PART:
-        return share > COMPLETED
-    return parent.error > FAR_FROM_FLOOR and share > NEARLY_ALL
-
-
-def completes_its_joints(explanation: Explanation, parent: Explanation, joints: Sequence[str]) -> bool:
-    """Whether the last effect takes the error of the joints where it acts down to the floor."""
-    places = [joints.index(joint) for joint in explanation.effects[-1].joints]
-    before, after = (one.judgement.joint_errors[places] for one in (parent, explanation))
-    return bool(before.max() > LITTLE and after.max() <= FLOOR)
-
-
 def without_effect(explanation: Explanation, place: int) -> Model:
     """The fitted model without one of its effects."""
     model = explanation.fit.model
@@ -313,44 +273,3 @@ def some(stretches: Stretches, segments: int) -> Stretches:
         if turn < len(rows)
     ]
     return stretches.take(np.array(sorted(order[: -(-segments // stretches.segments)])))
-
-
-def resized(score: Score) -> Candidate:
-    """The candidate with its start as large as the first look says, where a single number makes the effect's size."""
-    (name, start), *more = score.candidate.form.items()
-    known = {p.name: p for p in score.candidate.effect.parameters}[name]
-    if more or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
-        return score.candidate
-    return replace(score.candidate, form={name: min(max(score.factor * start, known.low), known.high)})
-
-
-def of_each(pairs: Sequence[tuple[Candidate, Fit]], count: int) -> list[tuple[Candidate, Fit]]:
-    """The best of each of the `count` best effects, and `VARIANTS` more, still in their order.
-
-    Forms and places of one effect that follow the data alike would else leave no room for another that does so too.
-    """
-    names = list(dict.fromkeys(candidate.effect.name for candidate, _ in pairs))[:count]
-    first = [next(k for k, (candidate, _) in enumerate(pairs) if candidate.effect.name == name) for name in names]
-    others = [k for k in range(len(pairs)) if k not in first][: VARIANTS + count - len(first)]
-    return [pairs[k] for k in sorted([*first, *others])]
-
-
-def with_groups(scores: Sequence[Score]) -> list[Candidate]:
-    """Candidates worth a refit, best first; an effect that helps at several joints also stands for all of them."""
-    best: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Score] = {}
-    for score in scores:
-        key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
-        best.setdefault(key, score)
-    ranked = [(score.gain, resized(score)) for score in best.values() if score.gain > 0.0]
-    families: dict[tuple[str, tuple[str, ...]], list[Score]] = {}
-    for (name, form, _), score in best.items():
-        families.setdefault((name, form), []).append(score)
-    for members in families.values():
-        useful = [m for m in members if m.gain > 0.0]
-        if len(useful) > 1 and sum(m.gain for m in useful) > 1.3 * max(m.gain for m in useful):
-            first = useful[0].candidate
-            joints = tuple(m.candidate.joints[0] for m in useful)
-            ranked.append((sum(m.gain for m in useful), Candidate(first.effect, joints, first.form)))
-    ranked.sort(key=lambda pair: -pair[0])
-    most = ranked[0][0] if ranked else 0.0
-    return [candidate for gained, candidate in ranked if gained > PROMISING * most]

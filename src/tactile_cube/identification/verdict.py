@@ -9,7 +9,8 @@ from typing import Literal
 from tactile_cube.identification.candidates import Candidate
 from tactile_cube.identification.evidence import gain, p_value, worse
 from tactile_cube.identification.explanation import Explanation
-from tactile_cube.identification.search import SMALLEST_GAIN, Findings
+from tactile_cube.identification.search import Findings
+from tactile_cube.identification.worth import SMALLEST_GAIN
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete
