@@ -185,6 +185,7 @@ def picture(summary: dict[str, Any], path: Path) -> None:
     axes = canvas.add_subplot()
     axes.imshow(counts, cmap="Blues", vmin=0)
     axes.set_xticks(range(len(COLUMNS)), [column.replace(", ", ",\n").replace("_", "_\n") for column in COLUMNS])
+    axes.tick_params(axis="x", labelsize=8)
     axes.set_yticks(range(len(rows)), rows)
     axes.set_title(f"Blind diagnosis, {summary['draws']} draws: hidden (rows) and answered (columns)", fontsize=10)
     most = max((max(row) for row in counts), default=1)

@@ -17,6 +17,7 @@ from tactile_cube.identification.noise import sensor_noise
 from tactile_cube.identification.problem import Problem
 from tactile_cube.identification.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search import Findings, Search
+from tactile_cube.identification.shared_offset import CommonOffset, common_offsets
 from tactile_cube.identification.verdict import Verdict, decide, unexplained_joints
 from tactile_cube.measurement.error import ErrorSummary
 from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
@@ -57,6 +58,7 @@ class Diagnosis:
         unexplained: what is left, joint by joint; empty unless something is.
         experiment: what would tell the rivals apart; None without rivals.
         held_out: names of the held-out trials.
+        common: joint offsets that may be the encoder's or the initialisations'.
     """
 
     verdict: Verdict
@@ -68,6 +70,7 @@ class Diagnosis:
     unexplained: list[Unexplained]
     experiment: Experiment | None
     held_out: list[str]
+    common: tuple[CommonOffset, ...] = ()
 
     def errors(self) -> ModelErrors:
         """The staircase as the model file and diagnosis.json state it [rad]."""
@@ -129,6 +132,7 @@ def diagnose(
         unexplained=unexplained,
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
+        common=common_offsets(findings.base, recording.joints) if verdict.kind == "adequate" else (),
     )
 
 

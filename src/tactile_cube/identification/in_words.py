@@ -27,6 +27,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
         lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
         lines += [_effect(entry) for entry in partial]
     lines += [_unexplained(entry) for entry in result["unexplained"]]
+    lines += [f"  {common_offset(entry)}" for entry in result.get("common_offsets", [])]
     error = result["error"]
     refitted = f"{_mrad(error['refitted'])} with constants refitted, " if not grasps else ""
     lines.append(
@@ -60,6 +61,14 @@ def _unexplained(entry: dict[str, Any]) -> str:
         f"  {entry['joint']}: the torque that {entry['beside']} lacks goes most with "
         f"{entry['depends_most_on']}; beside the recommended model a black box could explain "
         f"{100 * entry['black_box']:.0f} % of it"
+    )
+
+
+def common_offset(entry: Mapping[str, Any]) -> str:
+    """A joint offset that all initialisations have, and what would tell where it comes from."""
+    return (
+        f"{entry['joint']} reads about {_mrad(entry['offset'])} too much in each of {entry['initialisations']} "
+        "initialisations: by chance, or its encoder's zero is wrong (position_offset); more initialisations will tell."
     )
 
 

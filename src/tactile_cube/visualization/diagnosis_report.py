@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from tactile_cube.identification.in_words import common_offset
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.residual_shape import Shape
 from tactile_cube.measurement.comparison import Comparison
@@ -121,6 +122,7 @@ def identification_report(
 def _verdict_section(diagnosis: Mapping[str, Any]) -> Section:
     lines = [_in_a_line(effect) for effect in diagnosis["effects"]]
     lines += [f"helps, but is not the whole of it: {_in_a_line(one)}" for one in diagnosis.get("partial_effects", [])]
+    lines += [common_offset(entry) for entry in diagnosis.get("common_offsets", [])]
     for joint in diagnosis["unexplained_joints"]:
         lines.append(f"not explained: {joint}{_ceiling(diagnosis, joint)}")
     return Section("The answer", (), [Listing(lines or ["no effect has to be added"])])
