@@ -22,7 +22,7 @@ def sensor(error: float) -> np.ndarray:
     commands = np.full((1, ROWS, 1), 0.1 + error)
     plant.kernel.segments_batch(
         commands, np.array([0]), np.array([ROWS]), 0, 1, SEGMENT, position, np.zeros_like(position), np.zeros((1, 2)),
-        memory, np.array([MOTOR_POSITION]), 0, 1, out,
+        np.zeros((1, 2)), memory, np.array([MOTOR_POSITION]), 0, 1, out,
     )  # fmt: skip
     readings: np.ndarray = out[0, :, 0, 0] - error
     return readings

@@ -6,7 +6,7 @@ import pytest
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.candidates import Candidate, forms
 from tactile_cube.identification.explanation import Explanation
-from tactile_cube.identification.search import Search
+from tactile_cube.identification.search import Search, pursued
 from tactile_cube.identification.shortlist import of_each
 from tests.identification.test_verdict import explanation
 
@@ -54,3 +54,11 @@ def test_a_pair_is_found_through_the_effect_that_alone_looked_worse() -> None:
     assert [c.effect.name for c in pair.effects] == ["nonlinear_drag", "torque_saturation"]
     assert len(search.said) == 2, "what comes after a pair at the noise is not tried"
     assert search.second_thoughts(replace(base, fit=replace(base.fit, cost=0.0))) == (), "they leave too much alone"
+
+
+def test_the_simplest_of_equals_is_pursued_beside_the_best() -> None:
+    profile, bias = explanation("position_torque", 6.000), explanation("torque_bias", 6.001)
+    curved, poor = explanation("stribeck_friction", 6.0005), explanation("payload", 9.0)
+    order = [one.effects[0].effect.name for one in pursued([profile, curved, bias, poor])]
+    assert order == ["position_torque", "torque_bias", "stribeck_friction", "payload"]
+    assert [one.error for one in pursued([bias, profile])] == [bias.error, profile.error], "the best may be simplest"

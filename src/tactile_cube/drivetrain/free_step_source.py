@@ -84,7 +84,7 @@ def look_ahead(commands, memory, trial, free):
 
 
 @inner
-def start_segment(position, speed, nudge, free, trial, memory):
+def start_segment(position, speed, free, trial, memory):
     """Puts the sensor to its measured position and the joints to their measured speed; effects keep their past.
 
     `trial` has made the coming step already, which says how far the sensor is from the joint. A joint that is `free` of
@@ -96,12 +96,20 @@ def start_segment(position, speed, nudge, free, trial, memory):
         if free[a] == 0.0:
             memory[Q + a] = position[a] - (x[MOTOR_POSITION, column] - x[POSITION, column])
             memory[V + a] = speed[a]
-        memory[Q + a] += nudge[a]
-        memory[V + a] += nudge[C * n + a]
 
 
 @inner
-def roll_segments(commands, length, history, substeps, segment, position, speed, nudge, memory, rows, out):
+def move(by, memory):
+    """Moves all joints by so much, in position and in speed."""
+    for a in range(C * n):
+        memory[Q + a] += by[a]
+        memory[V + a] += by[C * n + a]
+
+
+@inner
+def roll_segments(
+    commands, length, history, substeps, segment, position, speed, beginning, nudge, memory, rows, out
+):
     reading = min(int(memory[READING]), substeps - 1)
     trial, free = memory.copy(), np.zeros(C * n)
     around = round(UNSURE / memory[DT])
@@ -113,7 +121,10 @@ def roll_segments(commands, length, history, substeps, segment, position, speed,
             for _ in range(4 if part == 0 else 1):  # the first start's torque is a guess at first
                 trial[:] = memory
                 free_step(commands[k], trial)
-                start_segment(position[part], speed[part], nudge, free, trial, memory)
+                start_segment(position[part], speed[part], free, trial, memory)
+            if part == 0:
+                move(beginning, memory)
+            move(nudge, memory)
             free[:] = 0.0
         elif (k - history) % segment >= segment - around:
             note_free(memory, free)
@@ -146,13 +157,14 @@ def rollout_batch(commands, which, lengths, history, substeps, memory, rows, out
 
 @outer
 def segments_batch(
-    commands, which, lengths, history, substeps, segment, position, speed, nudge, memory, rows, first, last, out
+    commands, which, lengths, history, substeps, segment, position, speed, beginning, nudge, memory, rows,
+    first, last, out
 ):
     """Blocks first..last of a batch, started anew from `position`, `speed` (S, K, n) every `segment` rows."""
     for b in range(first, last):
         s = which[b]
         roll_segments(
-            commands[s], lengths[s], history, substeps, segment, position[s], speed[s], nudge[b],
-            borrowed(memory[b]), rows, out[b],
+            commands[s], lengths[s], history, substeps, segment, position[s], speed[s],
+            beginning[s], nudge[b], borrowed(memory[b]), rows, out[b],
         )
 '''

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.identification.beginnings import with_beginnings
 from tactile_cube.identification.model import Model, Unknown
 from tactile_cube.identification.shooting import Shooting
 from tactile_cube.identification.stretches import Stretches
@@ -35,7 +36,8 @@ class Problem:
         self._inverse: Array = np.zeros((len(self.weight), 0, 0))
 
     def linearise_starts(self, model: Model) -> None:
-        """Take the sensitivity to segment starts from this model from now on."""
+        """Take the beginnings of trials and the sensitivity to segment starts from this model from now on."""
+        self.stretches = with_beginnings(self.shooting, model, self.stretches)
         raw = self.shooting.start_sensitivity(model, self.stretches)
         columns = np.stack([self.stretches.by_segment(column) for column in raw], axis=-1)
         acceleration = np.abs(self.stretches.acceleration).reshape(len(self.weight), -1)

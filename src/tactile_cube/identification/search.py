@@ -22,6 +22,7 @@ from tactile_cube.identification.screening import Score, screen
 from tactile_cube.identification.shared_offset import shared_offset
 from tactile_cube.identification.shooting import Shooting
 from tactile_cube.identification.shortlist import of_each, with_groups
+from tactile_cube.identification.simplicity import simplest
 from tactile_cube.identification.special_laws import special_candidates
 from tactile_cube.identification.stretches import Stretches, cut
 from tactile_cube.identification.worth import FAR_FROM_FLOOR, worthwhile
@@ -110,7 +111,9 @@ class Search:
             better.sort(key=lambda e: e.judgement.costs.sum())
             better[0] = self.pruned(better[0])
             levels.append(tuple(better))
-            beam = tuple(e for e in better[:BEAM] if e.judgement.costs.sum() < CLOSE * better[0].judgement.costs.sum())
+            beam = tuple(
+                e for e in pursued(better)[:BEAM] if e.judgement.costs.sum() < CLOSE * better[0].judgement.costs.sum()
+            )
         if levels and min(e.error for level in levels for e in level) > FAR_FROM_FLOOR:
             levels += [level] if (level := self.second_thoughts(base)) else []
         if not levels and base.error <= FLOOR and (shared := shared_offset(base, self.fitted, self.effects)):
@@ -253,6 +256,12 @@ class Search:
                 self.say(f"  {explanation.effects[place].label} is not needed")
                 return self.pruned(replace(explanation, effects=left, fit=fitted, judgement=judgement))
         return explanation
+
+
+def pursued(better: Sequence[Explanation]) -> list[Explanation]:
+    """The best, then the simplest that is as good, then the others: what is left may make up for its few numbers."""
+    plain = simplest(better)
+    return [better[0], *([] if plain is better[0] else [plain]), *(e for e in better[1:] if e is not plain)]
 
 
 def without_effect(explanation: Explanation, place: int) -> Model:

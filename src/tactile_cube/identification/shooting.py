@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,22 +45,32 @@ class Shooting:
 
     def positions(self, models: Sequence[Model], stretches: Stretches) -> Array:
         """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
-        joints = len(self.recording.joints)
-        return self._simulate(models, np.zeros((len(models), 2 * joints)), stretches)
+        return self._simulate(
+            models, np.zeros((len(models), 2 * len(self.recording.joints))), [stretches] * len(models)
+        )
+
+    def positions_from(self, model: Model, beginnings: Sequence[Array], stretches: Stretches) -> Array:
+        """The same for one model from several `beginning`s, (beginnings, S, K segment, n) [rad]."""
+        begun = [replace(stretches, beginning=one) for one in beginnings]
+        return self._simulate([model] * len(begun), np.zeros((len(begun), 2 * len(self.recording.joints))), begun)
+
+    def gaps(self, model: Model) -> Array:
+        """Width of the gap in each joint's transmission (n,) [rad]."""
+        return gaps(self.plant, self.memory(model))
 
     def start_sensitivity(self, model: Model, stretches: Stretches) -> Array:
         """D position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
         joints = len(self.recording.joints)
         nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
-        moved = self._simulate([model] * (2 * joints + 1), np.vstack([nudge, np.zeros(2 * joints)]), stretches)
+        count = 2 * joints + 1
+        moved = self._simulate([model] * count, np.vstack([nudge, np.zeros(2 * joints)]), [stretches] * count)
         slopes: Array = (moved[:-1] - moved[-1]) / nudge.max(axis=1)[:, None, None, None]
         return slopes
 
-    def _simulate(self, models: Sequence[Model], nudge: Array, stretches: Stretches) -> Array:
-        count, rows = len(stretches), stretches.measured.shape[1]
-        out = np.zeros((len(models), count, rows, len(self.recording.joints)))
+    def _simulate(self, models: Sequence[Model], nudge: Array, stretches: Sequence[Stretches]) -> Array:
+        out = np.zeros((len(models), *stretches[0].measured.shape))
         with ThreadPoolExecutor(self.workers) as pool:
-            list(pool.map(lambda k: self._one(models[k], nudge[k], stretches, out[k]), range(len(models))))
+            list(pool.map(self._one, models, nudge, stretches, out))
         return out
 
     def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
@@ -78,6 +89,7 @@ class Shooting:
             stretches.segment * fine,
             stretches.position,
             stretches.speed,
+            stretches.beginning,
             np.tile(nudge, (count, 1)),
             memory,
             rows,

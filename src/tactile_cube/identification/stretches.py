@@ -37,6 +37,7 @@ ROWS = (
     "initialisation",
     "time",
     "clamped",
+    "beginning",
 )
 """Arrays with one row a stretch."""
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
@@ -60,6 +61,8 @@ class Stretches:
         initialisation: (S,) robot initialisation.
         time: (S,) of the first row in its trial [s].
         clamped: (S,) the links were held still.
+        beginning: (S, 2 n) how far links stand from where their sensors put them as the stretch begins [rad], and how
+            much faster they are [rad/s]; see `beginnings`.
         forces: known forces on a link, or None.
         history: H.
         segment: rows of a segment.
@@ -79,6 +82,7 @@ class Stretches:
     initialisation: NDArray[np.int64]
     time: Array
     clamped: NDArray[np.bool_]
+    beginning: Array
     forces: tuple[KnownForce | None, ...]
     history: int
     segment: int
@@ -99,6 +103,16 @@ class Stretches:
         picked = {key: getattr(self, key)[chosen] for key in ROWS}
         forces = tuple(self.forces[int(k)] for k in np.arange(len(self))[chosen])
         return replace(self, **picked, forces=forces)
+
+    def first_segments(self) -> Stretches:
+        """The first segment of each stretch alone."""
+        rows = slice(self.segment)
+        return replace(
+            self,
+            commands=self.commands[:, : (self.history + self.segment) * self.substeps],
+            **{key: getattr(self, key)[:, rows] for key in ("measured", "jump", "weight")},
+            **{key: getattr(self, key)[:, :1] for key in ("position", "speed", "acceleration")},
+        )
 
     def by_segment(self, values: Array) -> Array:
         """(S, K segment, n) -> (S K, segment n)."""
@@ -169,6 +183,7 @@ def _pieces(
             "initialisation": trial.initialisation,
             "time": first * trial.step,
             "clamped": trial.clamped,
+            "beginning": np.zeros(2 * position.shape[1]),
             "force": trial.force,
         }
 

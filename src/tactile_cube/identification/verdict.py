@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from tactile_cube.identification.candidates import Candidate
 from tactile_cube.identification.evidence import gain, p_value, worse
 from tactile_cube.identification.explanation import Explanation
 from tactile_cube.identification.search import Findings
+from tactile_cube.identification.simplicity import contains, named, simplest
 from tactile_cube.identification.worth import SMALLEST_GAIN
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
@@ -17,7 +17,6 @@ TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete
 EXPLAINED, TOLERATED_IF_EXPLAINED = 0.98, 4.0  # share of the excess error, and the error, that a near miss may have
 MOST = 0.9  # share of the excess error that has to be explained unless the error is as good as none
 LIKELY = 0.05  # p-value at which a richer explanation stays in the race
-DETAIL = 0.002  # of what an effect explains, below which more numbers for it follow something else
 ADEQUATE = 1.3  # error / sensor noise of a model to which nothing significant can be added
 
 
@@ -57,33 +56,6 @@ def decide(findings: Findings, as_repeats: bool = False) -> Verdict:
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
 
 
-def simplest(found: Sequence[Explanation]) -> Explanation:
-    """The explanation with the fewest effects, then numbers, among those that are as good as the best."""
-    best = min(found, key=lambda e: e.judgement.costs.sum())
-    equal = [e for e in found if not worse(e.judgement, best.judgement)]
-    equal += [e for e in found if any(_but_for_a_detail(e, richer) for richer in equal)]
-    return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
-
-
-def _but_for_a_detail(simple: Explanation, richer: Explanation) -> bool:
-    """Whether the last effect is a special case of the richer one's, which explains next to nothing more.
-
-    Over many samples the least deviation of anything else in the model is significant.
-    """
-    if not _contains(richer, simple):
-        return False
-    small = richer.gain - simple.gain < DETAIL * richer.gain
-    return small and gain(simple.judgement, richer.judgement) < SMALLEST_GAIN
-
-
-def _contains(richer: Explanation, simple: Explanation) -> bool:
-    """Whether two explanations differ in the last effect alone, and one's is a special case of the other's."""
-    if not simple.effects or named_by(simple.effects[:-1]) != named_by(richer.effects[:-1]):
-        return False
-    last, special = richer.effects[-1], simple.effects[-1]
-    return special.effect.name in last.effect.contains and special.joints == last.joints
-
-
 def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:
     """Explanations by as many other effects that are as good: with at most a number more, or else clearly better.
 
@@ -93,7 +65,7 @@ def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Expl
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
         if len(named(other)) > len(named(chosen)) or named(other) == named(chosen):
             continue
-        simple = other.size <= chosen.size + 1 and not _contains(other, chosen)
+        simple = other.size <= chosen.size + 1 and not contains(other, chosen)
         if (simple or _richer_earned(other, chosen)) and not worse(other.judgement, chosen.judgement):
             rivals.setdefault(named(other), other)
     return tuple(rivals.values())
@@ -103,16 +75,6 @@ def _richer_earned(other: Explanation, chosen: Explanation) -> bool:
     """Whether more numbers than the chosen one has pay: a law that contains another always fits a little better."""
     better = gain(chosen.judgement, other.judgement) > SMALLEST_GAIN
     return better and p_value(chosen.judgement, other.judgement) < LIKELY
-
-
-def named(explanation: Explanation) -> frozenset[tuple[str, str]]:
-    """The (effect, joint) pairs of an explanation, whatever their form."""
-    return named_by(explanation.effects)
-
-
-def named_by(effects: Sequence[Candidate]) -> frozenset[tuple[str, str]]:
-    """The same of single effects."""
-    return frozenset((c.effect.name, joint) for c in effects for joint in c.joints)
 
 
 def unexplained_joints(chosen: Explanation, joints: tuple[str, ...]) -> list[str]:

@@ -53,7 +53,7 @@ def test_a_joint_that_its_sensor_does_not_show_goes_on_through_the_start_of_a_se
     starts = motor[None, ::segment, None]
     speeds = np.array([speed, 0.0, 0.0])[None, :, None]
     plant.kernel.segments_batch(
-        commands, np.array([0]), np.array([rows]), 0, 1, segment, starts, speeds, np.zeros((1, 2)), memory[None],
-        np.array([MOTOR_POSITION]), 0, 1, out,
+        commands, np.array([0]), np.array([rows]), 0, 1, segment, starts, speeds, np.zeros((1, 2)), np.zeros((1, 2)),
+        memory[None], np.array([MOTOR_POSITION]), 0, 1, out,
     )  # fmt: skip
     assert out[0, :, 0, 0] == pytest.approx(motor, abs=1e-9)
