@@ -1,5 +1,7 @@
 """Trials with an object, simulated in the world: the truth leaves sensor noise, anything else leaves more."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from tactile_cube.measurement.bench import has_free_motion, with_object, without
 from tactile_cube.measurement.hand_replay import Contact, HandReplay, contact_of
 from tactile_cube.measurement.parameters import nominal_parameters
 from tactile_cube.measurement.recording import Recording, read_recording
+from tactile_cube.measurement.replay import Replay
 from tactile_cube.measurement.sources.simulated_grasp import SimulatedGrasp
 from tactile_cube.measurement.writing import write_recording
 
@@ -119,3 +122,18 @@ def test_what_was_written_is_what_was_held(recording: Recording) -> None:
     assert load is not None
     assert (load.mass, load.released) == (0.25, 0.9)
     np.testing.assert_array_equal(load.size, [0.08] * 3)
+
+
+def test_free_motion_and_a_held_load_come_from_one_hand(tmp_path: Path) -> None:
+    silent = {"noise": 0.0, "resolution": 0.0, "torque_noise": 0.0, "duration": 1.0}
+    made = source(kinds=["multisine", "hold"], hidden=["viscous_friction@ring_q2"], **silent).recordings(seed=3)
+    write_recording(tmp_path, made[""])
+    both = read_recording(tmp_path)
+    assert [(trial.kind, trial.load is not None) for trial in both.trials] == [("multisine", False), ("hold", True)]
+    assert has_free_motion(both)
+    (free,) = without_touches(both).trials
+    simulated = Replay(both).simulate([free], nominal_parameters(both, None))[0]
+    error = np.sqrt(np.mean((simulated.position - free.position) ** 2, axis=0))
+    ring = [both.joints.index(f"ring_q{k}") for k in (1, 2, 3)]
+    assert error[ring[1]] > 8e-3, "the hidden effect"
+    assert np.delete(error, ring).max() < 1e-3, "the other fingers are as stated"

@@ -8,7 +8,7 @@ import pytest
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import MOTOR_POSITION, TORQUE, find_effect
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, finger_urdf
+from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation import RigWorld
 
@@ -48,6 +48,15 @@ def test_free_motion_in_bullet_agrees_with_the_fast_rollout() -> None:
     plant.reset(memory, np.array([0.1, 0.2, 0.3]), np.array([1.0, -1.0, 0.5]))
     fast, slow = both(plant, memory)
     assert np.abs(fast[:, 0]).max() > 0.3
+    np.testing.assert_allclose(slow, fast, atol=1e-9)
+
+
+def test_the_whole_hand_branches_and_moves_in_bullet_too() -> None:
+    plant = Plant([RigidBodyTree.from_urdf(hand_urdf(DLR_HAND2), DLR_HAND2.joint_names)], 0.002)
+    memory = plant.memory(DrivetrainConstants(), gravity=(3.0, -2.0, -9.0))
+    plant.reset(memory, np.linspace(0.1, 0.5, 12))
+    fast, slow = both(plant, memory, rows=100)
+    assert np.ptp(fast[:, 0], axis=0).min() > 0.02
     np.testing.assert_allclose(slow, fast, atol=1e-9)
 
 

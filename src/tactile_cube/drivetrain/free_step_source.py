@@ -47,19 +47,25 @@ def listen(command, memory):
 
 
 @inner
-def roll(commands, length, history, substeps, memory, rows, out):
-    """Signals of each command row, read at one substep of it: the last one, or memory[READING] if that is earlier."""
+def row_of_steps(k, command, history, substeps, memory, rows, out):
+    """The steps of command row k; its signals are read at one of them, the last one or memory[READING] if earlier."""
     reading = min(int(memory[READING]), substeps - 1)
+    for s in range(substeps):
+        if k < history:
+            listen(command, memory)
+            continue
+        free_step(command, memory)
+        if s == reading:
+            for r in range(len(rows)):
+                for a in range(C * n):
+                    out[k - history, r, a] = memory[SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+
+
+@inner
+def roll(commands, length, history, substeps, memory, rows, out):
+    """Signals of each command row after the history."""
     for k in range(history + length):
-        for s in range(substeps):
-            if k < history:
-                listen(commands[k], memory)
-                continue
-            free_step(commands[k], memory)
-            if s == reading:
-                for r in range(len(rows)):
-                    for a in range(C * n):
-                        out[k - history, r, a] = memory[SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+        row_of_steps(k, commands[k], history, substeps, memory, rows, out)
 
 
 @inner
@@ -110,7 +116,6 @@ def move(by, memory):
 def roll_segments(
     commands, length, history, substeps, segment, position, speed, beginning, nudge, memory, rows, out
 ):
-    reading = min(int(memory[READING]), substeps - 1)
     trial, free = memory.copy(), np.zeros(C * n)
     around = round(UNSURE / memory[DT])
     for k in range(history + length):
@@ -128,15 +133,7 @@ def roll_segments(
             free[:] = 0.0
         elif (k - history) % segment >= segment - around:
             note_free(memory, free)
-        for s in range(substeps):
-            if k < history:
-                listen(commands[k], memory)
-                continue
-            free_step(commands[k], memory)
-            if s == reading:
-                for r in range(len(rows)):
-                    for a in range(C * n):
-                        out[k - history, r, a] = memory[SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+        row_of_steps(k, commands[k], history, substeps, memory, rows, out)
 
 
 @outer

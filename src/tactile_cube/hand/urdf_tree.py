@@ -184,6 +184,7 @@ def _moves(joint: Joint, actuated: tuple[str, ...]) -> bool:
 
 
 def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> list[Joint]:
+    """Branch after branch to its end, which is PyBullet's order too."""
     children = [j.link for j in every]
     for name in children:
         if children.count(name) > 1:
@@ -193,10 +194,11 @@ def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> list[Joint
         found = ", ".join(reached) or "none (a loop)"
         raise InputError(f"URDF: a tree has exactly one root link; found {found}")
     ordered: list[Joint] = []
-    for link in reached:
-        below = [j for j in every if j.parent == link]
-        ordered += below
-        reached += [j.link for j in below]
+    waiting = [j for j in every if j.parent == reached[0]]
+    while waiting:
+        joint, *others = waiting
+        ordered.append(joint)
+        waiting = [j for j in every if j.parent == joint.link] + others
     if len(ordered) < len(every):
         lost = next(j.name for j in every if j not in ordered)
         raise InputError(f"URDF: joint '{lost}' does not hang on the root link '{reached[0]}'; connect it")

@@ -173,16 +173,9 @@ class RigWorld:
         topology = self.plant.topology
         urdf = tree_urdf(numbers, topology.parent, topology.prismatic, axes)
         self._body = load_chain(self._client, urdf, np.zeros(3), np.eye(3))
-        self._check_order()
         for k, diagonal in enumerate(moments):
             pybullet.changeDynamics(self._body, k, localInertiaDiagonal=diagonal.tolist(), physicsClientId=self._client)
         self._loaded = fingerprint
-
-    def _check_order(self) -> None:
-        count = pybullet.getNumJoints(self._body, physicsClientId=self._client)
-        names = [pybullet.getJointInfo(self._body, k, physicsClientId=self._client)[1].decode() for k in range(count)]
-        if names != [f"joint{k}" for k in range(count)]:
-            raise InputError("this rig's joints branch in an order that PyBullet changes; list them branch by branch")
 
 
 def _fold_offsets(plant: Plant, memory: Array) -> None:

@@ -3,6 +3,7 @@
 Hold: four fingertips squeeze a box of known weight, somebody lets go of it, and the grip loosens slowly until the box
 slips out: sideways force over normal force is then the lateral friction. Twist: two opposing fingertips hold a box with
 a weight on a lever, and the grip loosens until the box swings down: torque over normal force is the spinning friction.
+Free motion of the empty hand, in the same initialisations, shows the drivetrain that holds the load.
 
 Source: paper, section II-D: lateral and spinning friction from the torque needed to hold a known load.
 """
@@ -20,13 +21,15 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, grasp_angles, hand_urdf
-from tactile_cube.measurement.description import Coupling, Description, Grasp, TrialEntry, per_joint
+from tactile_cube.measurement.description import Coupling, Description, Grasp, TrialEntry
+from tactile_cube.measurement.excitation import KINDS as EXCITATIONS
 from tactile_cube.measurement.hand_replay import Contact, HandReplay
 from tactile_cube.measurement.parameters import Parameters
-from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.replay import Replay
 from tactile_cube.measurement.rig import parse_rig
+from tactile_cube.measurement.sources.session import FreeSession, free_command, logged, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.measurement.trial import Gains, Trial, load_of
+from tactile_cube.measurement.trial import Trial, load_of
 from tactile_cube.measurement.writing import RecordingTables, TrialTable
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
 from tactile_cube.simulation.pose import to_hand
@@ -51,12 +54,14 @@ class SimulatedGrasp:
         true_spread: relative half width by which the true drivetrain differs from what is believed.
         hidden: effects that recording.yaml does not mention, of the contact (`lateral_friction: coefficient=0.6`) or of
             the drivetrain (`stribeck_friction@ring_q3`).
-        kinds: `hold`, `twist`.
+        kinds: `hold`, `twist`, and kinds of free motion (`ramps`, `holds`, `multisine`, `policy`).
         initialisations: how often the robot is initialised anew.
         offset: half width of the joint offsets that an initialisation brings [rad].
         placing: half width of the error with which the box is put in its place [m].
         squeeze: how deep inside the faces the fingertips aim [m].
         loosen: how long the grip takes to loosen [s].
+        duration: of a trial of free motion [s].
+        reach: share of each joint's range that free motion uses.
         rate: samples per second [Hz].
         noise: standard deviation of the position [rad].
         resolution: of the position [rad].
@@ -79,6 +84,8 @@ class SimulatedGrasp:
     placing: float = 0.001
     squeeze: float = 0.02
     loosen: float = 2.0
+    duration: float = 8.0
+    reach: float = 0.75
     rate: float = 100.0
     noise: float = 2e-4
     resolution: float = 1e-4
@@ -88,19 +95,30 @@ class SimulatedGrasp:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """The recording, and a further initialisation under `validation`."""
-        unknown = set(self.kinds) - set(HOLDING)
+        unknown = set(self.kinds) - set(HOLDING) - set(EXCITATIONS)
         if unknown:
-            raise InputError(f"source.kinds: unknown {sorted(unknown)}; choose from {', '.join(HOLDING)}")
+            known = ", ".join([*HOLDING, *EXCITATIONS])
+            raise InputError(f"source.kinds: unknown {sorted(unknown)}; choose from {known}")
         rng = np.random.default_rng(seed)
         description, urdf = self._description(), hand_urdf(DLR_HAND2)
         session = self._session(description, urdf, rng)
-        rounds = [session.initialisation(number, folder="trials/") for number in range(self.initialisations)]
+        commands, fresh = self._free_commands(session, rng), self._free_commands(session, rng)
+        rounds = [session.initialisation(number, "trials/", commands) for number in range(self.initialisations)]
         result = {"": RecordingTables(description, urdf, [table for tables in rounds for table in tables])}
         if self.validation:
-            fresh = session.initialisation(self.initialisations, folder="")
-            result["validation"] = RecordingTables(description, urdf, fresh)
-        session.simulator.close()
+            last = session.initialisation(self.initialisations, "", fresh)
+            result["validation"] = RecordingTables(description, urdf, last)
+        session.close()
         return result
+
+    def _free_commands(self, session: _Session, rng: np.random.Generator) -> dict[str, Array]:
+        """Commands of each kind of free motion, the same in every initialisation."""
+        rig, joints = session.free.simulator.recording.rig, list(DLR_HAND2.joint_names)
+        return {
+            kind: free_command(kind, rig, joints, self.reach, self.duration, self.rate, rng)
+            for kind in self.kinds
+            if kind in EXCITATIONS
+        }
 
     def _description(self) -> Description:
         gravity = DLR_HAND2.rotation.T @ [0.0, 0.0, -9.81]
@@ -114,18 +132,15 @@ class SimulatedGrasp:
 
     def _session(self, description: Description, urdf: str, rng: np.random.Generator) -> _Session:
         joints = tuple(description.joints)
-        gains = Gains(*(per_joint(self.controller[key], joints, key) for key in ("kp", "kd", "torque_limit")))
-        constants = {key: getattr(gains, key) for key in ("kp", "kd", "torque_limit")}
-        constants |= {key: per_joint(value, joints, key) for key, value in self.nominal.items()}
-        for key in ("kd", "static_friction", "reflected_inertia"):
-            constants[key] = constants[key] * rng.uniform(1 - self.true_spread, 1 + self.true_spread, len(joints))
+        stated = dict(self.controller) | dict(self.nominal)
+        constants = true_constants(stated, joints, self.true_spread, rng)
         hidden = [parse_effect(text, find_any_effect) for text in self.hidden]
         drive = tuple(one for one in hidden if not is_contact_effect(one[0]))
         contact = Contact({name: values for name, values in hidden if is_contact_effect(name)})
-        rig = parse_rig(urdf, Path("hand.urdf"))
-        recording = Recording(Path(), description, rig, gains, {}, ())
+        recording = unmeasured(description, parse_rig(urdf, Path("hand.urdf")), constants)
+        free = FreeSession(self, Replay(recording, [name for name, _ in drive], self.step), constants, drive, rng)
         simulator = HandReplay(recording, Parameters(constants, drive, np.zeros(len(joints))), self.step)
-        return _Session(self, simulator, contact, rng)
+        return _Session(self, simulator, contact, free, rng)
 
 
 @dataclass(frozen=True)
@@ -135,19 +150,28 @@ class _Session:
     settings: SimulatedGrasp
     simulator: HandReplay
     contact: Contact
+    free: FreeSession
     rng: np.random.Generator
 
-    def initialisation(self, number: int, folder: str) -> list[TrialTable]:
-        """Every load once, with the joint offsets of a new initialisation."""
+    def close(self) -> None:
+        """End the simulations."""
+        self.simulator.close()
+        self.free.simulator.close()
+
+    def initialisation(self, number: int, folder: str, commands: Mapping[str, Array]) -> list[TrialTable]:
+        """Every free motion and every load once, with the joint offsets of a new initialisation."""
         s = self.settings
         offset = self.rng.uniform(-s.offset, s.offset, len(DLR_HAND2.joint_names))
+        entries = [
+            TrialEntry(file=f"{folder}{kind}_{number}.parquet", initialisation=number, kind=kind) for kind in commands
+        ]
+        tables = [self.free.play(entry, commands[entry.kind], offset) for entry in entries]
         loads: list[tuple[str, dict[str, object]]] = []
         if "hold" in s.kinds:
             loads += [("hold", {"mass": weight}) for weight in s.weights]
         if "twist" in s.kinds:
             loads += [("twist", {"mass": s.lever_weight, "com": [0.0, lever, 0.0]}) for lever in s.levers]
         place, quaternion = to_hand(DLR_HAND2, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
-        tables = []
         for index, (kind, load) in enumerate(loads):
             grasp = Grasp.model_validate(
                 {
@@ -175,11 +199,7 @@ class _Session:
         trial = Trial(entry.kind, entry.file, entry.kind, entry.initialisation, time, command, still, None,
                       np.ones(len(command), dtype=bool), gains, load=load)  # fmt: skip
         result = self.simulator.simulate(trial, self.contact, offset)
-        position = result.position + self.rng.normal(0, s.noise, command.shape)
-        if s.resolution > 0:
-            position = np.round(position / s.resolution) * s.resolution
-        torque = result.torque + self.rng.normal(0, s.torque_noise, command.shape)
-        return TrialTable(entry, time, command, position, torque)
+        return logged(entry, command, result, s, self.rng)
 
     def _command(self, kind: str) -> Array:
         """Commands (n, 12) [rad]: close, carry, loosen; fingers that take no part stay away."""

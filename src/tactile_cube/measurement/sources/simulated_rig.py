@@ -1,7 +1,7 @@
 """A recording of a simulated rig: commands, joint offsets, sensor noise, effects that the reader does not know of."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +10,14 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
 from tactile_cube.measurement.bench import BENCH_KINDS, Bench, bench_trials
-from tactile_cube.measurement.description import Coupling, Description, Touch, TrialEntry, per_joint
-from tactile_cube.measurement.excitation import excitation, safe_range
-from tactile_cube.measurement.parameters import Parameters
-from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.description import Coupling, Description, TrialEntry
 from tactile_cube.measurement.replay import Engine, Replay
 from tactile_cube.measurement.rig import Rig, parse_rig, read_rig
+from tactile_cube.measurement.sources.session import FreeSession, free_command, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.measurement.trial import Gains, Trial
-from tactile_cube.measurement.writing import RecordingTables, TrialTable
+from tactile_cube.measurement.writing import RecordingTables
 
 Array = NDArray[np.float64]
-OBSTACLE = 500.0  # [N m/rad] stiffness of what a link touches
-SETTLING = 1.0  # [s] at the first command before a trial is logged
 BUILT_IN = {"finger": lambda: finger_urdf(DLR_HAND2), "hand": lambda: hand_urdf(DLR_HAND2)}
 
 
@@ -78,14 +73,15 @@ class SimulatedRig:
         rig = self._rig()
         description = self._description(rig)
         effects = tuple(parse_effect(text) for text in self.hidden)
-        constants = self._true_constants(description, rng)
+        stated = dict(self.controller) | dict(self.nominal)
+        constants = true_constants(stated, tuple(description.joints), self.true_spread, rng)
         offsets = rng.uniform(-self.offset, self.offset, (self.initialisations, len(description.joints)))
         commands = {kind: self._command(kind, rig, description, rng) for kind in self.kinds if kind not in BENCH_KINDS}
         fresh = {kind: self._command(kind, rig, description, rng) for kind in commands}
-        rig_only = _unmeasured(description, rig, constants)
+        rig_only = unmeasured(description, rig, constants)
         stops = [f"joint_stop@{joint}" for joint in description.joints] if "touch" in self.kinds else []
         simulator = Replay(rig_only, [*(name for name, _ in effects), *stops], self.step, self.engine)
-        session = _Session(self, simulator, constants, effects, rng)
+        session = FreeSession(self, simulator, constants, effects, rng)
         last = self.initialisations - 1
         repeated = [
             session.play(TrialEntry(file=f"trials/{kind}_{n}.parquet", initialisation=n, kind=kind), command, offset)
@@ -119,66 +115,5 @@ class SimulatedRig:
             sensors={"position_resolution": self.resolution},
         )  # fmt: skip
 
-    def _true_constants(self, description: Description, rng: np.random.Generator) -> dict[str, Array]:
-        """Gains as stated; damping, friction and inertia differ from what is believed, joint by joint."""
-        joints = tuple(description.joints)
-        stated = {key: getattr(description.controller, key) for key in ("kp", "kd", "torque_limit")} | dict(
-            self.nominal
-        )
-        constants = {key: per_joint(value, joints, key) for key, value in stated.items()}
-        for key in ("kd", "static_friction", "reflected_inertia"):
-            constants[key] = constants[key] * rng.uniform(1 - self.true_spread, 1 + self.true_spread, len(joints))
-        return constants
-
     def _command(self, kind: str, rig: Rig, description: Description, rng: np.random.Generator) -> Array:
-        ranges = np.array([safe_range(rig.joints[joint], self.reach) for joint in description.joints])
-        return excitation(kind, ranges[:, 0], ranges[:, 1], self.duration, self.rate, rng)
-
-
-@dataclass(frozen=True)
-class _Session:
-    """One rig with its true constants, and its sensors."""
-
-    settings: SimulatedRig
-    simulator: Replay
-    constants: dict[str, Array]
-    effects: tuple[tuple[str, dict[str, float]], ...]
-    rng: np.random.Generator
-
-    def play(self, entry: TrialEntry, command: Array, offset: Array) -> TrialTable:
-        """Simulate one trial and log it as the rig's sensors would."""
-        settle = round(SETTLING * self.settings.rate)
-        trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), self.simulator.recording, entry)
-        effects = self.effects if entry.touch is None else (*self.effects, _obstacle(entry.touch))
-        parameters = Parameters(self.constants, effects, -offset)
-        result = self.simulator.simulate([trial], parameters)[0]
-        if entry.force is not None:  # a force pulls at the posture that it leads to
-            trial = replace(trial, position=result.position)
-            result = self.simulator.simulate([trial], parameters)[0]
-        position = result.position[settle:] + self.rng.normal(0, self.settings.noise, command.shape)
-        if self.settings.resolution > 0:
-            position = np.round(position / self.settings.resolution) * self.settings.resolution
-        torque = result.torque[settle:] + self.rng.normal(0, self.settings.torque_noise, command.shape)
-        time = np.arange(len(command)) / self.settings.rate
-        return TrialTable(entry, time, command, position, torque)
-
-
-def _obstacle(touch: Touch) -> tuple[str, dict[str, float]]:
-    """A hard stop where the touching joint meets the obstacle."""
-    return f"joint_stop@{touch.joint}", {"upper": touch.angle, "stiffness": OBSTACLE, "damping": 0.5}
-
-
-def _unmeasured(description: Description, rig: Rig, constants: dict[str, Array]) -> Recording:
-    """The rig as a recording without trials, as the replay wants it."""
-    gains = Gains(constants["kp"], constants["kd"], constants["torque_limit"])
-    return Recording(rig.path.parent, description, rig, gains, {}, ())
-
-
-def _silent_trial(command: Array, rig: Recording, entry: TrialEntry) -> Trial:
-    """A trial that starts at rest at its first command."""
-    time = np.arange(len(command)) / rig.rate
-    still = np.broadcast_to(command[0], command.shape)
-    valid = np.ones(len(command), dtype=bool)
-    torque = np.zeros_like(command)
-    return Trial(entry.kind, entry.file, entry.kind, entry.initialisation, time, command, still, torque, valid,
-                 rig.gains, entry.force, entry.clamped)  # fmt: skip
+        return free_command(kind, rig, description.joints, self.reach, self.duration, self.rate, rng)
