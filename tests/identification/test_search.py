@@ -6,8 +6,10 @@ import pytest
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.candidates import Candidate, forms
 from tactile_cube.identification.explanation import Explanation
+from tactile_cube.identification.model import Model
+from tactile_cube.identification.screening import Score
 from tactile_cube.identification.search import Search, pursued
-from tactile_cube.identification.shortlist import of_each
+from tactile_cube.identification.shortlist import of_each, with_groups
 from tests.identification.test_verdict import explanation
 
 FIT = SimpleNamespace(cost=0.0)  # stands for a fit: the choice goes by order alone
@@ -37,7 +39,7 @@ class Rehearsal(Search):
     def finish(self, parent: Explanation, candidate: Candidate, refitted: object, judged: int) -> Explanation:
         return explanation(candidate.effect.name, self.outcomes[candidate.effect.name][0], 300.0)
 
-    def extend(self, parent: Explanation) -> list[Explanation]:
+    def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
         error = self.outcomes[parent.effects[0].effect.name][1]
         second = explanation("torque_saturation", error, parent.error)
         return [replace(second, effects=(*parent.effects, *second.effects))]
@@ -62,3 +64,16 @@ def test_the_simplest_of_equals_is_pursued_beside_the_best() -> None:
     order = [one.effects[0].effect.name for one in pursued([profile, curved, bias, poor])]
     assert order == ["position_torque", "torque_bias", "stribeck_friction", "payload"]
     assert [one.error for one in pursued([bias, profile])] == [bias.error, profile.error], "the best may be simplest"
+
+
+def score(name: str, joint: str, gain: float) -> Score:
+    effect = find_effect(name)
+    return Score(Candidate(effect, (joint,), forms(effect)[0]), Model({}, (), {}), gain, 1.0)
+
+
+def test_where_a_first_look_promises_next_to_nothing_nothing_is_refitted() -> None:
+    scores = [score("cogging", "q1", 30.0), score("backlash", "q1", 20.0), score("payload", "q2", 0.5)]
+    assert [c.effect.name for c in with_groups(scores, 100.0)] == ["cogging", "backlash"]
+    assert with_groups(scores, 400.0) == []
+    together = [score("cogging", "q1", 80.0), score("cogging", "q2", 70.0)]
+    assert with_groups(together, 400.0)[0].joints == ("q1", "q2"), "at all joints together it promises enough"

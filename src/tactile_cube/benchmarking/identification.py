@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 import time
 from collections.abc import Sequence
@@ -10,15 +11,13 @@ from types import ModuleType
 
 import numpy as np
 
+from tactile_cube.benchmarking.command import run_and_watch
 from tactile_cube.benchmarking.mujoco_sysid import fit_finger
 from tactile_cube.benchmarking.peers import find_peer
 from tactile_cube.benchmarking.report import Figure, Section
-from tactile_cube.drivetrain.effects import catalogue
-from tactile_cube.identification.diagnosis import diagnose
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.noise import sensor_noise
 from tactile_cube.identification.search import Search
-from tactile_cube.identification.shooting import Shooting
 from tactile_cube.measurement.recording import Recording, read_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 from tactile_cube.measurement.split import held_out_split
@@ -68,24 +67,25 @@ def identification(
 def diagnoses(trial: float, hidden: Sequence[Sequence[str]]) -> list[Figure]:
     """Diagnoses of bench sessions of 12 trials with a finger's three joints, once each: they take long.
 
+    The whole command, from its start to the written report; the finger's kernels are compiled before.
+
     Args:
         trial: duration of a trial [s].
         hidden: effects of each session.
     """
-    effects = list(catalogue().values())
-    figures = []
     nominal = NOMINAL | {"stiffness": 25.0}
-    for names in hidden:
+    figures = []
+    for names in [(), *hidden]:
         rig = SimulatedRig(controller=CONTROLLER, nominal=nominal, hidden=names, duration=trial, validation=False)
-        recording = _recorded(rig, seed=3)
-        Shooting(recording, effects)  # compiles
-        began = time.perf_counter()
-        verdict = diagnose(recording, effects, engine="fast", say=lambda line: None).verdict
-        seconds = time.perf_counter() - began
+        with tempfile.TemporaryDirectory() as folder:
+            write_recording(Path(folder, "bench"), rig.recordings(seed=3)[""])
+            words = [f"recording={folder}/bench", f"hydra.run.dir={folder}/run"]
+            seconds = run_and_watch(["tactile_cube.diagnose", *words]).wall
+            verdict = json.loads(Path(folder, "run", "diagnosis.json").read_text(encoding="utf-8"))["verdict"]
         name = f"diagnosis, {' and '.join(names) or 'nothing'} hidden"
-        note = f"{len(recording.trials)} trials of {trial:g} s: {verdict.kind}"
+        note = f"12 trials of {trial:g} s: {verdict}"
         figures.append(Figure(name, seconds, seconds, seconds, "s on the clock", None, note))
-    return figures
+    return figures[1:]  # the first one compiled
 
 
 def simulated_recording(duration: float, kinds: int) -> Recording:

@@ -25,7 +25,7 @@ from tactile_cube.identification.shortlist import of_each, with_groups
 from tactile_cube.identification.simplicity import simplest
 from tactile_cube.identification.special_laws import special_candidates
 from tactile_cube.identification.stretches import Stretches, cut
-from tactile_cube.identification.worth import FAR_FROM_FLOOR, worthwhile
+from tactile_cube.identification.worth import FAR_FROM_FLOOR, least_gain, worthwhile
 from tactile_cube.measurement.recording import Recording
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ class Search:
         scores: tuple[Score, ...] = ()
         beam: tuple[Explanation, ...] = (base,)
         while len(levels) < DEEPEST and not any(e.complete for e in beam):
-            found = [(parent, e) for parent in beam for e in self.extend(parent)]
+            found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
             if not scores:
                 scores = tuple(self.last_scores)
                 self.left_behind = list(self.last_behind)
@@ -129,7 +129,7 @@ class Search:
                 break
             self.say(f"far from the noise; what if it begins with {candidate.label}?")
             first = self.finish(base, candidate, fitted, RETRIED)
-            pairs = [e for e in self.extend(first) if worthwhile(e, first, base, self.fitted.joints)]
+            pairs = [e for e in self.extend(first, base) if worthwhile(e, first, base, self.fitted.joints)]
             found += [self.pruned(e) for e in sorted(pairs, key=lambda e: e.error)[:1]]
         return tuple(found)
 
@@ -149,12 +149,12 @@ class Search:
         """The model with joint offsets for the held-out initialisations too."""
         return Model(model.constants, model.terms, {**self.postures, **model.posture})
 
-    def extend(self, parent: Explanation) -> list[Explanation]:
+    def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
         frozen = self.frozen(parent.fit)
         wanted = [*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)]
         self.last_scores = screen(self.problem, frozen, wanted, [placed(c, self.fitted) for c in wanted])
-        chosen = with_groups(self.last_scores)[:REFITTED]
+        chosen = with_groups(self.last_scores, least_gain(parent, base) * frozen.cost)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
         raced = of_each(self.race(frozen, chosen), FINALISTS)
         raced = [*(self.restarted(frozen, *pair) for pair in raced[:RESTARTED]), *raced[RESTARTED:]]

@@ -11,11 +11,15 @@ from tactile_cube.identification.screening import Score
 
 VARIANTS = 1  # further forms or places of these effects that come along
 RESIZED = (0.2, 6.0)  # factors of the first look that are believed
+UNDERRATED = 4.0  # times that a refit may explain more than the first look
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 
 
-def with_groups(scores: Sequence[Score]) -> list[Candidate]:
-    """Candidates worth a refit, best first; an effect that helps at several joints also stands for all of them."""
+def with_groups(scores: Sequence[Score], needed: float) -> list[Candidate]:
+    """Candidates worth a refit, best first; an effect that helps at several joints also stands for all of them.
+
+    None where even the best of them is far from taking as much off the squared error as is `needed`.
+    """
     best: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Score] = {}
     for score in scores:
         key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
@@ -32,6 +36,8 @@ def with_groups(scores: Sequence[Score]) -> list[Candidate]:
             ranked.append((sum(m.gain for m in useful), Candidate(first.effect, joints, first.form)))
     ranked.sort(key=lambda pair: -pair[0])
     most = ranked[0][0] if ranked else 0.0
+    if UNDERRATED * most < needed:
+        return []
     return [candidate for gained, candidate in ranked if gained > PROMISING * most]
 
 

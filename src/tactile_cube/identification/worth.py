@@ -42,6 +42,16 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation,
     return parent.error > FAR_FROM_FLOOR and share > NEARLY_ALL
 
 
+def least_gain(parent: Explanation, base: Explanation) -> float:
+    """Share of the squared error that a further effect has to explain at least to earn its place."""
+    if not parent.effects or parent.explained(base) < REAL_PART or parent.error > FAR_FROM_FLOOR:
+        return SMALLEST_GAIN
+    squares = parent.judgement.joint_errors**2
+    poor = squares[squares > LITTLE**2]
+    completing = [1.0 - (FLOOR / parent.error) ** 2, *(poor - FLOOR**2) / squares.sum()]
+    return max(SMALLEST_GAIN, float(min(completing)))
+
+
 def completes_its_joints(explanation: Explanation, parent: Explanation, joints: Sequence[str]) -> bool:
     """Whether the last effect takes the error of the joints where it acts down to the floor."""
     places = [joints.index(joint) for joint in explanation.effects[-1].joints]
