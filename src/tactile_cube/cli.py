@@ -178,7 +178,7 @@ def _group_lines(path: Path) -> list[str]:
     return [
         *lines,
         "  (* is the default)",
-        *(["  (added to the others: +experiment=option, +without=option)"] if "without" in groups else []),
+        *(["  (added to the others: +experiment=option; to ablations: without=option)"] if "without" in groups else []),
     ]
 
 

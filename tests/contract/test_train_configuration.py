@@ -83,6 +83,8 @@ def test_default_worker_count_divides_the_worlds() -> None:
 
 @pytest.mark.parametrize("part", sorted(file.stem for file in (CONFIG / "without").glob("*.yaml")))
 def test_an_ablation_changes_the_recipe_and_makes_an_environment(part: str) -> None:
-    recipe, ablated = composed("+experiment=ablations"), composed("+experiment=ablations", f"+without={part}")
+    # a sweep puts its own choices before what is typed; whichever comes first, the part has the last word
+    recipe, ablated = composed("+experiment=ablations"), composed(f"without={part}", "+experiment=ablations")
+    assert ablated == composed("+experiment=ablations", f"without={part}")
     assert (ablated == recipe) == (part == "nothing")
     assert as_environment(instantiate(ablated.env)).sizes.action == 12
