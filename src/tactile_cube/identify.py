@@ -29,6 +29,7 @@ def main(config: DictConfig) -> None:
     from tactile_cube.measurement.recording import read_recording
     from tactile_cube.visualization.comparison_episode import write_comparison
     from tactile_cube.visualization.comparison_summary import markdown
+    from tactile_cube.visualization.contact_report import contact_sections
     from tactile_cube.visualization.contact_results import write_contact_results
     from tactile_cube.visualization.diagnosis_report import identification_report
     from tactile_cube.visualization.report import write_report
@@ -66,9 +67,9 @@ def main(config: DictConfig) -> None:
     result["seconds"] = round(time.perf_counter() - begin, 2)
     (folder / "identification.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
     after = compare(recording, model, config.engine, config.step, floor=found.floor)
-    write_report(
-        identification_report(after, stages, joints, command, str(folder / "model.yaml")), folder / "report.html"
-    )
+    held_sections = [] if grip is None else contact_sections(grip, alone=False)
+    page = identification_report(after, stages, joints, command, str(folder / "model.yaml"), held_sections)
+    write_report(page, folder / "report.html")
     write_comparison(after, folder / "identification.rrd", markdown(after))
     print(staircase(stages, model))
     print(f"model: {folder / 'model.yaml'}\nreport: {folder / 'report.html'}")

@@ -105,6 +105,18 @@ def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals(
     assert "effects=[command_delay@a]" in text
 
 
+def test_a_diagnosis_with_an_object_shows_its_error_and_what_identify_takes(
+    comparison: Comparison, tmp_path: Path
+) -> None:
+    slipping = DIAGNOSIS["effects"][0] | {"name": "lateral_friction", "joints": ["object"]}  # type: ignore[index]
+    contact = {"error": {"nominal": 0.009, "refitted": 0.009, "with_effects": 0.003}, "error_joints": {}}
+    both = DIAGNOSIS | {"effects": [*DIAGNOSIS["effects"], slipping], "contact": contact}  # type: ignore[misc]
+    text = page(diagnosis_report(both, comparison, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
+    assert "How the error with an object falls" in text
+    assert "9 mrad" in text
+    assert "effects=[command_delay@a,lateral_friction]" in text
+
+
 def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison, tmp_path: Path) -> None:
     unsure = DIAGNOSIS | {"verdict": "ambiguous", "next_experiment": "next_experiment.csv"}
     time = np.linspace(0, 1, 50)

@@ -105,13 +105,14 @@ class RigWorld:
         q, v = self._place(memory)
         self._loop.bind([self._body], q, v, memory)
         reading = min(int(self.plant.view(memory, "reading")[0]), substeps - 1) + 1
-        goal = self.plant.view(memory, "goal")
+        goal, signals = self.plant.view(memory, "goal"), [self.plant.signal(memory, int(row)) for row in rows]
         for k, command in enumerate(commands[history : history + len(out)]):
             goal[:] = command
             self._loop.run(reading, -1, None, None)
-            for r, row in enumerate(rows):
-                out[k, r] = self.plant.signal(memory, int(row))
-            self._loop.run(substeps - reading, -1, None, None)
+            for r, signal in enumerate(signals):
+                out[k, r] = signal
+            if substeps > reading:
+                self._loop.run(substeps - reading, -1, None, None)
 
     def rollout_batch(
         self,

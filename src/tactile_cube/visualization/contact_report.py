@@ -8,7 +8,13 @@ from typing import Any
 from tactile_cube.identification.contact_identification import ContactIdentification
 from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.visualization.diagnosis_report import VERDICTS
-from tactile_cube.visualization.diagnosis_sections import effect_section, ranking_section, staircase_section
+from tactile_cube.visualization.diagnosis_sections import (
+    HELD,
+    effect_section,
+    held_section,
+    ranking_section,
+    staircase_section,
+)
 from tactile_cube.visualization.numbers import mrad
 from tactile_cube.visualization.report import Listing, Report, Section, Table
 
@@ -20,8 +26,8 @@ EXPLANATION = (
 )
 
 
-def contact_sections(found: ContactIdentification) -> list[Section]:
-    """What was found of fingertips and object."""
+def contact_sections(found: ContactIdentification, alone: bool = True) -> list[Section]:
+    """What was found of fingertips and object; values only if they stand `alone`, not beside those of the drives."""
     effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
     rows = [
         (effect, parameter, str(one.initialisation), f"{one.value:.4g}", "" if one.telling else "does not show it")
@@ -31,11 +37,8 @@ def contact_sections(found: ContactIdentification) -> list[Section]:
     table = Table(("effect", "parameter", "initialisation", "value", ""), rows)
     stages = {key: one.overall for key, one in found.stages.items()} | {"noise_floor": found.noise_floor}
     joints = {key: one.joints for key, one in found.stages.items()}
-    return [
-        staircase_section(stages, joints),
-        *effect_section(effects),
-        Section("What each initialisation says", (EXPLANATION,), [table]),
-    ]
+    opinions = Section("What each initialisation says", (EXPLANATION,), [table])
+    return [staircase_section(stages, joints, HELD), *(effect_section(effects) if alone else []), opinions]
 
 
 def contact_diagnosis_report(
@@ -49,7 +52,7 @@ def contact_diagnosis_report(
         answer=f"{said}: {names}." if names else said,
         tone=tone,
         sections=[
-            staircase_section({k: v for k, v in result["error"].items() if k != "refitted"}, result["error_joints"]),
+            held_section(result),
             *effect_section(result["effects"]),
             *ranking_section([_ranked(row) for row in result["ranking"]]),
             _next_section(result, recording, model_path),

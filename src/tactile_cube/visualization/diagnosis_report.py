@@ -16,6 +16,7 @@ from tactile_cube.visualization.comparison_sections import (
 )
 from tactile_cube.visualization.diagnosis_sections import (
     effect_section,
+    held_section,
     next_section,
     ranking_section,
     shape_section,
@@ -58,6 +59,7 @@ def diagnosis_report(
     sections = [
         _verdict_section(diagnosis),
         staircase_section(diagnosis["error"], diagnosis.get("error_joints", {})),
+        *([held_section(diagnosis["contact"])] if "contact" in diagnosis else []),
         *effect_section(diagnosis["effects"]),
         *shape_section(shapes),
         *ranking_section(diagnosis["ranking"]),
@@ -83,6 +85,7 @@ def identification_report(
     joints: Mapping[str, Mapping[str, float]],
     command: str,
     model_path: str,
+    further: Sequence[Section] = (),
 ) -> Report:
     """The page of an identification: the staircase of errors, the values found, the fitted model beside the recording.
 
@@ -92,6 +95,7 @@ def identification_report(
         joints: the same stage -> joint -> error [rad].
         command: the command line that made it.
         model_path: the model file that was written.
+        further: what trials with an object say.
     """
     steps = [value for key, value in stages.items() if key != "noise_floor" and value is not None]
     effects = after.model.effects if after.model is not None else []
@@ -105,6 +109,7 @@ def identification_report(
         sections=[
             staircase_section(stages, joints),
             *effect_section(found),
+            *further,
             value_section(after),
             recording_section(after.recording, after.model),
             where_section(after),

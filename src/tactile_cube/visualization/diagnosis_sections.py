@@ -26,7 +26,12 @@ COLUMNS = {
 }
 
 
-def staircase_section(stages: Mapping[str, float | None], joints: Mapping[str, Mapping[str, float]]) -> Section:
+HELD = "How the error with an object falls"
+
+
+def staircase_section(
+    stages: Mapping[str, float | None], joints: Mapping[str, Mapping[str, float]], title: str = "How the error falls"
+) -> Section:
     """The error after each step, down to the noise floor."""
     bars = [(STAGES.get(key, key), 1e3 * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
     floor = stages.get("noise_floor")
@@ -41,7 +46,15 @@ def staircase_section(stages: Mapping[str, float | None], joints: Mapping[str, M
         if len(names) > WIDE:
             names, steps, cells = steps, names, [list(column) for column in zip(*cells, strict=True)]
         blocks.append(Table(("", *names), [(step, *row) for step, row in zip(steps, cells, strict=True)]))
-    return Section("How the error falls", (), blocks)
+    return Section(title, (), blocks)
+
+
+def held_section(contact: Mapping[str, Any]) -> Section:
+    """The staircase of the trials with an object, from what diagnosis.json says under `contact`."""
+    # grasps refit no constants
+    return staircase_section(
+        {k: v for k, v in contact["error"].items() if k != "refitted"}, contact["error_joints"], HELD
+    )
 
 
 def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
@@ -126,7 +139,7 @@ def next_section(
     if diagnosis["verdict"] == "adequate":
         said, lines = "Train with the refitted constants:", [train]
     elif diagnosis["verdict"] == "missing_effect":
-        names = [f"{effect['name']}@{joint}" for effect in diagnosis["effects"] for joint in effect["joints"]]
+        names = [_typed(effect["name"], joint) for effect in diagnosis["effects"] for joint in effect["joints"]]
         said, lines = (
             "Fit exactly these effects, and train with the result:",
             [f"{identify}=[{','.join(names)}]", train],
@@ -157,6 +170,11 @@ def experiment_section(experiment: Experiment, file: str) -> Section:
         f"{mrad(experiment.difference)} (RMS)."
     )
     return Section("What to record next", text, [Listing([file], code=True), Figure(chart, caption)])
+
+
+def _typed(effect: str, joint: str) -> str:
+    """An effect as `effects=[...]` takes it: those of fingertips and object belong to no joint."""
+    return effect if joint == "object" else f"{effect}@{joint}"
 
 
 def _cell(value: object) -> str:
