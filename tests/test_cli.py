@@ -1,5 +1,6 @@
 """Errors of the user in one line, errors of the program as they are."""
 
+import errno
 from collections.abc import Callable
 from typing import Any
 
@@ -48,6 +49,14 @@ def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:
 
 def test_errors_of_the_program_are_not_the_users() -> None:
     assert cli.usage_error(KeyError("x")) is None
+    assert cli.usage_error(FileNotFoundError(errno.ENOENT, "gone", "a.csv")) is None
+
+
+def test_a_full_disk_is_said_with_the_file_and_a_way_out() -> None:
+    message = cli.usage_error(OSError(errno.ENOSPC, "No space left on device", "report.html"))
+    assert message is not None
+    assert message.startswith("report.html: the disk is full")
+    assert "hydra.run.dir" in message
 
 
 def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:

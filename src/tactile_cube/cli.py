@@ -6,6 +6,7 @@ A verb is a module of this package with a function decorated by `verb`; it impor
 
 import ast
 import contextlib
+import errno
 import functools
 import os
 import re
@@ -26,10 +27,11 @@ CONFIG = Path(__file__).parent / "conf"
 """The configuration tree; in a checkout a link to conf/ at the top."""
 
 ADDED = ("experiment", "without")
-"""Groups of training that are added with `+group=option`."""
+"""Groups of training that no default chooses from: `+experiment=option`, and `without=option` beside ablations."""
 
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
 USAGE_ERROR = 2
+FULL = (errno.ENOSPC, errno.EDQUOT)
 INTERRUPTED = 130
 
 
@@ -102,6 +104,11 @@ def usage_error(error: BaseException) -> str | None:
         cause = _find(error, kinds)
         if cause is not None:
             return _one_line(cause)
+    full = _find(error, OSError)
+    if isinstance(full, OSError) and full.errno in FULL:
+        return (
+            f"{full.filename or 'output'}: the disk is full; free some of it, or write elsewhere with hydra.run.dir=DIR"
+        )
     return None
 
 

@@ -10,6 +10,7 @@ import torch
 
 from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.errors import InputError
+from tactile_cube.training.checkpoint import load_checkpoint, save_checkpoint
 from tactile_cube.training.loop import barrier_seed
 from tactile_cube.training.run import Run
 from tests.training.tiny_env import tiny_environment
@@ -136,6 +137,20 @@ def test_damaged_checkpoint_is_named(tmp_path: Path) -> None:
     (tmp_path / "checkpoint.pt").write_bytes(b"not a checkpoint")
     with pytest.raises(InputError, match=r"checkpoint\.pt: damaged checkpoint"):
         tiny_run(tmp_path)
+
+
+def test_a_full_disk_leaves_the_checkpoint_before_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_checkpoint(tmp_path, {"steps": 1})
+
+    def half(state: Any, path: Path) -> None:
+        path.write_bytes(b"half")
+        raise RuntimeError("unexpected pos 15074304 vs 15074196")
+
+    monkeypatch.setattr(torch, "save", half)
+    with pytest.raises(InputError, match=r"checkpoint\.pt: cannot be written \(unexpected pos .*disk full"):
+        save_checkpoint(tmp_path, {"steps": 2})
+    assert load_checkpoint(tmp_path / "checkpoint.pt") == {"steps": 1}
+    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.pt"]
 
 
 def test_learner_uses_the_replay_of_the_iteration_before(tmp_path: Path) -> None:

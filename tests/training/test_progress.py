@@ -9,7 +9,7 @@ from tactile_cube.training.progress import ProgressLine
 
 
 def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = iter([100.0, 101.0, 110.0])
+    clock = iter([100.0, 101.0, 110.0, 120.0])
     monkeypatch.setattr(progress.time, "perf_counter", lambda: next(clock))
     stream = io.StringIO()
     line = ProgressLine(total=10_000, steps=1000, updates=50, stream=stream)
@@ -28,3 +28,5 @@ def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytes
         "0 min 20 s left",
     ):
         assert part in text
+    line.show(12_000, 3000, summary, {"T_s": 0.25})  # the last barrier lies beyond the end
+    assert stream.getvalue().rstrip().endswith("0 min 00 s left")

@@ -25,10 +25,21 @@ FREE_KEYS = {
 
 
 def save_checkpoint(folder: Path, state: dict[str, Any]) -> Path:
-    """Write the state so that a crash in between leaves the previous checkpoint whole."""
+    """Write the state so that a crash in between leaves the previous checkpoint whole.
+
+    Raises:
+        InputError: it cannot be written, for instance because the disk is full.
+    """
     path = folder / FILE
     partial = path.with_suffix(".partial")
-    torch.save(state, partial)
+    try:
+        torch.save(state, partial)
+    except (OSError, RuntimeError) as error:  # torch raises a RuntimeError of its own where a disk is full
+        partial.unlink(missing_ok=True)
+        raise InputError(
+            f"{path}: cannot be written ({str(error).splitlines()[0]}); is the disk full? The checkpoint before it, if "
+            "there is one, is whole, and the same command goes on from there"
+        ) from error
     partial.replace(path)
     return path
 

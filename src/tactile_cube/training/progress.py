@@ -41,7 +41,7 @@ class ProgressLine:
         step_rate = (steps - self._at_print[0]) / elapsed
         update_rate = (updates - self._at_print[1]) / elapsed
         self._printed, self._at_print = now, (steps, updates)
-        left = (self._total - steps) / max(step_rate, 1e-9)
+        left = max(self._total - steps, 0) / max(step_rate, 1e-9)  # the last barrier may lie beyond
         values = " ".join(f"{key} {value:.3g}" for key, value in conditions.items())
         parts = [
             f"{steps / 1e3:8.1f} k of {self._total / 1e3:.0f} k steps",
