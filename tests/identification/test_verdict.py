@@ -14,7 +14,7 @@ from tactile_cube.identification.gauss_newton import Fit
 from tactile_cube.identification.model import Model
 from tactile_cube.identification.search import Findings
 from tactile_cube.identification.verdict import decide, unexplained_joints
-from tactile_cube.identification.worth import worthwhile
+from tactile_cube.identification.worth import SMALLEST_GAIN, least_gain, worthwhile
 
 MODEL = Model({}, (), {})
 NOTHING = np.zeros((0, 0))
@@ -214,3 +214,13 @@ def test_one_effect_that_explains_everything_needs_less_significance() -> None:
     assert worthwhile(replace(whole, p_value=6e-3, gain=0.2), base, base, JOINTS)
     assert not worthwhile(replace(part, p_value=6e-3, gain=0.05), base, base, JOINTS)
     assert not worthwhile(replace(whole, p_value=6e-3, gain=0.2), part, base, JOINTS)
+
+
+def test_a_further_effect_has_to_finish_what_is_nearly_explained() -> None:
+    base = Explanation((), FIT, judged(20.0), 1.0, 0.0)
+    nearly, far, partly = (explanation("cogging", error) for error in (1.5, 8.0, 3.5))
+    assert least_gain(base, base) == SMALLEST_GAIN
+    # the one joint with error 1.5 down to 1.1, where the other one has 1.0
+    assert least_gain(nearly, base) == pytest.approx((1.5**2 - 1.1**2) / (1.5**2 + 1.0))
+    assert least_gain(far, base) == SMALLEST_GAIN, "most of what is left may be anything"
+    assert least_gain(partly, replace(base, judgement=judged(6.0))) == SMALLEST_GAIN, "much is not explained yet"
