@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from tactile_cube.agent.batch import Batch, Sizes
-from tactile_cube.agent.flat_perceptron import FlatPerceptron
+from tactile_cube.agent.flat_perceptron import FlatPerceptron, parameter_count, rectified_gradient
 from tactile_cube.agent.sac import Sac
 from tactile_cube.agent.sac_fast import FastSac
 
@@ -137,7 +137,6 @@ def test_bfloat16_follows_float32_roughly() -> None:
 
 
 def test_flat_perceptron_equals_torch_perceptron() -> None:
-    from tactile_cube.agent.flat_perceptron import parameter_count
     from tactile_cube.agent.networks import perceptron
 
     torch.manual_seed(0)
@@ -148,6 +147,15 @@ def test_flat_perceptron_equals_torch_perceptron() -> None:
     network.copy_from(module)
     x = torch.randn(9, 5)
     torch.testing.assert_close(network.forward(x)[0], module(x))
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_the_gradient_of_relu_has_the_bits_of_torchs(dtype: torch.dtype) -> None:
+    torch.manual_seed(0)
+    gradient, after_relu = torch.randn(64, 32).to(dtype), torch.randn(64, 32).to(dtype).relu()
+    expected = torch.ops.aten.threshold_backward(gradient, after_relu, 0.0)
+    assert 0 < int((expected == 0.0).sum()) < expected.numel()
+    assert torch.equal(rectified_gradient(gradient, after_relu), expected)
 
 
 def test_state_dict_restores_the_agent_bit_for_bit() -> None:

@@ -6,6 +6,7 @@ backward pass computes what is used and nothing else: no weight gradients of the
 
 import itertools
 from collections.abc import Sequence
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -31,6 +32,16 @@ def affine(x: Tensor, weight: Tensor, bias: Tensor, rectify: bool) -> Tensor:
         return result
     product = torch.addmm(bias, x, weight)
     return product.relu_() if rectify else product
+
+
+def rectified_gradient(gradient: Tensor, after_relu: Tensor) -> Tensor:
+    """The gradient where ReLU gave more than zero, else zero.
+
+    Both are taken for integers, which have the same sign and zero: a CPU compares them three times as fast as bfloat16.
+    """
+    whole = torch.int16 if gradient.dtype == torch.bfloat16 else torch.int32
+    passed = torch.ops.aten.threshold_backward(gradient.view(whole), after_relu.view(whole), 0)
+    return cast(Tensor, passed.view(gradient.dtype))
 
 
 class FlatPerceptron:
@@ -59,7 +70,7 @@ class FlatPerceptron:
             x = normalised.relu() if self.layer_norm else product
         weight, bias = self.layers[-1]
         kept.append((x, x, None, None))
-        return torch.addmm(bias, x, weight), kept
+        return affine(x, weight, bias, rectify=False), kept
 
     def backward(self, kept: list[Activation], gradient: Tensor, rows: slice) -> Tensor:
         """Write the parameters' gradients of the given rows; give the gradient at the first layer's product, all rows.
@@ -75,9 +86,7 @@ class FlatPerceptron:
             torch.sum(gradient[rows], 0, out=bias_gradient)
             if index > 0:
                 after_relu = kept[index][0]
-                gradient = torch.mm(gradient, self.layers[index][0].t())
-                # threshold_backward: comparisons in bfloat16 are slow on a CPU
-                gradient = torch.ops.aten.threshold_backward(gradient, after_relu, 0.0)
+                gradient = rectified_gradient(torch.mm(gradient, self.layers[index][0].t()), after_relu)
                 gradient = self._normalise_backward(gradient, kept[index - 1])
         return gradient
 

@@ -79,7 +79,8 @@ class NativeLoop:
         """See `PhysicsLoop.bind`."""
         self._chains = np.array(chains, dtype=np.int32)
         self._bound = (q, v, np.zeros_like(q), memory)  # kept alive: C sees their addresses
-        self._who = (self._handle, self._chains.ctypes.data, len(chains), q.size // len(chains))
+        answer = self._library.find_answer(self._handle, chains[0])
+        self._who = (self._handle, answer, self._chains.ctypes.data, len(chains), q.size // len(chains))
         self._what = (self._control, *(array.ctypes.data for array in self._bound))
 
     def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:

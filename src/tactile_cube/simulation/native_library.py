@@ -62,11 +62,13 @@ def load_native() -> ctypes.CDLL:
     """The library, with PyBullet's exported functions made visible to it first."""
     ctypes.CDLL(pybullet.__file__, mode=ctypes.RTLD_GLOBAL)
     library = ctypes.CDLL(str(native_library()))
-    library.physics_client.restype = ctypes.c_void_p
     pointer, number = ctypes.c_void_p, ctypes.c_int
+    library.physics_client.restype = pointer
+    library.find_answer.restype = pointer
+    library.find_answer.argtypes = [pointer, number]
     library.run_physics_steps.restype = None
     library.run_physics_steps.argtypes = [
-        *(pointer, pointer, number, number, ctypes.c_int64),
+        *(pointer, pointer, pointer, number, number, ctypes.c_int64),
         *(pointer, pointer, pointer, pointer, pointer),
         *(number, pointer, pointer),
     ]
