@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from tactile_cube.agent.batch import Batch, Sizes
-from tactile_cube.agent.flat_perceptron import FlatPerceptron, parameter_count, rectified_gradient
+from tactile_cube.agent.flat_perceptron import FlatPerceptron, parameter_count, rectify_gradient_
 from tactile_cube.agent.sac import Sac
 from tactile_cube.agent.sac_fast import FastSac
 
@@ -155,7 +155,7 @@ def test_the_gradient_of_relu_has_the_bits_of_torchs(dtype: torch.dtype) -> None
     gradient, after_relu = torch.randn(64, 32).to(dtype), torch.randn(64, 32).to(dtype).relu()
     expected = torch.ops.aten.threshold_backward(gradient, after_relu, 0.0)
     assert 0 < int((expected == 0.0).sum()) < expected.numel()
-    assert torch.equal(rectified_gradient(gradient, after_relu), expected)
+    assert torch.equal(rectify_gradient_(gradient, after_relu), expected)
 
 
 def test_state_dict_restores_the_agent_bit_for_bit() -> None:

@@ -6,7 +6,6 @@ backward pass computes what is used and nothing else: no weight gradients of the
 
 import itertools
 from collections.abc import Sequence
-from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -34,14 +33,15 @@ def affine(x: Tensor, weight: Tensor, bias: Tensor, rectify: bool) -> Tensor:
     return product.relu_() if rectify else product
 
 
-def rectified_gradient(gradient: Tensor, after_relu: Tensor) -> Tensor:
-    """The gradient where ReLU gave more than zero, else zero.
+def rectify_gradient_(gradient: Tensor, after_relu: Tensor) -> Tensor:
+    """The gradient, in place, where ReLU gave more than zero, else zero.
 
     Both are taken for integers, which have the same sign and zero: a CPU compares them three times as fast as bfloat16.
     """
     whole = torch.int16 if gradient.dtype == torch.bfloat16 else torch.int32
-    passed = torch.ops.aten.threshold_backward(gradient.view(whole), after_relu.view(whole), 0)
-    return cast(Tensor, passed.view(gradient.dtype))
+    bits = gradient.view(whole)
+    torch.ops.aten.threshold_backward.grad_input(bits, after_relu.view(whole), 0, grad_input=bits)
+    return gradient
 
 
 class FlatPerceptron:
@@ -86,7 +86,7 @@ class FlatPerceptron:
             torch.sum(gradient[rows], 0, out=bias_gradient)
             if index > 0:
                 after_relu = kept[index][0]
-                gradient = rectified_gradient(torch.mm(gradient, self.layers[index][0].t()), after_relu)
+                gradient = rectify_gradient_(torch.mm(gradient, self.layers[index][0].t()), after_relu)
                 gradient = self._normalise_backward(gradient, kept[index - 1])
         return gradient
 
