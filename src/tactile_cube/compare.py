@@ -19,10 +19,10 @@ def main(config: DictConfig) -> None:
     from hydra.core.hydra_config import HydraConfig
 
     from tactile_cube.drivetrain.model_file import read_model
-    from tactile_cube.identification.contact_comparison import compare_contact
+    from tactile_cube.identification.contact.comparison import compare_contact
     from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
-    from tactile_cube.measurement.comparison import as_json, compare
-    from tactile_cube.measurement.recording import read_recording
+    from tactile_cube.measurement.comparing.comparison import as_json, compare
+    from tactile_cube.measurement.recordings.reading import read_recording
     from tactile_cube.visualization.comparison_report import comparison_report
     from tactile_cube.visualization.comparison_summary import markdown, summary
     from tactile_cube.visualization.report import write_report

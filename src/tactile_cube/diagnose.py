@@ -22,15 +22,15 @@ def main(config: DictConfig) -> None:
 
     from tactile_cube.drivetrain.effects import catalogue, find_effect
     from tactile_cube.drivetrain.model_file import write_model
-    from tactile_cube.identification.contact_diagnosis import diagnose_contact, with_contact
-    from tactile_cube.identification.contact_identification import stated_model
+    from tactile_cube.identification.contact.diagnosis import diagnose_contact, with_contact
+    from tactile_cube.identification.contact.identification import stated_model
     from tactile_cube.identification.diagnosis import diagnose, write_experiment
     from tactile_cube.identification.diagnosis_json import as_json
     from tactile_cube.identification.in_words import answer
     from tactile_cube.identification.recommended import model_file
     from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
-    from tactile_cube.measurement.comparison import compare
-    from tactile_cube.measurement.recording import read_recording
+    from tactile_cube.measurement.comparing.comparison import compare
+    from tactile_cube.measurement.recordings.reading import read_recording
     from tactile_cube.visualization.comparison_episode import write_comparison
     from tactile_cube.visualization.comparison_summary import markdown
     from tactile_cube.visualization.contact_results import write_contact_diagnosis

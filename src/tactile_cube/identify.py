@@ -19,14 +19,14 @@ def main(config: DictConfig) -> None:
     from hydra.core.hydra_config import HydraConfig
 
     from tactile_cube.drivetrain.model_file import write_model
-    from tactile_cube.identification.contact_identification import contact_effects, identify_contact, stated_model
+    from tactile_cube.identification.contact.identification import contact_effects, identify_contact, stated_model
     from tactile_cube.identification.identification import identify
     from tactile_cube.identification.in_words import staircase
     from tactile_cube.identification.recommended import model_file
     from tactile_cube.measurement.bench import has_free_motion, without_touches
     from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
-    from tactile_cube.measurement.comparison import compare
-    from tactile_cube.measurement.recording import read_recording
+    from tactile_cube.measurement.comparing.comparison import compare
+    from tactile_cube.measurement.recordings.reading import read_recording
     from tactile_cube.visualization.comparison_episode import write_comparison
     from tactile_cube.visualization.comparison_summary import markdown
     from tactile_cube.visualization.contact_report import contact_sections

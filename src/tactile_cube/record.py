@@ -17,8 +17,8 @@ def main(config: DictConfig) -> None:
     from omegaconf import OmegaConf
 
     from tactile_cube.errors import InputError
-    from tactile_cube.measurement.recording import DESCRIPTION, read_recording
-    from tactile_cube.measurement.writing import write_recording
+    from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
+    from tactile_cube.measurement.recordings.writing import write_recording
 
     out = Path(config.out)
     if (out / DESCRIPTION).exists():

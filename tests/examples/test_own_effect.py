@@ -9,9 +9,9 @@ import pytest
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.env import Task
 from tactile_cube.identification.identification import identify
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
-from tactile_cube.measurement.writing import write_recording
 from tactile_cube.transforms import EnvConfig
 from tactile_cube.transforms.make_env import rotation_env
 

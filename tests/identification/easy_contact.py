@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from tactile_cube.measurement.hand_replay import Contact
+from tactile_cube.measurement.replay.hand_replay import Contact
 
 JOINTS = tuple("abcdefghijkl")
 

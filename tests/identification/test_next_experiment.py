@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 
 from tactile_cube.identification.next_experiment import FASTEST, Experiment, safe_excitations
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import write
 
 

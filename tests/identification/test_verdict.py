@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.identification.candidates import Candidate, forms
 from tactile_cube.identification.diagnosis import Unexplained, follows_signals
-from tactile_cube.identification.evidence import Judgement, gain, p_value, worse
-from tactile_cube.identification.explanation import Explanation
-from tactile_cube.identification.gauss_newton import Fit
-from tactile_cube.identification.model import Model
-from tactile_cube.identification.search import Findings
+from tactile_cube.identification.fitting.gauss_newton import Fit
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
+from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.search import Findings
+from tactile_cube.identification.search.worth import SMALLEST_GAIN, least_gain, worthwhile
 from tactile_cube.identification.verdict import decide, unexplained_joints
-from tactile_cube.identification.worth import SMALLEST_GAIN, least_gain, worthwhile
 
 MODEL = Model({}, (), {})
 NOTHING = np.zeros((0, 0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import URDF, Table, write
 
 

@@ -8,9 +8,10 @@ import pytest
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.bench import without_bench
 from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
-from tactile_cube.measurement.recording import Recording, read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
-from tactile_cube.measurement.writing import write_recording
 from tests.measurement.small_rig import URDF
 
 KP, STIFFNESS = 3.0, 25.0

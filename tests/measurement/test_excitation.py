@@ -3,7 +3,7 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.excitation import KINDS, excitation, safe_range
-from tactile_cube.measurement.rig import RigJoint
+from tactile_cube.measurement.recordings.rig import RigJoint
 
 
 @pytest.mark.parametrize("kind", list(KINDS))

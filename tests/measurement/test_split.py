@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.split import held_out_split
 from tests.measurement.small_rig import write
 

@@ -9,9 +9,9 @@ import pytest
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.identification.next_experiment import Experiment
-from tactile_cube.identification.residual_shape import Shape
-from tactile_cube.measurement.comparison import Comparison, compare
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.identification.search.residual_shape import Shape
+from tactile_cube.measurement.comparing.comparison import Comparison, compare
+from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
 from tactile_cube.visualization.comparison_report import comparison_report
 from tactile_cube.visualization.comparison_summary import markdown, summary

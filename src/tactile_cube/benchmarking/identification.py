@@ -15,13 +15,14 @@ from tactile_cube.benchmarking.command import run_and_watch
 from tactile_cube.benchmarking.mujoco_sysid import fit_finger
 from tactile_cube.benchmarking.peers import find_peer
 from tactile_cube.benchmarking.report import Figure, Section
+from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.free_run import free_run, free_run_error
-from tactile_cube.identification.noise import sensor_noise
-from tactile_cube.identification.search import Search
-from tactile_cube.measurement.recording import Recording, read_recording
+from tactile_cube.identification.search.search import Search
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 from tactile_cube.measurement.split import held_out_split
-from tactile_cube.measurement.writing import write_recording
 
 YARDSTICK = "mujoco.sysid"
 CONTROLLER = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0}

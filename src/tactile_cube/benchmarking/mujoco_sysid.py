@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.base import TOLERANCE, nominal_model
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.trial import Trial
+from tactile_cube.identification.fitting.base import TOLERANCE, nominal_model
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
 
 Array = NDArray[np.float64]
 

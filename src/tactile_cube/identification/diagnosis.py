@@ -8,21 +8,21 @@ from pathlib import Path
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors
-from tactile_cube.identification.explanation import Explanation
+from tactile_cube.identification.fitting.intervals import Fitted, final_fit
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.noise import sensor_noise
+from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.free_run import free_run, free_run_error
-from tactile_cube.identification.intervals import Fitted, final_fit
-from tactile_cube.identification.model import Model
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.noise import sensor_noise
-from tactile_cube.identification.problem import Problem
-from tactile_cube.identification.residual_shape import Shape, black_box, missing_torques, shapes
-from tactile_cube.identification.search import Findings, Search
-from tactile_cube.identification.shared_offset import CommonOffset, common_offsets
+from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
+from tactile_cube.identification.search.search import Findings, Search
+from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
 from tactile_cube.identification.verdict import Verdict, decide, unexplained_joints
-from tactile_cube.measurement.error import ErrorSummary
-from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.replay import Engine
+from tactile_cube.measurement.comparing.error import ErrorSummary
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.rig_replay import Engine
 from tactile_cube.measurement.split import held_out_split
 
 SHOWN_SHAPES = 6

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_cube.identification.model import Model
-from tactile_cube.measurement.error import ErrorSummary, residuals, summarise
-from tactile_cube.measurement.parameters import Parameters
-from tactile_cube.measurement.postures import replay_each
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.replay import Engine, Simulated
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.measurement.comparing.error import ErrorSummary, residuals, summarise
+from tactile_cube.measurement.comparing.postures import replay_each
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.parameters import Parameters
+from tactile_cube.measurement.replay.rig_replay import Engine, Simulated
 
 
 def free_run(recording: Recording, model: Model, engine: Engine, step: float) -> list[Simulated]:

@@ -10,22 +10,22 @@ import numpy as np
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors
-from tactile_cube.identification.base import base_unknowns
-from tactile_cube.identification.candidates import candidates, model_unknowns
 from tactile_cube.identification.diagnosis import with_offsets
-from tactile_cube.identification.evidence import judge
+from tactile_cube.identification.fitting.base import base_unknowns
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
+from tactile_cube.identification.fitting.intervals import Fitted, final_fit
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.noise import sensor_noise
+from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.free_run import free_run, free_run_error
-from tactile_cube.identification.gauss_newton import Fit, fit
-from tactile_cube.identification.intervals import Fitted, final_fit
-from tactile_cube.identification.model import Model
-from tactile_cube.identification.noise import sensor_noise
-from tactile_cube.identification.problem import Problem
-from tactile_cube.identification.residual_starts import residual_candidates
-from tactile_cube.identification.search import Search
-from tactile_cube.measurement.error import ErrorSummary
-from tactile_cube.measurement.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.replay import Engine
+from tactile_cube.identification.search.candidates import candidates, model_unknowns
+from tactile_cube.identification.search.evidence import judge
+from tactile_cube.identification.search.residual_starts import residual_candidates
+from tactile_cube.identification.search.search import Search
+from tactile_cube.measurement.comparing.error import ErrorSummary
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.rig_replay import Engine
 from tactile_cube.measurement.split import held_out_split
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tactile_cube.identification.model import Model
-from tactile_cube.identification.shooting import Shooting
-from tactile_cube.identification.stretches import cut
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.trial import Trial
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.stretches import cut
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
 
 Array = NDArray[np.float64]
 DURATION = 12.0  # [s]

@@ -9,9 +9,9 @@ from importlib.metadata import version
 import numpy as np
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
-from tactile_cube.identification.intervals import Fitted, bounds
-from tactile_cube.identification.model import Model, Term
-from tactile_cube.measurement.recording import Recording
+from tactile_cube.identification.fitting.intervals import Fitted, bounds
+from tactile_cube.identification.fitting.model import Model, Term
+from tactile_cube.measurement.recordings.recording import Recording
 
 UNITS = {
     "kp": "N m/rad",

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from tactile_cube.identification.evidence import gain, p_value, worse
-from tactile_cube.identification.explanation import Explanation
-from tactile_cube.identification.search import Findings
-from tactile_cube.identification.simplicity import contains, named, simplest
-from tactile_cube.identification.worth import SMALLEST_GAIN
+from tactile_cube.identification.search.evidence import gain, p_value, worse
+from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.search import Findings
+from tactile_cube.identification.search.simplicity import contains, named, simplest
+from tactile_cube.identification.search.worth import SMALLEST_GAIN
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
 TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete

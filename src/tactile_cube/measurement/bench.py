@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
-from tactile_cube.measurement.description import Description, KnownForce, Touch, TrialEntry
 from tactile_cube.measurement.excitation import safe_range
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.rig import Rig
+from tactile_cube.measurement.recordings.description import Description, KnownForce, Touch, TrialEntry
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.rig import Rig
 
 Array = NDArray[np.float64]
 FORCE = 2.0  # [N] the largest, on the last link

@@ -9,10 +9,10 @@ from scipy import stats
 
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
-from tactile_cube.measurement.known_force import force_torque
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.regimes import latest_direction
-from tactile_cube.measurement.trial import Trial
+from tactile_cube.measurement.comparing.regimes import latest_direction
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.known_force import force_torque
 
 Array = NDArray[np.float64]
 SETTLED = 0.5  # last share of a trial, at rest

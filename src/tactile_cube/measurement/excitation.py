@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.rig import RigJoint
+from tactile_cube.measurement.recordings.rig import RigJoint
 
 Array = NDArray[np.float64]
 POLICY_PERIOD = 0.1  # [s]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.recordings.recording import Recording
 
 
 def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> tuple[Recording, Recording]:

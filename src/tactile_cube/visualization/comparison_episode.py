@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
 
-from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.visualization.comparison_figures import marked
 from tactile_cube.visualization.solid_links import fill_shapes
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.visualization.svg import ERROR, FLOOR, MEASURED, SIMULATED, Axes, Band, Line, line_chart
 from tactile_cube.visualization.svg_tables import heat_map
 

@@ -1,6 +1,6 @@
 """The report of `compare`: how well the model follows, where it fails, how sure that is, what to do next."""
 
-from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.visualization.comparison_sections import (
     band_section,
     error_section,

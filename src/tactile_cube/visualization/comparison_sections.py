@@ -1,9 +1,9 @@
 """Sections of a comparison's report; the other reports use them too."""
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.measurement.comparison import Comparison
-from tactile_cube.measurement.noise_floor import NoiseFloor
-from tactile_cube.measurement.recording import Recording
+from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.visualization import comparison_figures as figures
 from tactile_cube.visualization.numbers import mrad, p_value
 from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Section, Table

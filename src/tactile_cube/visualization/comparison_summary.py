@@ -1,6 +1,6 @@
 """A comparison in the terminal, and as Markdown beside the robot."""
 
-from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.visualization.comparison_report import answer
 from tactile_cube.visualization.comparison_sections import floor_source
 

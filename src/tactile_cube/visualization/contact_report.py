@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tactile_cube.identification.contact_identification import ContactIdentification
+from tactile_cube.identification.contact.identification import ContactIdentification
 from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.visualization.diagnosis_report import VERDICTS
 from tactile_cube.visualization.diagnosis_sections import (

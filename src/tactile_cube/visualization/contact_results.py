@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
-from tactile_cube.identification.contact_diagnosis import ContactDiagnosis
-from tactile_cube.identification.contact_identification import ContactIdentification
+from tactile_cube.identification.contact.diagnosis import ContactDiagnosis
+from tactile_cube.identification.contact.identification import ContactIdentification
 from tactile_cube.identification.in_words import answer, staircase
 from tactile_cube.visualization.contact_report import contact_diagnosis_report, contact_report
 from tactile_cube.visualization.report import write_report

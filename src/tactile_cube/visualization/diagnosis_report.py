@@ -5,8 +5,8 @@ from typing import Any
 
 from tactile_cube.identification.in_words import common_offset
 from tactile_cube.identification.next_experiment import Experiment
-from tactile_cube.identification.residual_shape import Shape
-from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.identification.search.residual_shape import Shape
+from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.visualization.comparison_sections import (
     band_section,
     overlay_section,

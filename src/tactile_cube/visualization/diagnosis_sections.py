@@ -5,8 +5,8 @@ from typing import Any
 
 from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.identification.next_experiment import Experiment
-from tactile_cube.identification.residual_shape import Shape
-from tactile_cube.measurement.comparison import Comparison
+from tactile_cube.identification.search.residual_shape import Shape
+from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.visualization.numbers import mrad, p_value, short
 from tactile_cube.visualization.report import Figure, Listing, Section, Table
 from tactile_cube.visualization.svg import PALETTE, SIMULATED, Axes, Band, Line, line_chart

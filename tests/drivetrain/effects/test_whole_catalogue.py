@@ -6,7 +6,7 @@ import pytest
 from tactile_cube.drivetrain.effects import Effect, Stage, catalogue
 from tactile_cube.drivetrain.effects.effect import Place
 from tactile_cube.drivetrain.signals import ROWS
-from tactile_cube.identification.candidates import forms
+from tactile_cube.identification.search.candidates import forms
 
 NAMES = (
     "coulomb_friction",

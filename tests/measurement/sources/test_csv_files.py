@@ -5,9 +5,9 @@ import polars
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.csv_files import CsvFiles
-from tactile_cube.measurement.writing import write_recording
 from tests.measurement.small_rig import URDF, table
 
 COLUMNS = {"time": "t", "a": {"command": "goal1", "position": "pos1"}, "b": {"command": "goal2", "position": "pos2"}}

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.noise_floor import noise_floor
-from tactile_cube.measurement.recording import Recording, read_recording
+from tactile_cube.measurement.comparing.noise_floor import noise_floor
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.bam_xl330 import BamXl330, stiffness
 from tactile_cube.measurement.sources.shadow_lfj3 import ShadowLfj3
 from tactile_cube.measurement.sources.so101_sage import So101Sage
 from tactile_cube.measurement.sources.source import Source
-from tactile_cube.measurement.writing import write_recording
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data")

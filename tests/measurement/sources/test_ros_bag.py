@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.ros_bag import RosBag
-from tactile_cube.measurement.writing import write_recording
 from tests.measurement.small_rig import URDF, table
 
 writer = pytest.importorskip("mcap_ros2.writer", reason="needs the extra `ros`")

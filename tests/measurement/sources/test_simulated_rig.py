@@ -5,9 +5,9 @@ import pytest
 
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recording import read_recording
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
-from tactile_cube.measurement.writing import write_recording
 from tests.measurement.small_rig import URDF
 
 SETTINGS = {

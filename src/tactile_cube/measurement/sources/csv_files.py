@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.description import TrialEntry
-from tactile_cube.measurement.rig import read_rig
+from tactile_cube.measurement.recordings.description import TrialEntry
+from tactile_cube.measurement.recordings.rig import read_rig
+from tactile_cube.measurement.recordings.tables import Table, read_table
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.measurement.tables import Table, read_table
-from tactile_cube.measurement.writing import RecordingTables, TrialTable
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.description import TrialEntry
-from tactile_cube.measurement.rig import read_rig
+from tactile_cube.measurement.recordings.description import TrialEntry
+from tactile_cube.measurement.recordings.rig import read_rig
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.measurement.writing import RecordingTables, TrialTable
 
 Array = NDArray[np.float64]
 SAME_STAMP = 1e-6  # [s]

@@ -10,14 +10,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.description import Description, Touch, TrialEntry, per_joint
 from tactile_cube.measurement.excitation import excitation, safe_range
-from tactile_cube.measurement.parameters import Parameters
-from tactile_cube.measurement.recording import Recording
-from tactile_cube.measurement.replay import Replay, Simulated
-from tactile_cube.measurement.rig import Rig
-from tactile_cube.measurement.trial import Gains, Trial
-from tactile_cube.measurement.writing import TrialTable
+from tactile_cube.measurement.recordings.description import Description, Touch, TrialEntry, per_joint
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.rig import Rig
+from tactile_cube.measurement.recordings.trial import Gains, Trial
+from tactile_cube.measurement.recordings.writing import TrialTable
+from tactile_cube.measurement.replay.parameters import Parameters
+from tactile_cube.measurement.replay.rig_replay import Replay, Simulated
 
 Array = NDArray[np.float64]
 OBSTACLE = 500.0  # [N m/rad] stiffness of what a link touches

@@ -21,16 +21,16 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, grasp_angles, hand_urdf
-from tactile_cube.measurement.description import Coupling, Description, Grasp, TrialEntry
 from tactile_cube.measurement.excitation import KINDS as EXCITATIONS
-from tactile_cube.measurement.hand_replay import Contact, HandReplay
-from tactile_cube.measurement.parameters import Parameters
-from tactile_cube.measurement.replay import Replay
-from tactile_cube.measurement.rig import parse_rig
+from tactile_cube.measurement.recordings.description import Coupling, Description, Grasp, TrialEntry
+from tactile_cube.measurement.recordings.rig import parse_rig
+from tactile_cube.measurement.recordings.trial import Trial, load_of
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
+from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
+from tactile_cube.measurement.replay.parameters import Parameters
+from tactile_cube.measurement.replay.rig_replay import Replay
 from tactile_cube.measurement.sources.session import FreeSession, free_command, logged, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.measurement.trial import Trial, load_of
-from tactile_cube.measurement.writing import RecordingTables, TrialTable
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
 from tactile_cube.simulation.pose import to_hand
 

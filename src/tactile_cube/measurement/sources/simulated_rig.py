@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
 from tactile_cube.measurement.bench import BENCH_KINDS, Bench, bench_trials
-from tactile_cube.measurement.description import Coupling, Description, TrialEntry
-from tactile_cube.measurement.replay import Engine, Replay
-from tactile_cube.measurement.rig import Rig, parse_rig, read_rig
+from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry
+from tactile_cube.measurement.recordings.rig import Rig, parse_rig, read_rig
+from tactile_cube.measurement.recordings.writing import RecordingTables
+from tactile_cube.measurement.replay.rig_replay import Engine, Replay
 from tactile_cube.measurement.sources.session import FreeSession, free_command, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.measurement.writing import RecordingTables
 
 Array = NDArray[np.float64]
 BUILT_IN = {"finger": lambda: finger_urdf(DLR_HAND2), "hand": lambda: hand_urdf(DLR_HAND2)}

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.description import TrialEntry
+from tactile_cube.measurement.recordings.description import TrialEntry
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.measurement.writing import RecordingTables, TrialTable
 
 Array = NDArray[np.float64]
 RATE = 50.0  # [Hz]

@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
-from tactile_cube.measurement.description import Description, TrialEntry
-from tactile_cube.measurement.writing import RecordingTables
+from tactile_cube.measurement.recordings.description import Description, TrialEntry
+from tactile_cube.measurement.recordings.writing import RecordingTables
 
 PLACEHOLDER = [TrialEntry(file="none")]
 

@@ -1,0 +1,187 @@
+"""Which property of fingertips or object a model lacks, judged on trials that the fit never saw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
+from tactile_cube.identification.contact.choice import GOOD, ContactSearch, Tried, mean_squares, some_of_each_kind
+from tactile_cube.identification.contact.fit import fit_contact
+from tactile_cube.identification.contact.trial import SIGMA, ContactTrial
+from tactile_cube.measurement.bench import with_object
+from tactile_cube.measurement.comparing.error import ErrorSummary, summarise
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.hand_replay import HandReplay, contact_of
+from tactile_cube.measurement.replay.parameters import nominal_parameters
+from tactile_cube.measurement.split import held_out_split
+
+Array = NDArray[np.float64]
+Verdict = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
+FITTED, JUDGED = 3, 2  # trials of each kind that are fitted and judged
+
+
+@dataclass(frozen=True)
+class ContactDiagnosis:
+    """The answer.
+
+    Attributes:
+        verdict: the answer.
+        found: effects that were added, in that order.
+        rivals: what explains the last of them as well.
+        tried: everything that was tried, best first in each round.
+        estimates: (effect, parameter) -> value with interval.
+        stages: nominal and with_effects: held-out errors [rad].
+        noise_floor: noise of the position sensors, and what a world with the true effects leaves [rad].
+        held_out: names of the trials that judged.
+    """
+
+    verdict: Verdict
+    found: list[Tried]
+    rivals: list[Tried]
+    tried: list[list[Tried]]
+    estimates: dict[tuple[str, str], Estimate]
+    stages: dict[str, ErrorSummary]
+    noise_floor: float
+    held_out: list[str]
+
+    def effects(self) -> list[EffectEstimate]:
+        """The recommended effects as the model file states them."""
+        names = [one.effect.name for one in self.found] if self.verdict != "unknown_effect" else []
+        grouped = {name: {p: e for (n, p), e in self.estimates.items() if n == name} for name in names}
+        return [EffectEstimate(effect=name, parameters=values) for name, values in grouped.items()]
+
+    def into(self, model: ModelFile, alone: bool) -> ModelFile:
+        """The model with these effects; `alone`: nothing else was diagnosed, so its errors are these."""
+        update: dict[str, Any] = {"effects": [*model.drive_effects, *self.effects()]}
+        if alone:
+            overall: dict[str, Any] = {key: summary.overall for key, summary in self.stages.items()}
+            update["errors"] = ModelErrors(**overall, noise_floor=self.noise_floor)
+            others = [name for name in model.provenance.trials if name not in self.held_out]
+            trials = {"trials": others, "held_out": self.held_out}
+            update["provenance"] = model.provenance.model_copy(update=trials)
+        return model.model_copy(update=update)
+
+    def as_json(self) -> dict[str, Any]:
+        """In the terms of diagnosis.json; errors in rad."""
+        rivals = [one.effect.name for one in self.rivals]
+        entries = [self._entry(one, rivals if one is self.found[-1] else []) for one in self.found]
+        chosen = [one.effect.name for one in self.found[-1:]]
+        entries += [self._entry(one, [*chosen, *(r for r in rivals if r != one.effect.name)]) for one in self.rivals]
+        overall = {key: summary.overall for key, summary in self.stages.items()}
+        return {
+            "verdict": self.verdict,
+            "effects": entries if self.verdict in ("missing_effect", "ambiguous") else [],
+            "unexplained_joints": [],
+            "ranking": [
+                {
+                    "effects": one.effect.name,
+                    "held_out_error": one.error,
+                    "gain": one.gain,
+                    "p_value": one.p_value,
+                    "gain_of": one.gain_of,
+                }
+                for tried in self.tried
+                for one in tried
+            ],
+            # grasps refit no constants of the drives: the stated error stands for the refitted one
+            "error": overall | {"refitted": overall["nominal"], "noise_floor": self.noise_floor},
+            "error_joints": {key: summary.joints for key, summary in self.stages.items()},
+            "noise_floor_source": "contact",
+            "unexplained": [],
+            "partial_effects": entries if self.verdict == "unknown_effect" else [],
+            "next_experiment": None,
+            "held_out": self.held_out,
+        }
+
+    def _entry(self, one: Tried, rivals: list[str]) -> dict[str, Any]:
+        coarse = {p.name: Estimate(value=v, low=p.low, high=p.high, unit=p.unit) for p, v in _values(one)}
+        exact = {p: e for (name, p), e in self.estimates.items() if name == one.effect.name}
+        return {
+            "name": one.effect.name,
+            "joints": ["object"],
+            "parameters": {key: e.model_dump() for key, e in (coarse | exact).items()},
+            "heldout_gain": one.gain,
+            "gain_of": one.gain_of,
+            "p_value": one.p_value,
+            "rivals": rivals,
+        }
+
+
+def diagnose_contact(
+    recording: Recording,
+    model: ModelFile | None = None,
+    step: float = 0.002,
+    seed: int = 0,
+    say: Callable[[str], None] = print,
+) -> ContactDiagnosis:
+    """Add contact effects one after another while the held-out error falls, the drivetrain taken as known.
+
+    Args:
+        recording: trials without an object are left aside.
+        model: of the drivetrain; None: as recording.yaml states it.
+        step: longest physics step [s].
+        seed: which trials are held out.
+        say: takes progress lines.
+    """
+    held = with_object(recording)
+    fitted_part, held_out = held_out_split(held, seed=seed)
+    replay = HandReplay(held, nominal_parameters(held, model), step)
+    try:
+        trials = some_of_each_kind([ContactTrial(replay, trial) for trial in fitted_part.trials], FITTED)
+        judges = some_of_each_kind([ContactTrial(replay, trial) for trial in held_out.trials], JUDGED)
+        start = contact_of(model)
+        search = ContactSearch(trials, judges, say)
+        search.run(start)
+        estimates = {}
+        if search.found:
+            effects = [one.effect for one in search.found]
+            fit = fit_contact(trials, effects, start, say)
+            estimates, end = fit.estimates, mean_squares(judges, fit.contact)
+        else:
+            end = search.first
+    finally:
+        replay.close()
+    stages = {
+        key: summarise(list(np.sqrt(s)), held.joints) for key, s in (("nominal", search.first), ("with_effects", end))
+    }
+    noise = float(np.hypot(np.sqrt(np.mean(sensor_noise(held) ** 2)), SIGMA))
+    names = [one.trial.name for one in judges]
+    verdict = verdict_of(search, stages["with_effects"].overall)
+    return ContactDiagnosis(verdict, search.found, search.rivals, search.tried, estimates, stages, noise, names)
+
+
+def with_contact(result: Mapping[str, Any], found: ContactDiagnosis) -> dict[str, Any]:
+    """The content of diagnosis.json of a drivetrain, with what was found of fingertips and object.
+
+    The errors stay those of free motion; those of the grasps stand under `contact`.
+    """
+    contact = found.as_json()
+    verdicts = (result["verdict"], contact["verdict"])
+    return {
+        **result,
+        "verdict": next(
+            one for one in ("unknown_effect", "ambiguous", "missing_effect", "adequate") if one in verdicts
+        ),
+        "effects": [*result["effects"], *contact["effects"]],
+        "partial_effects": [*result["partial_effects"], *contact["partial_effects"]],
+        "contact": contact,
+    }
+
+
+def verdict_of(search: ContactSearch, left: float) -> Verdict:
+    """The answer, with `left` of the held-out error [rad]."""
+    if not search.found:
+        return "adequate" if left < 2 * GOOD else "unknown_effect"
+    return "ambiguous" if search.rivals else "missing_effect"
+
+
+def _values(one: Tried) -> list[tuple[Any, float]]:
+    values: Mapping[str, float] = one.contact.values.get(one.effect.name, {})
+    pairs = [(p, values.get(p.name, p.neutral)) for p in one.effect.parameters]
+    return [(p, float(np.clip(value, p.low, p.high))) for p, value in pairs]

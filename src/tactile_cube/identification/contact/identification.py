@@ -1,0 +1,159 @@
+"""Identify effects of fingertips and object from the trials in which the hand holds one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
+from tactile_cube.errors import InputError
+from tactile_cube.identification.contact.fit import ContactFit, fit_contact, shown_by
+from tactile_cube.identification.contact.trial import SIGMA, ContactTrial
+from tactile_cube.measurement.bench import with_object
+from tactile_cube.measurement.comparing.error import ErrorSummary, summarise
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.recordings.reading import DESCRIPTION
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, contact_of
+from tactile_cube.measurement.replay.parameters import CONTROLLER, nominal_parameters
+from tactile_cube.measurement.split import held_out_split
+from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
+
+
+@dataclass(frozen=True)
+class ContactIdentification:
+    """Contact effects with intervals, and what they gain.
+
+    Attributes:
+        fit: values, intervals and what each initialisation said.
+        stages: nominal and with_effects: errors on held-out trials, offsets and the box's place fitted to each [rad].
+        noise_floor: noise of the position sensors, and what a world with the true effects leaves [rad].
+        held_out: names of the held-out trials.
+    """
+
+    fit: ContactFit
+    stages: dict[str, ErrorSummary]
+    noise_floor: float
+    held_out: list[str]
+
+    def into(self, model: ModelFile, alone: bool) -> ModelFile:
+        """The model with these effects; `alone`: nothing else was identified, so its errors are these."""
+        effects = [*model.drive_effects, *self.effects()]
+        if not alone:
+            return model.model_copy(update={"effects": effects})
+        overall = {key: summary.overall for key, summary in self.stages.items()}
+        joints = {key: summary.joints for key, summary in self.stages.items()}
+        errors = ModelErrors(**overall, noise_floor=self.noise_floor, joints=joints)
+        fitted = [name for name in model.provenance.trials if name not in self.held_out]
+        provenance = model.provenance.model_copy(update={"trials": fitted, "held_out": self.held_out})
+        return model.model_copy(update={"effects": effects, "errors": errors, "provenance": provenance})
+
+    def effects(self) -> list[EffectEstimate]:
+        """As the model file states them."""
+        parameters: dict[str, dict[str, Estimate]] = {}
+        for (effect, parameter), estimate in self.fit.estimates.items():
+            parameters.setdefault(effect, {})[parameter] = estimate
+        return [EffectEstimate(effect=name, parameters=values) for name, values in parameters.items()]
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers, errors in rad."""
+        return {
+            "effects": [one.model_dump() for one in self.effects()],
+            "error": {key: one.overall for key, one in self.stages.items()} | {"noise_floor": self.noise_floor},
+            "joints": {key: one.joints for key, one in self.stages.items()},
+            "held_out": self.held_out,
+            "initialisations": {" ".join(key): [vars(one) for one in said] for key, said in self.fit.opinions.items()},
+            "silent": self.fit.silent(),
+        }
+
+
+def contact_effects(names: Sequence[str], recording: Recording) -> list[type[ContactEffect]]:
+    """The contact effects among names as a user writes them.
+
+    Raises:
+        InputError: one with a joint, or with a recording that has no object.
+    """
+    chosen = [name for name in names if is_contact_effect(name)]
+    for name in chosen:
+        if "@" in name:
+            raise InputError(
+                f"effects: '{name}': {name.partition('@')[0]} belongs to fingertips and object, not to a joint; "
+                "leave out what follows the @"
+            )
+        if not with_object(recording).trials:
+            raise InputError(
+                f"effects: '{name}' shows only where the hand holds something, and no trial of "
+                f"{recording.folder / DESCRIPTION} has a key 'object'; record such trials "
+                "(python -m tactile_cube.record source=grasp simulates them) or leave the effect out"
+            )
+    return [contact_catalogue()[name] for name in dict.fromkeys(chosen)]
+
+
+def stated_model(recording: Recording, command: str, seed: int) -> ModelFile:
+    """What recording.yaml says of the drivetrain, as a model without intervals; it is silent where the recording is."""
+    every = nominal_parameters(recording, None).constants
+    constants = {key: row for key, row in every.items() if key in (*CONTROLLER, *recording.nominal)}
+    values = {
+        key: {
+            joint: Estimate(value=v, low=v, high=v) for joint, v in zip(recording.joints, map(float, row), strict=True)
+        }
+        for key, row in constants.items()
+    }
+    provenance = Provenance(
+        recording=str(recording.folder),
+        command=command,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        version=version("tactile-cube"),
+        seed=seed,
+        trials=[trial.name for trial in recording.trials],
+    )
+    return ModelFile(rig=recording.name, joints=list(recording.joints), values=values, provenance=provenance)
+
+
+def identify_contact(
+    recording: Recording,
+    effects: Sequence[type[ContactEffect]],
+    model: ModelFile | None = None,
+    step: float = 0.002,
+    seed: int = 0,
+    say: Callable[[str], None] = print,
+) -> ContactIdentification:
+    """Fit contact effects by simulation in the world that training uses, the drivetrain taken as known.
+
+    Args:
+        recording: trials without an object are left aside.
+        effects: what to fit.
+        model: of the drivetrain; None: as recording.yaml states it.
+        step: longest physics step [s].
+        seed: which trials are held out.
+        say: takes progress lines.
+    """
+    held = with_object(recording)
+    fitted_part, held_out = held_out_split(held, seed=seed)
+    replay = HandReplay(held, nominal_parameters(held, model), step)
+    try:
+        trials = [ContactTrial(replay, trial) for trial in fitted_part.trials]
+        start = contact_of(model)
+        fit = fit_contact(trials, effects, start, say)
+        say("simulating the held-out trials")
+        judges = [ContactTrial(replay, trial) for trial in held_out.trials]
+        judges = list(dict.fromkeys(one for effect in effects for one in shown_by(judges, effect)))
+        stages = {"nominal": start, "with_effects": fit.contact}
+        errors = {key: contact_error(judges, contact, held.joints) for key, contact in stages.items()}
+    finally:
+        replay.close()
+    noise = float(np.hypot(np.sqrt(np.mean(sensor_noise(held) ** 2)), SIGMA))
+    return ContactIdentification(fit, errors, noise, [one.trial.name for one in judges])
+
+
+def contact_error(trials: Sequence[ContactTrial], contact: Contact, joints: Sequence[str]) -> ErrorSummary:
+    """RMS error [rad], offsets and the box's place fitted in each trial."""
+    residuals = []
+    for one in trials:
+        residuals.append(np.where(one.trial.valid[:, None], one.residual(contact), np.nan))
+    return summarise(residuals, tuple(joints))

@@ -1,0 +1,137 @@
+"""One trial with an object beside its simulation, with what nobody knows of it fitted: offsets and the box's place.
+
+Where a fingertip first touches decides how hard it presses later, and joint offsets of a degree move it by millimetres.
+So every value of a contact effect is judged with the offsets and the place that suit it best, found anew from zero:
+what suits another value would pull the answer to where the search began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
+
+Array = NDArray[np.float64]
+OFFSET = 0.02  # [rad] standard deviation of a joint offset; the paper's initialisations differ by degrees
+PLACING = 1e-3  # [m] with which somebody puts the box in its place
+FARTHEST = 3e-3  # [m] it is never farther from there
+SIGMA = 1e-3  # [rad] error that the world leaves in contact: drives known to 10 %, a solver that stops early
+WIDTHS = (4e-3, 4e-4)  # [rad], [m] finite steps, wide against the roughness of contact
+EVERY = 3  # rows of a trial that are compared; neighbours say the same
+ALIKE = 10  # of these rows count as one: what the world leaves stays the same for some 0.3 s
+ITERATIONS = 4  # steps with slopes that each step corrects
+SHARES = (1.0, 0.3)  # of a step that are tried
+ENOUGH = 0.05  # share of the misfit that a further step must take off
+MOVED = 1e-3  # [rad] a finger whose commands move less takes no part, so that nobody need know its offsets
+
+
+class ContactTrial:
+    """A trial, and its misfit as a function of the contact alone.
+
+    Attributes:
+        trial: what was measured.
+    """
+
+    def __init__(self, replay: HandReplay, trial: Trial) -> None:
+        """Simulates nothing yet."""
+        assert trial.load is not None, "a trial with an object"
+        self.trial, self._replay, self._load = trial, replay, trial.load
+        joints = trial.position.shape[1]
+        self._spread = np.r_[np.full(joints, OFFSET), np.full(3, PLACING)]
+        self._width = np.r_[np.full(joints, WIDTHS[0]), np.full(3, WIDTHS[1])]
+        busy = replay.finger_of[np.ptp(trial.command, axis=0) > MOVED]
+        self._free = np.flatnonzero(np.r_[np.isin(replay.finger_of, busy), np.ones(3, dtype=bool)])
+        released = round(trial.load.released / trial.step)
+        self._grip = released if released >= EVERY else len(trial.time)
+        self._slopes: Array | None = None
+        self._known: dict[frozenset[tuple[str, str, float]], tuple[Array, Array]] = {}
+
+    def cost(self, contact: Contact) -> float:
+        """Mean square of the residual over SIGMA^2, plus what improbable offsets cost, the nuisance fitted."""
+        nuisance, residual = self._fitted(contact)
+        seen = residual[self.trial.valid][::EVERY] / SIGMA
+        return float((np.sum(seen**2) + ALIKE * np.sum((nuisance / self._spread) ** 2)) / seen.size)
+
+    def residual(self, contact: Contact) -> Array:
+        """Measured minus simulated position (n, joints) [rad], the nuisance fitted."""
+        return self._fitted(contact)[1]
+
+    def surprise(self, contact: Contact) -> float:
+        """Squared distance of joint offsets and the box's place from what is expected, in standard deviations."""
+        return float(np.sum((self._fitted(contact)[0] / self._spread) ** 2))
+
+    @property
+    def freedom(self) -> int:
+        """Numbers that nobody knows of it."""
+        return len(self._free)
+
+    def nuisance(self, contact: Contact) -> Array:
+        """Joint offsets (joints,) [rad] and displacement of the box in the rig's frame (3,) [m] that suit a contact."""
+        return self._fitted(contact)[0]
+
+    def _fitted(self, contact: Contact) -> tuple[Array, Array]:
+        """Nuisance and residual, simulated once for each contact."""
+        key = contact.without_neutral()
+        if key not in self._known:
+            nuisance = self._fitted_nuisance(contact)
+            position = self._simulate(contact, nuisance, len(self.trial.time))
+            self._known[key] = (nuisance, np.asarray(self.trial.position - position))
+        return self._known[key]
+
+    def _fitted_nuisance(self, contact: Contact) -> Array:
+        """From zero, on the time before the box has weight, when nothing can slip yet."""
+        nuisance = np.zeros(len(self._spread))
+        target = self._target(contact, nuisance)
+        if self._slopes is None:
+            self._slopes = self._gradients(contact, nuisance, target)
+        nuisance, target = self._descended(contact, nuisance, target, self._slopes)
+        if target @ target > len(target):  # slopes of another contact led nowhere
+            slopes = self._gradients(contact, nuisance, target)
+            nuisance, target = self._descended(contact, nuisance, target, slopes)
+        return nuisance
+
+    def _descended(self, contact: Contact, nuisance: Array, target: Array, slopes: Array) -> tuple[Array, Array]:
+        """Gauss-Newton steps; what each of them saw corrects the slopes.
+
+        Source: C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, 1965.
+        """
+        for _ in range(ITERATIONS):
+            before = target @ target
+            for tried in self._tries(nuisance, target, slopes):
+                reached = self._target(contact, tried)
+                step = (tried - nuisance)[self._free]
+                slopes = slopes + np.outer(reached - target - slopes @ step, step) / (float(step @ step) or 1.0)
+                if reached @ reached < before:
+                    nuisance, target = tried, reached
+                    break
+            if target @ target > (1 - ENOUGH) * before:
+                break
+        return nuisance, target
+
+    def _tries(self, nuisance: Array, target: Array, slopes: Array) -> Iterator[Array]:
+        """The whole of a step and parts of it, the box within reach."""
+        step = np.zeros(len(nuisance))
+        step[self._free] = -np.linalg.lstsq(slopes, target, rcond=None)[0]
+        for share in SHARES:
+            tried = nuisance + share * step
+            tried[-3:] = np.clip(tried[-3:], -FARTHEST, FARTHEST)
+            yield tried
+
+    def _target(self, contact: Contact, nuisance: Array) -> Array:
+        grip = self._simulate(contact, nuisance, self._grip) - self.trial.position[: self._grip]
+        return np.concatenate([grip[::EVERY].ravel() / SIGMA, np.sqrt(ALIKE) * nuisance / self._spread])
+
+    def _gradients(self, contact: Contact, nuisance: Array, target: Array) -> Array:
+        steps = np.diag(self._width)[self._free]
+        columns = [(self._target(contact, nuisance + step) - target) / step.max() for step in steps]
+        return np.stack(columns, axis=1)
+
+    def _simulate(self, contact: Contact, nuisance: Array, rows: int) -> Array:
+        moved = replace(self._load, position=self._load.position + nuisance[-3:])
+        trial = replace(self.trial, load=moved)
+        return self._replay.simulate(trial, contact, nuisance[:-3], rows * self.trial.step).position

@@ -1,0 +1,88 @@
+"""The model that a rig's owner already has, and how far its constants may be from what he believes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.fitting.model import Model, Unknown
+from tactile_cube.measurement.comparing.postures import LARGEST_OFFSET
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.parameters import TORQUE_MODE_GAIN
+
+Array = NDArray[np.float64]
+TOLERANCE = {
+    "kd": (0.75, 1.3),
+    "static_friction": (0.5, 1.6),
+    "reflected_inertia": (0.6, 1.6),
+    "stiffness": (0.8, 1.25),
+}
+"""Part of the nominal value at which a constant still counts as the nominal one; more is an effect that is missing."""
+MEASURED = (0.2, 5.0)
+SPREAD = 0.12  # relative standard deviation of a true constant about its nominal value
+CREEP_SPREAD = 0.1  # [rad/s per N m]
+OFFSET_SPREAD = 0.01  # [rad]
+LARGEST_CREEP = 1.0  # [rad/s per N m] joints that stick give way slowly where friction is regularised
+
+
+def nominal_model(recording: Recording) -> Model:
+    """What the recording's owner states."""
+    n = len(recording.joints)
+    gains = recording.gains
+    constants = {
+        "kp": np.full(n, TORQUE_MODE_GAIN) if recording.torque_controlled else np.array(gains.kp, dtype=float),
+        "kd": np.zeros(n) if recording.torque_controlled else np.array(gains.kd, dtype=float),
+        "torque_limit": np.array(gains.torque_limit, dtype=float),
+        "stiffness": np.array(recording.nominal.get("stiffness", np.full(n, np.inf)), dtype=float),
+        "static_friction": np.array(recording.nominal.get("static_friction", np.zeros(n)), dtype=float),
+        "reflected_inertia": np.array(recording.nominal.get("reflected_inertia", np.zeros(n)), dtype=float),
+        "friction_creep": np.zeros(n),
+    }
+    return Model(constants, (), {trial.initialisation: np.zeros(n) for trial in recording.trials})
+
+
+def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
+    """Bounds relative to the nominal values; wide for what a bench trial of the recording measures directly.
+
+    Source: Sievers et al., ICRA 2022, II-D: K_P from a known force on a static finger, K_e from clamped links.
+    """
+    wide = {}
+    if any(trial.force is not None for trial in recording.trials):
+        wide["kp"] = MEASURED
+    if any(trial.clamped for trial in recording.trials):
+        wide["stiffness"] = MEASURED
+    return TOLERANCE | wide
+
+
+def base_unknowns(recording: Recording) -> tuple[Unknown, ...]:
+    """Constants that a refit may change, and the joint offsets of each initialisation."""
+    nominal = nominal_model(recording).constants
+    joints = range(len(recording.joints))
+    constants = [
+        _around_nominal(key, j, float(nominal[key][j]), low, high)
+        for key, (low, high) in tolerance(recording).items()
+        for j in joints
+        if 0.0 < nominal[key][j] < np.inf
+    ]
+    creeps = [
+        Unknown("constant", "friction_creep", j, 0.0, LARGEST_CREEP, 0.05, spread=CREEP_SPREAD)
+        for j in joints
+        if nominal["static_friction"][j] > 0.0
+    ]
+    return (*constants, *creeps, *offset_unknowns(recording))
+
+
+def offset_unknowns(recording: Recording) -> tuple[Unknown, ...]:
+    """The joint offsets of each initialisation of a recording."""
+    initialisations = sorted({trial.initialisation for trial in recording.trials})
+    return tuple(
+        Unknown("posture", "offset", j, -LARGEST_OFFSET, LARGEST_OFFSET, 0.05, initialisation, spread=OFFSET_SPREAD)
+        for initialisation in initialisations
+        for j in range(len(recording.joints))
+    )
+
+
+def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float) -> Unknown:
+    return Unknown(
+        "constant", key, joint, nominal * low, nominal * high, 0.2 * nominal, centre=nominal, spread=SPREAD * nominal
+    )

@@ -1,0 +1,49 @@
+"""Where the links are when a trial begins within a gap of the transmission, where the sensors do not show them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.stretches import Stretches
+
+Array = NDArray[np.float64]
+PLACES = 17  # within the gap: the time of landing depends on them
+
+
+def with_beginnings(shooting: Shooting, model: Model, stretches: Stretches) -> Stretches:
+    """The stretches with the beginning of each trial that follows its first segment best, one joint after the other.
+
+    A link may stand anywhere within the gap, at rest or as fast as the motor. Without a gap nothing changes.
+    """
+    gap = shooting.gaps(model)
+    if not gap.any():
+        return stretches
+    at_start = np.flatnonzero(stretches.time == 0.0)
+    first = stretches.take(at_start).first_segments()
+    first = replace(first, beginning=np.zeros_like(first.beginning))
+    for joint in np.flatnonzero(gap):
+        first = replace(first, beginning=_best(shooting, model, first, int(joint), float(gap[joint])))
+    beginning = stretches.beginning.copy()
+    beginning[at_start] = first.beginning
+    return replace(stretches, beginning=beginning)
+
+
+def _best(shooting: Shooting, model: Model, first: Stretches, joint: int, gap: float) -> Array:
+    """The beginnings (S, 2 n) with that of one joint chosen from all places in its gap."""
+    count, joints = len(first), first.position.shape[2]
+    trials = []
+    for still in (False, True):
+        for place in np.linspace(-0.5 * gap, 0.5 * gap, PLACES):
+            trial = first.beginning.copy()
+            trial[:, joint] = place
+            trial[:, joints + joint] = -first.speed[:, 0, joint] if still else 0.0
+            trials.append(trial)
+    simulated = shooting.positions_from(model, trials, first)
+    error = (simulated - first.measured) * first.weight
+    squares = np.nan_to_num(error**2, nan=np.inf).reshape(len(trials), count, -1).sum(axis=2)
+    return np.asarray(np.array(trials)[squares.argmin(axis=0), np.arange(count)])

@@ -1,0 +1,159 @@
+"""Bounded Levenberg-Marquardt on the marginal likelihood of a multiple-shooting problem."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.fitting.model import Model, Unknown, put_all, read_all
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.measurement.comparing.postures import CORRELATED
+
+Array = NDArray[np.float64]
+CONVERGED = 2e-3  # relative gain below which a fit ends
+SHORTER = (
+    6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many
+)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    Attributes:
+        model: with the fitted values.
+        unknowns: what was fitted.
+        cost: marginal squared error, in units of the sensor's variance.
+        surprise: squared distance of the unknowns from what was expected, in standard deviations.
+        residual: (G, R) weighted.
+        columns: (G, R, P) derivatives per scale at (or near) the fitted values.
+        information: (P, P) of the data, in units of the scales.
+    """
+
+    model: Model
+    unknowns: tuple[Unknown, ...]
+    cost: float
+    surprise: float
+    residual: Array = field(repr=False)
+    columns: Array = field(repr=False)
+    information: Array = field(repr=False)
+
+
+def fit(
+    problem: Problem,
+    model: Model,
+    unknowns: Sequence[Unknown],
+    iterations: int = 4,
+    frozen: Fit | None = None,
+) -> Fit:
+    """Fit the unknowns of a model.
+
+    Args:
+        problem: the stretches to fit.
+        model: where to start.
+        unknowns: what to fit; with `frozen`, beside its unknowns.
+        iterations: most steps that are taken.
+        frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
+    """
+    everything = (*(frozen.unknowns if frozen else ()), *unknowns)
+    best = _linearised(problem, model, unknowns, everything, frozen)
+    damping = 1e-4
+    for _ in range(iterations):
+        weight = temper(problem, best.cost)
+        for _ in range(SHORTER):
+            tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
+            if tried.cost + weight * tried.surprise < best.cost + weight * best.surprise:
+                break
+            damping *= 10.0
+        else:
+            return best  # no step is too short to fail where a fit has converged
+        gain = (best.cost - tried.cost) / max(best.cost, 1e-9)
+        damping *= 0.3
+        best = tried
+        if gain < CONVERGED:
+            break
+        best = _linearised(problem, best.model, unknowns, everything, frozen)
+    return best
+
+
+def _linearised(
+    problem: Problem, model: Model, unknowns: Sequence[Unknown], everything: tuple[Unknown, ...], frozen: Fit | None
+) -> Fit:
+    """A model with its derivatives: one simulation for each unknown."""
+    prediction, fresh = problem.columns(model, unknowns)
+    residual = problem.residual(prediction)
+    columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
+    cost = float(problem.cost(residual).sum())
+    return Fit(model, everything, cost, surprise(model, everything), residual, columns, _information(problem, columns))
+
+
+def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
+    """A model with the derivatives of one close to it: one simulation."""
+    residual = problem.residual(problem.predictions([model])[0])
+    cost = float(problem.cost(residual).sum())
+    return replace(near, model=model, cost=cost, surprise=surprise(model, near.unknowns), residual=residual)
+
+
+def temper(problem: Problem, cost: float) -> float:
+    """Weight of what is expected beforehand.
+
+    While the model is wrong its error is far above the noise and remembers itself; taking it for white noise would let
+    the constants soak it up. So expectations weigh as much more as the error is larger and longer than noise.
+    """
+    excess = cost / max(float(np.count_nonzero(problem.weight)), 1.0) - 1.0
+    return 1.0 + CORRELATED * max(excess, 0.0)
+
+
+def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) -> Fit:
+    """A fit with residual, columns and information of a problem whose starts were linearised anew."""
+    residual, information = problem.residual(prediction), _information(problem, columns)
+    cost = float(problem.cost(residual).sum())
+    return Fit(fitted.model, fitted.unknowns, cost, fitted.surprise, residual, columns, information)
+
+
+def surprise(model: Model, unknowns: Sequence[Unknown]) -> float:
+    """Squared distance from what is expected beforehand, in standard deviations."""
+    return float(sum(((u.of(model) - u.centre) / u.spread) ** 2 for u in unknowns))
+
+
+def precision(unknowns: Sequence[Unknown]) -> Array:
+    """Weights (P,) of the expectations, per squared scale; a trace for those without, so that no direction is flat."""
+    return np.array([(u.scale / u.spread) ** 2 + 1e-9 for u in unknowns])
+
+
+def _information(problem: Problem, columns: Array) -> Array:
+    return np.asarray(np.einsum("grp,grq->pq", columns, problem.free(columns), optimize=True))
+
+
+def _stepped(problem: Problem, fitted: Fit, trust: float, damping: float) -> Model:
+    """Damped Gauss-Newton step; an unknown that would leave its bounds stops there and the others are solved anew."""
+    values = read_all(fitted.model, fitted.unknowns)
+    scale, centre, low, high = (
+        np.array([getattr(u, key) for u in fitted.unknowns]) for key in ("scale", "centre", "low", "high")
+    )
+    weight = trust * precision(fitted.unknowns)
+    pull = np.einsum("grp,gr->p", fitted.columns, problem.free(fitted.residual), optimize=True)
+    gradient = pull - weight * (values - centre) / scale
+    information = fitted.information + np.diag(weight)
+    step = bounded_step(information, gradient, damping, (low - values) / scale, (high - values) / scale)
+    return put_all(fitted.model, fitted.unknowns, values + step * scale)
+
+
+def bounded_step(information: Array, gradient: Array, damping: float, least: Array, most: Array) -> Array:
+    """Step (P,) that minimises the damped quadratic model within the bounds, active bounds found one after another."""
+    step: Array = np.zeros(len(gradient))
+    held = np.zeros(len(gradient), dtype=bool)
+    damped = information + damping * np.diag(np.maximum(np.diag(information), 1e-9))
+    for _ in range(len(gradient) + 1):
+        loose = ~held
+        right = gradient[loose] - damped[np.ix_(loose, held)] @ step[held]
+        step[loose] = np.linalg.lstsq(damped[np.ix_(loose, loose)], right, rcond=1e-12)[0]
+        outside = loose & ((step < least) | (step > most))
+        if not outside.any():
+            break
+        step = np.where(outside, np.clip(step, least, most), step)
+        held |= outside
+    return np.clip(step, least, most)

@@ -1,0 +1,107 @@
+"""The least-squares problem of one set of stretches: weighted residuals, columns, starts of segments taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.fitting.beginnings import with_beginnings
+from tactile_cube.identification.fitting.model import Model, Unknown
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.stretches import Stretches
+
+Array = NDArray[np.float64]
+START_POSITION = 1e-3  # [rad] how well a segment's start is known beforehand
+START_SPEED, START_SPEED_PER_ACCELERATION = 0.02, 0.01  # [rad/s], [s]
+STEP = 0.2  # finite differences, in units of an unknown's scale
+
+
+class Problem:
+    """Residuals (G, R) of G segments with R samples, in units of the sensor noise.
+
+    Each segment's start is a nuisance with a Gaussian prior. `free(x)` multiplies by the inverse covariance that is
+    left when it is integrated out, so `sum(x * free(y))` is the inner product of the marginal likelihood.
+    """
+
+    def __init__(self, shooting: Shooting, stretches: Stretches) -> None:
+        self.shooting = shooting
+        self.stretches = stretches
+        self.weight = stretches.by_segment(stretches.weight)
+        self.measured = stretches.by_segment(stretches.measured)
+        self.segment_trial = np.repeat(stretches.trial, stretches.segments)
+        self.segment_initialisation = np.repeat(stretches.initialisation, stretches.segments)
+        self._starts: Array = np.zeros((*self.weight.shape, 0))
+        self._inverse: Array = np.zeros((len(self.weight), 0, 0))
+
+    def linearise_starts(self, model: Model) -> None:
+        """Take the beginnings of trials and the sensitivity to segment starts from this model from now on."""
+        self.stretches = with_beginnings(self.shooting, model, self.stretches)
+        raw = self.shooting.start_sensitivity(model, self.stretches)
+        columns = np.stack([self.stretches.by_segment(column) for column in raw], axis=-1)
+        acceleration = np.abs(self.stretches.acceleration).reshape(len(self.weight), -1)
+        speed = START_SPEED + START_SPEED_PER_ACCELERATION * acceleration
+        spread = np.concatenate([np.full_like(speed, START_POSITION), speed], axis=1)
+        self._starts = np.asarray(columns * self.weight[..., None] * spread[:, None])
+        gram = np.swapaxes(self._starts, 1, 2) @ self._starts
+        self._inverse = np.asarray(np.linalg.inv(gram + np.eye(gram.shape[-1])), dtype=np.float64)
+
+    def free(self, x: Array) -> Array:
+        """Residuals or columns (G, R) or (G, R, P) with the starts integrated out."""
+        wide = x if x.ndim == 3 else x[..., None]
+        inner = np.swapaxes(self._starts, 1, 2) @ wide
+        freed: Array = wide - self._starts @ (self._inverse @ inner)
+        return freed if x.ndim == 3 else freed[..., 0]
+
+    def predictions(self, models: Sequence[Model]) -> Array:
+        """(models, G, R) [rad]."""
+        simulated = self.shooting.positions(models, self.stretches)
+        return np.stack([self.stretches.by_segment(one) for one in simulated])
+
+    def residual(self, prediction: Array) -> Array:
+        """Weighted measured - predicted (G, R); a simulation that ran away counts as far off."""
+        return np.clip(np.nan_to_num(self.measured - prediction, nan=1.0), -1.0, 1.0) * self.weight
+
+    def cost(self, residual: Array) -> Array:
+        """Marginal squared error of each segment (G,), in units of the sensor's variance."""
+        return np.asarray(np.sum(residual * self.free(residual), axis=1))
+
+    def columns(self, model: Model, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
+        """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
+        moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
+        all_predictions = self.predictions([model, *(one for one, _ in moved)])
+        base = all_predictions[0]
+        found = {
+            _key(unknown): (np.clip(p - base, -1.0, 1.0) / step * self.weight)
+            for unknown, p, (_, step) in zip(_simulated(unknowns), all_predictions[1:], moved, strict=True)
+        }
+        columns = [self._masked(found[_key(unknown)], unknown) for unknown in unknowns]
+        return base, np.nan_to_num(np.stack(columns, axis=-1)) if columns else np.zeros((*base.shape, 0))
+
+    def _masked(self, column: Array, unknown: Unknown) -> Array:
+        if unknown.kind != "posture":
+            return column
+        return np.asarray(column * (self.segment_initialisation == unknown.initialisation)[:, None])
+
+
+def _key(unknown: Unknown) -> tuple[str, str, int]:
+    return unknown.kind, unknown.key, unknown.place
+
+
+def _simulated(unknowns: Sequence[Unknown]) -> list[Unknown]:
+    """One unknown for each simulation: the offsets of one joint in all initialisations share one."""
+    return list({_key(unknown): unknown for unknown in unknowns}.values())
+
+
+def moved_model(model: Model, unknown: Unknown) -> tuple[Model, float]:
+    """The model with an unknown moved by a finite step within its bounds, and the step in units of its scale."""
+    step = STEP * unknown.scale
+    if unknown.kind == "posture":
+        moved = {key: value + step * (np.arange(len(value)) == unknown.place) for key, value in model.posture.items()}
+        return Model(model.constants, model.terms, moved), STEP
+    value = unknown.of(model)
+    step = step if value + step <= unknown.high else -step
+    if value + step < unknown.low:
+        step = unknown.low - value if value > unknown.low else unknown.high - value
+    return unknown.put(model, value + step), step / unknown.scale

@@ -1,0 +1,160 @@
+"""Simulates many models at once, each through all stretches of a recording, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION
+from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.stretches import Stretches, steps_per_row
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.jump_ratio import gaps, jump_ratio
+from tactile_cube.measurement.replay.known_force import force_torque
+from tactile_cube.measurement.replay.read_out import free_way
+from tactile_cube.measurement.replay.rig_replay import CLAMPED
+
+Array = NDArray[np.float64]
+POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] finite differences of a segment's start
+
+
+class Shooting:
+    """The drivetrain of a rig, with every effect that may be tried compiled in."""
+
+    def __init__(self, recording: Recording, effects: Sequence[type[Effect]]) -> None:
+        """Build the plant; its kernel is compiled once and kept on disk.
+
+        Args:
+            recording: rig, controller and sampling step.
+            effects: classes that a model may use.
+        """
+        coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
+        self.recording = recording
+        self.tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
+        dt = recording.step / steps_per_row(recording)
+        self.plant = Plant([self.tree], dt=dt, effects=tuple(effects), joint_names=recording.joints)
+        self.workers = min(4, len(os.sched_getaffinity(0)))
+
+    def positions(self, models: Sequence[Model], stretches: Stretches) -> Array:
+        """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
+        return self._simulate(
+            models, np.zeros((len(models), 2 * len(self.recording.joints))), [stretches] * len(models)
+        )
+
+    def positions_from(self, model: Model, beginnings: Sequence[Array], stretches: Stretches) -> Array:
+        """The same for one model from several `beginning`s, (beginnings, S, K segment, n) [rad]."""
+        begun = [replace(stretches, beginning=one) for one in beginnings]
+        return self._simulate([model] * len(begun), np.zeros((len(begun), 2 * len(self.recording.joints))), begun)
+
+    def gaps(self, model: Model) -> Array:
+        """Width of the gap in each joint's transmission (n,) [rad]."""
+        return gaps(self.plant, self.memory(model))
+
+    def start_sensitivity(self, model: Model, stretches: Stretches) -> Array:
+        """D position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
+        joints = len(self.recording.joints)
+        nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
+        count = 2 * joints + 1
+        moved = self._simulate([model] * count, np.vstack([nudge, np.zeros(2 * joints)]), [stretches] * count)
+        slopes: Array = (moved[:-1] - moved[-1]) / nudge.max(axis=1)[:, None, None, None]
+        return slopes
+
+    def _simulate(self, models: Sequence[Model], nudge: Array, stretches: Sequence[Stretches]) -> Array:
+        out = np.zeros((len(models), *stretches[0].measured.shape))
+        with ThreadPoolExecutor(self.workers) as pool:
+            list(pool.map(self._one, models, nudge, stretches, out))
+        return out
+
+    def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
+        memory = self._memory(model, stretches)
+        count, fine = len(stretches), stretches.substeps
+        felt, _ = jump_ratio(self.plant, memory[0], stretches.commands[0, stretches.history * fine])
+        gap = gaps(self.plant, memory[0])
+        rows = np.array([MOTOR_POSITION, COMMAND, *([LEAD] if gap.any() else [])])
+        signals = np.zeros((count, out.shape[1] * fine, len(rows), out.shape[2]))
+        self.plant.kernel.segments_batch(
+            stretches.commands,
+            np.arange(count),
+            np.full(count, signals.shape[1]),
+            stretches.history * fine,
+            1,
+            stretches.segment * fine,
+            stretches.position,
+            stretches.speed,
+            stretches.beginning,
+            np.tile(nudge, (count, 1)),
+            memory,
+            rows,
+            0,
+            count,
+            signals,
+        )
+        jump = _jumps(signals[:, :, 1], stretches)
+        free = free_way(signals[:, ::fine, 2], jump, gap) if gap.any() else 0.0
+        out[:] = signals[:, ::fine, 0] - free - felt * (jump - free)
+
+    def _memory(self, model: Model, stretches: Stretches) -> Array:
+        """One block (S, size) for each stretch, at rest at its start."""
+        single = self.memory(model)
+        memory = np.tile(single, (len(stretches), 1))
+        posture = np.array([model.posture[int(k)] for k in stretches.initialisation])
+        self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * posture[:, self.tree.follow]
+        self.plant.view(memory, "angle_offset")[:] = posture
+        self.plant.reset(memory, self._links(model, stretches), stretches.speed[:, 0])
+        self.plant.view(memory, "step")[:, 0] = stretches.time / self.plant.dt
+        for k, key in enumerate(("kp", "kd", "torque_limit")):
+            self.plant.view(memory, key)[:] *= stretches.gains[:, k]
+        self.plant.view(memory, "brake")[stretches.clamped] = CLAMPED
+        for k, force in enumerate(stretches.forces):
+            if force is not None:
+                resting = np.average(stretches.measured[k], axis=0, weights=stretches.weight[k, :, 0])
+                self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
+        return memory
+
+    def memory(self, model: Model) -> Array:
+        """Memory (size,) of the plant with a model's constants and effects."""
+        known = model.constants
+        constants = DrivetrainConstants(
+            kp=known["kp"],
+            kd=known["kd"],
+            stiffness=known["stiffness"],
+            static_friction=known["static_friction"],
+            reflected_inertia=known["reflected_inertia"],
+            torque_limit=known["torque_limit"],
+        )
+        memory: Array = self.plant.memory(constants, gravity=self.recording.gravity)
+        self.plant.view(memory, "friction_creep")[:] = model.constants["friction_creep"]
+        self.plant.view(memory, "command_torque_limit")[:] = np.inf
+        for term in model.terms:
+            self.plant.set_effect(memory, term.effect, term.joint, term.values)
+        return memory
+
+    def _links(self, model: Model, stretches: Stretches) -> Array:
+        """Link positions (S, n) near those of the first row: measured less the deflection of the plain drive."""
+        constants = model.constants
+        error = stretches.commands[:, stretches.history * stretches.substeps] - stretches.position[:, 0]
+        torque = constants["kp"] * error - constants["kd"] * stretches.speed[:, 0]
+        limit = constants["torque_limit"]
+        return stretches.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
+
+
+def _jumps(acting: Array, stretches: Stretches) -> Array:
+    """Simulated command at each reading less the one that the log feels (S, K segment, n).
+
+    Known exactly unless an effect changes the command on its way; then half the change from row to row, smoothed.
+    """
+    first, fine = stretches.history * stretches.substeps, stretches.substeps
+    if np.array_equal(acting, stretches.commands[:, first:]):
+        return stretches.jump
+    rows = acting[:, ::fine]
+    jumps = np.zeros_like(rows)
+    jumps[:, 1:-1] = 0.25 * (rows[:, 2:] - rows[:, :-2])
+    return jumps if stretches.read_after else -jumps

@@ -1,0 +1,279 @@
+"""A recording cut for multiple shooting: stretches simulated in one go, made of short segments started anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.recordings.description import KnownForce
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.parameters import TORQUE_MODE_GAIN
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+SEGMENT = (
+    0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
+)
+STRETCH = 11  # segments simulated without a break, so that effects with a memory keep it
+LEAD = 1  # segments at the beginning of a stretch that only wake such memories, unless a trial begins there
+HISTORY = 8.0  # [s] of commands before a stretch at most, for effects that remember them, such as a rate limit
+LONGEST_STEP = 0.0021  # [s] of the simulation
+FEWEST = 4  # samples that a stretch needs
+ROWS = (
+    "commands",
+    "measured",
+    "jump",
+    "weight",
+    "position",
+    "speed",
+    "acceleration",
+    "gains",
+    "trial",
+    "initialisation",
+    "time",
+    "clamped",
+    "beginning",
+)
+"""Arrays with one row a stretch."""
+SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
+MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """S stretches of K segments of `segment` rows each; n joints.
+
+    Attributes:
+        commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
+        measured: (S, K segment, n) measured positions [rad].
+        jump: (S, K segment, n) mean command at each reading less the one that the log feels [rad].
+        weight: (S, K segment, n) 1 / sensor noise; 0 where nothing was measured [1/rad].
+        position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
+        speed: (S, K, n) [rad/s].
+        acceleration: (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2].
+        gains: (S, 3, n) kp, kd and torque limit of the trial over those of the recording.
+        trial: (S,) index of the trial.
+        initialisation: (S,) robot initialisation.
+        time: (S,) of the first row in its trial [s].
+        clamped: (S,) the links were held still.
+        beginning: (S, 2 n) how far links stand from where their sensors put them as the stretch begins [rad], and how
+            much faster they are [rad/s]; see `beginnings`.
+        forces: known forces on a link, or None.
+        history: H.
+        segment: rows of a segment.
+        substeps: simulation steps from row to row.
+        read_after: a row is read at the end of the period in which its command acts, not at its beginning.
+    """
+
+    commands: Array
+    measured: Array
+    jump: Array
+    weight: Array
+    position: Array
+    speed: Array
+    acceleration: Array
+    gains: Array
+    trial: NDArray[np.int64]
+    initialisation: NDArray[np.int64]
+    time: Array
+    clamped: NDArray[np.bool_]
+    beginning: Array
+    forces: tuple[KnownForce | None, ...]
+    history: int
+    segment: int
+    substeps: int
+    read_after: bool
+
+    @property
+    def segments(self) -> int:
+        """K, segments of a stretch."""
+        return int(self.position.shape[1])
+
+    def __len__(self) -> int:
+        """S."""
+        return len(self.commands)
+
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Stretches:
+        """Some of the stretches."""
+        picked = {key: getattr(self, key)[chosen] for key in ROWS}
+        forces = tuple(self.forces[int(k)] for k in np.arange(len(self))[chosen])
+        return replace(self, **picked, forces=forces)
+
+    def first_segments(self) -> Stretches:
+        """The first segment of each stretch alone."""
+        rows = slice(self.segment)
+        return replace(
+            self,
+            commands=self.commands[:, : (self.history + self.segment) * self.substeps],
+            **{key: getattr(self, key)[:, rows] for key in ("measured", "jump", "weight")},
+            **{key: getattr(self, key)[:, :1] for key in ("position", "speed", "acceleration")},
+        )
+
+    def by_segment(self, values: Array) -> Array:
+        """(S, K segment, n) -> (S K, segment n)."""
+        return values.reshape(len(self) * self.segments, -1)
+
+
+def cut(
+    recording: Recording, noise: Array, trials: Sequence[Trial] | None = None, segment: int | None = None
+) -> Stretches:
+    """The trials of a recording as stretches.
+
+    Args:
+        recording: gives the joints and the sampling step.
+        noise: (n,) standard deviation of the position sensor of each joint [rad].
+        trials: all of the recording's by default.
+        segment: rows of a segment; as short as identification likes it by default.
+    """
+    trials = recording.trials if trials is None else trials
+    longest = max(len(trial.time) for trial in trials)
+    segment = min(segment or max(8, round(SEGMENT / recording.step)), longest)
+    rows = segment * min(STRETCH, -(-longest // segment))
+    forward = max(rows - LEAD * segment, segment)  # from the start of a stretch to that of the next one
+    history = min(round(HISTORY / recording.step), (longest - 1) // forward * forward)
+    pieces = [
+        piece
+        for k, trial in enumerate(trials)
+        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise)
+    ]
+    columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
+    forces = tuple(piece["force"] for piece in pieces)
+    return Stretches(
+        **columns,
+        forces=forces,  # type: ignore[arg-type]
+        history=history,
+        segment=segment,
+        substeps=steps_per_row(recording),
+        read_after=recording.read == "after",
+    )
+
+
+def _pieces(
+    recording: Recording, trial: Trial, index: int, rows: int, forward: int, segment: int, history: int, noise: Array
+) -> Iterator[dict[str, object]]:
+    command = trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
+    substeps = steps_per_row(recording)
+    fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
+    jump = _half_jump(command, recording.read)
+    drive = _drive(recording, trial)
+    for first in range(0, len(trial.time), forward):
+        span = np.arange(first, first + rows)
+        usable = np.minimum(span, len(trial.time) - 1)
+        counted = span >= (first + rows - forward if first > 0 else 0)
+        present = (span < len(trial.time)) & trial.valid[usable] & counted
+        if np.count_nonzero(present) < FEWEST:
+            continue
+        starts = np.minimum(span[::segment], len(trial.time) - 1)
+        position, speed, acceleration = _states(trial, command, jump, drive, starts)
+        yield {
+            "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
+            "measured": trial.position[usable],
+            "jump": np.where((span < len(trial.time))[:, None], jump[usable], 0.0),
+            "weight": present[:, None] / noise,
+            "position": position,
+            "speed": speed,
+            "acceleration": acceleration,
+            "gains": _gains(recording, trial),
+            "trial": index,
+            "initialisation": trial.initialisation,
+            "time": first * trial.step,
+            "clamped": trial.clamped,
+            "beginning": np.zeros(2 * position.shape[1]),
+            "force": trial.force,
+        }
+
+
+def _rows(fine: Array, first: int, last: int) -> Array:
+    """Rows of a trial's commands (T, substeps, n); before the trial its first command, after it the last one."""
+    wanted = np.arange(first, last)
+    chosen = fine[np.clip(wanted, 0, len(fine) - 1)]
+    chosen[wanted < 0] = fine[0, 0]
+    chosen[wanted >= len(fine)] = fine[-1, -1]
+    return chosen
+
+
+def steps_per_row(recording: Recording) -> int:
+    """Simulation steps between two samples."""
+    return max(1, int(np.ceil(recording.step / LONGEST_STEP - 1e-6)))
+
+
+def _gains(recording: Recording, trial: Trial) -> Array:
+    """kp, kd and torque limit (3, n) of a trial over those of the recording; 1 where the recording has none."""
+    own = np.array([trial.gains.kp, trial.gains.kd, trial.gains.torque_limit])
+    common = np.array([recording.gains.kp, recording.gains.kd, recording.gains.torque_limit])
+    usable = (common > 0) & np.isfinite(common) & np.isfinite(own) & (not recording.torque_controlled)
+    return np.where(usable, own / np.where(usable, common, 1.0), 1.0)
+
+
+class Drive(NamedTuple):
+    """Nominal values (n,) by which a drive deflects: kp, kd, torque limit and compliance [rad/(N m)]."""
+
+    kp: Array
+    kd: Array
+    limit: Array
+    compliance: Array
+
+
+def _drive(recording: Recording, trial: Trial) -> Drive:
+    joints = len(recording.joints)
+    stiffness = recording.nominal.get("stiffness", np.full(joints, np.inf))
+    if recording.torque_controlled:
+        return Drive(np.full(joints, TORQUE_MODE_GAIN), np.zeros(joints), np.full(joints, np.inf), 1.0 / stiffness)
+    gains = trial.gains
+    return Drive(np.array(gains.kp), np.array(gains.kd), np.array(gains.torque_limit), 1.0 / stiffness)
+
+
+def _impulses(command: Array, reading: str, substeps: int) -> Array:
+    """Commands (T, n) as the simulation's steps take them, (T substeps, n), from the instant at which row 0 is read.
+
+    A step acts like an impulse at its beginning, a held command from there on; so the first step of a row takes the
+    mean of the commands before and after that instant, which makes the simulation second order in its step. A row is
+    read at the end of the period in which its command acts, or at its beginning.
+    """
+    before, after = _around(command, reading)
+    fine = np.repeat(after, substeps, axis=0)
+    fine[::substeps] = 0.5 * (before + after)
+    return fine
+
+
+def _around(command: Array, reading: str) -> tuple[Array, Array]:
+    """Commands (T, n) in force just before and just after each row is read."""
+    if reading == "after":
+        return command, np.concatenate([command[1:], command[-1:]])
+    return np.concatenate([command[:1], command[:-1]]), command
+
+
+def _half_jump(command: Array, reading: str) -> Array:
+    """The mean command less the one that the log feels (T, n): the drive deflects accordingly."""
+    before, after = _around(command, reading)
+    return 0.5 * (after - before) if reading == "after" else 0.5 * (before - after)
+
+
+def _states(trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows) -> tuple[Array, Array, Array]:
+    """Position of the sensor, speed and acceleration of the link (K, n) at some rows.
+
+    The sensor follows every kink of the command, for the drive deflects with its torque; the link does not. So speed
+    and acceleration come from a polynomial through the samples around, with the drive's deflection taken off: of
+    fourth degree, since a joint that is pulled out of its stiction is fast before a parabola can follow, or a parabola
+    where samples lie on one side only or are few.
+    """
+    torque = np.clip(drive.kp * (command - trial.position), -drive.limit, drive.limit)
+    link = trial.position - drive.compliance * torque  # behind by compliance * kd * speed
+    half = max(2, round(SMOOTHING / trial.step))
+    found = []
+    for row in rows:
+        near = slice(max(0, row - half), min(len(trial.time), row + half + 1))
+        centred = near.start == row - half and near.stop == row + half + 1
+        terms = 5 if centred and 2 * half >= MANY else 3
+        basis = np.vander(trial.time[near] - trial.time[row], terms, increasing=True)
+        found.append(np.linalg.lstsq(basis, link[near], rcond=None)[0][1:3])
+    slope, half_curvature = np.moveaxis(np.array(found), 1, 0)
+    acceleration = 2.0 * half_curvature
+    soft = drive.kp * drive.compliance
+    position = trial.position[rows] + soft / (1.0 + soft) * jump[rows]
+    return position, slope + drive.compliance * drive.kd * acceleration, acceleration

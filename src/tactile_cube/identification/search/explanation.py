@@ -1,0 +1,55 @@
+"""A set of effects that may be what is missing, fitted and judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from tactile_cube.identification.fitting.gauss_newton import Fit
+from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.search.evidence import Judgement
+
+FLOOR = 1.1  # error / sensor noise at which nothing is left to explain
+NEARLY = 1.5  # the same of a fit before everything is free
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects with everything refitted.
+
+    Attributes:
+        effects: candidates in the order in which they were added.
+        fit: on the fitted trials.
+        judgement: on the held-out trials.
+        p_value: of the last effect, corrected for the number of effects that were judged beside it.
+        gain: held-out share that the last effect explains.
+    """
+
+    effects: tuple[Candidate, ...]
+    fit: Fit = field(repr=False)
+    judgement: Judgement = field(repr=False)
+    p_value: float
+    gain: float
+
+    @property
+    def error(self) -> float:
+        """Held-out error in units of the sensor noise."""
+        return self.judgement.error
+
+    @property
+    def label(self) -> str:
+        """Readable."""
+        return " & ".join(c.label for c in self.effects) or "base"
+
+    @property
+    def size(self) -> int:
+        """Numbers fitted beyond the base."""
+        return sum(c.size for c in self.effects)
+
+    def explained(self, base: Explanation) -> float:
+        """Share of the base model's excess over the sensor noise that is explained."""
+        return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is left that would be worth a further effect."""
+        return self.error <= FLOOR

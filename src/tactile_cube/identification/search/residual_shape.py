@@ -1,0 +1,181 @@
+"""What the torque that a model lacks depends on: its average over bins of each signal, what any law could explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.measurement.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+BINS = 24
+MANY = 10 * BINS  # samples that a curve needs
+FEATURES = 300  # random cosine features of the black box
+RIDGE = 1e-2
+APART = 0.1  # share that curves for motion up and down have to explain beyond one curve for both
+TOLD_APART = 0.6  # share of the segments on which the black box learns
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The missing torque at a joint, averaged over bins of another signal.
+
+    Attributes:
+        joint: where it is missing.
+        against: the signal, with its unit; with ", moving up" or ", moving down" for one direction of motion.
+        centres: (bins,) of the signal.
+        mean: (bins,) [N m].
+        spread: (bins,) standard deviation [N m].
+        explained: share of the missing torque that a function of this signal alone explains; of a pair of curves for
+            motion up and down, what both explain together.
+        beside: the model that lacks the torque.
+    """
+
+    joint: str
+    against: str
+    centres: Array
+    mean: Array
+    spread: Array
+    explained: float
+    beside: str = ""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """The missing torque of one joint and the signals it may depend on, each (samples,)."""
+
+    joint: str
+    torque: Array
+    signals: dict[str, Array]
+    segment: NDArray[np.int64]
+    initialisation: NDArray[np.int64]
+
+
+def missing_torques(problem: Problem, recording: Recording, model: Model, residual: Array) -> list[Missing]:
+    """The torque that each joint would have to get so that the residual vanished: I r'' + D r' + K r.
+
+    Args:
+        problem: the stretches that the residual belongs to.
+        recording: names the joints.
+        model: gives inertia and gains.
+        residual: (G, R) weighted measured - predicted.
+    """
+    n, segment = len(recording.joints), problem.stretches.segment
+    weight = problem.weight.reshape(-1, segment, n)
+    error = np.divide(residual.reshape(weight.shape), weight, out=np.zeros_like(weight), where=weight > 0)
+    measured = problem.measured.reshape(weight.shape)
+    fine = problem.stretches.substeps
+    commands = problem.stretches.commands[:, problem.stretches.history * fine :: fine].reshape(weight.shape)
+    step = recording.step
+    position, velocity, acceleration = _derivatives(measured, step)
+    constants = model.constants
+    soft = 1.0 + constants["kp"] / constants["stiffness"]
+    inertia = _inertia(problem, model, measured)
+    r, dr, ddr = _derivatives(error, step)
+    torque = inertia * ddr + constants["kd"] / soft * dr + constants["kp"] / soft * r
+    drive = constants["kp"] * (commands - position) - constants["kd"] * velocity
+    first = np.tile(problem.stretches.time[:, None], (1, problem.stretches.segments)).ravel()
+    length = segment * step
+    time = first + np.tile(np.arange(problem.stretches.segments), len(problem.stretches)) * length
+    inner = slice(segment // 8, -segment // 8)
+    inside = np.all(weight[:, inner] > 0, axis=2)
+    number = np.broadcast_to(np.arange(len(weight))[:, None], weight.shape[:2])[:, inner][inside]
+    clock = (time[:, None] + np.arange(segment) * step)[:, inner][inside]
+    angle = position + np.array([model.posture[int(k)] for k in problem.segment_initialisation])[:, None]
+    found = []
+    for j, joint in enumerate(recording.joints):
+        signals = {}
+        for k, other in enumerate(recording.joints):
+            signals[f"position of {other} [rad]"] = angle[:, inner, k][inside]
+            signals[f"velocity of {other} [rad/s]"] = velocity[:, inner, k][inside]
+        signals[f"acceleration of {joint} [rad/s^2]"] = acceleration[:, inner, j][inside]
+        signals[f"torque of {joint} [N m]"] = drive[:, inner, j][inside]
+        signals["time [s]"] = clock
+        initialisation = problem.segment_initialisation[number]
+        found.append(Missing(joint, torque[:, inner, j][inside], signals, number, initialisation))
+    return found
+
+
+def shapes(missing: Missing) -> list[Shape]:
+    """The missing torque over every signal, most telling first.
+
+    Where it looks different for motion up and down, as friction does, a signal has two curves.
+    """
+    found = [_shape(missing, name) for name in missing.signals]
+    found += [curve for one in found for curve in _by_direction(missing, one)]
+    return sorted(found, key=lambda shape: -shape.explained)
+
+
+def black_box(missing: Missing, seed: int = 0) -> float:
+    """Share of the missing torque that a smooth function of all signals explains on segments it has not seen.
+
+    Ridge regression on random cosine features (Rahimi and Recht, 2007): no law of these signals does much better.
+    """
+    rng = np.random.default_rng(seed)
+    inputs = np.stack(list(missing.signals.values()), axis=1)
+    inputs = (inputs - inputs.mean(axis=0)) / np.maximum(inputs.std(axis=0), 1e-12)
+    frequencies = rng.normal(size=(inputs.shape[1], FEATURES)) * rng.choice([0.3, 1.0, 3.0], FEATURES)
+    features = np.cos(inputs @ frequencies + rng.uniform(0, 2 * np.pi, FEATURES))
+    learn = rng.uniform(size=missing.segment.max() + 1)[missing.segment] < TOLD_APART
+    if learn.all() or not learn.any():
+        return 0.0
+    a, b = features[learn], missing.torque[learn]
+    weights = np.linalg.solve(a.T @ a + RIDGE * len(a) * np.eye(FEATURES), a.T @ (b - b.mean()))
+    test = missing.torque[~learn]
+    left = test - b.mean() - features[~learn] @ weights
+    return float(max(0.0, 1.0 - left.var() / max(test.var(), 1e-30)))
+
+
+def _by_direction(missing: Missing, both: Shape) -> list[Shape]:
+    """A curve for motion up and one for motion down, if they explain clearly more than one for both."""
+    speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
+    curves, left = [], 0.0
+    for side, chosen in (("up", speed > 0.0), ("down", speed <= 0.0)):
+        if chosen.sum() < MANY:
+            return []
+        signals = {both.against: missing.signals[both.against][chosen]}
+        parts = (missing.segment[chosen], missing.initialisation[chosen])
+        part = Missing(missing.joint, missing.torque[chosen], signals, *parts)
+        curve = _shape(part, both.against)
+        left += (1.0 - curve.explained) * part.torque.var() * chosen.sum()
+        curves.append(replace(curve, against=f"{both.against}, moving {side}"))
+    explained = 1.0 - left / max(missing.torque.var() * len(speed), 1e-30)
+    return [replace(curve, explained=explained) for curve in curves] if explained > both.explained + APART else []
+
+
+def _shape(missing: Missing, name: str) -> Shape:
+    values = missing.signals[name]
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
+    count = np.maximum(np.bincount(place), 1)
+    mean = np.bincount(place, missing.torque) / count
+    square = np.bincount(place, missing.torque**2) / count
+    centres = np.bincount(place, values) / count
+    explained = np.sum(count * (mean - missing.torque.mean()) ** 2) / max(missing.torque.var() * len(values), 1e-30)
+    chance = len(count) / max(
+        len(np.unique(missing.segment)), 1
+    )  # bins fit noise; samples of one segment are not independent
+    spread = np.sqrt(np.maximum(square - mean**2, 0.0))
+    return Shape(missing.joint, name, centres, mean, spread, float(max(0.0, explained - 0.1 * min(chance, 1.0))))
+
+
+def _derivatives(x: Array, step: float) -> tuple[Array, Array, Array]:
+    """Value, slope and curvature of (G, segment, n) by sliding parabolas of about 30 ms."""
+    half = max(2, min(round(0.015 / step), x.shape[1] // 4))
+    lever = np.arange(-half, half + 1) * step
+    weights = np.linalg.pinv(np.stack([np.ones_like(lever), lever, 0.5 * lever**2], axis=1))
+    padded = np.pad(x, ((0, 0), (half, half), (0, 0)), mode="reflect", reflect_type="odd")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=1)
+    value, slope, curvature = (windows @ row for row in weights)
+    return value, slope, curvature
+
+
+def _inertia(problem: Problem, model: Model, measured: Array) -> Array:
+    """Diagonal (n,) of the joint-space inertia at the mean posture [kg m^2]."""
+    posture = measured.reshape(-1, measured.shape[2]).mean(axis=0)
+    mass = problem.shooting.tree.actuated_mass_matrix(posture)
+    return np.asarray(np.diag(mass) + model.constants["reflected_inertia"])

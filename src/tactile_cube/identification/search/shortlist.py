@@ -1,0 +1,61 @@
+"""Which candidates come along: worth a refit after a first look, worth a full fit after a refit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from tactile_cube.identification.fitting.gauss_newton import Fit
+from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.search.screening import Score
+
+VARIANTS = 1  # further forms or places of these effects that come along
+RESIZED = (0.2, 6.0)  # factors of the first look that are believed
+UNDERRATED = 4.0  # times that a refit may explain more than the first look
+PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
+
+
+def with_groups(scores: Sequence[Score], needed: float) -> list[Candidate]:
+    """Candidates worth a refit, best first; an effect that helps at several joints also stands for all of them.
+
+    None where even the best of them is far from taking as much off the squared error as is `needed`.
+    """
+    best: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Score] = {}
+    for score in scores:
+        key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
+        best.setdefault(key, score)
+    ranked = [(score.gain, resized(score)) for score in best.values() if score.gain > 0.0]
+    families: dict[tuple[str, tuple[str, ...]], list[Score]] = {}
+    for (name, form, _), score in best.items():
+        families.setdefault((name, form), []).append(score)
+    for members in families.values():
+        useful = [m for m in members if m.gain > 0.0]
+        if len(useful) > 1 and sum(m.gain for m in useful) > 1.3 * max(m.gain for m in useful):
+            first = useful[0].candidate
+            joints = tuple(m.candidate.joints[0] for m in useful)
+            ranked.append((sum(m.gain for m in useful), Candidate(first.effect, joints, first.form)))
+    ranked.sort(key=lambda pair: -pair[0])
+    most = ranked[0][0] if ranked else 0.0
+    if UNDERRATED * most < needed:
+        return []
+    return [candidate for gained, candidate in ranked if gained > PROMISING * most]
+
+
+def resized(score: Score) -> Candidate:
+    """The candidate with its start as large as the first look says, where a single number makes the effect's size."""
+    (name, start), *more = score.candidate.form.items()
+    known = {p.name: p for p in score.candidate.effect.parameters}[name]
+    if more or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
+        return score.candidate
+    return replace(score.candidate, form={name: min(max(score.factor * start, known.low), known.high)})
+
+
+def of_each(pairs: Sequence[tuple[Candidate, Fit]], count: int) -> list[tuple[Candidate, Fit]]:
+    """The best of each of the `count` best effects, and `VARIANTS` more, still in their order.
+
+    Forms and places of one effect that follow the data alike would else leave no room for another that does so too.
+    """
+    names = list(dict.fromkeys(candidate.effect.name for candidate, _ in pairs))[:count]
+    first = [next(k for k, (candidate, _) in enumerate(pairs) if candidate.effect.name == name) for name in names]
+    others = [k for k in range(len(pairs)) if k not in first][: VARIANTS + count - len(first)]
+    return [pairs[k] for k in sorted([*first, *others])]

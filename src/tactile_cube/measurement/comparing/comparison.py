@@ -1,0 +1,174 @@
+"""How well a model follows a recording, and where it fails."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.measurement.comparing.band import Band, simulate_band
+from tactile_cube.measurement.comparing.error import ErrorSummary, residuals, summarise
+from tactile_cube.measurement.comparing.in_words import where_it_fails
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.comparing.postures import fitted_postures, no_postures, replay_each
+from tactile_cube.measurement.comparing.regimes import Regime, regimes
+from tactile_cube.measurement.comparing.stretches import Stretch, failing_stretches
+from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.parameters import Parameters, nominal_parameters, require_same_joints
+from tactile_cube.measurement.replay.rig_replay import Engine, Simulated
+
+Array = NDArray[np.float64]
+FINER = 8  # times smaller than the simulation's step, to see the error of the step itself
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model beside a recording; every error in rad, residual = measured - simulated, joint offsets removed.
+
+    Attributes:
+        recording: what was measured.
+        model: what was simulated; None for what the rig's owner believes.
+        simulated: one entry a trial.
+        residuals: (n, joints) of each trial, nan where a dropped sample was bridged.
+        errors: overall and by joint.
+        trials: the same for each trial.
+        floor: what a perfect model would leave.
+        regimes: the error by joint and regime.
+        sentences: the same in words.
+        whiteness: does the residual remember itself?
+        cross_correlations: what it goes with, strongest first.
+        stretches: where it is far above the floor.
+        band: randomised simulations, or None.
+    """
+
+    recording: Recording
+    model: ModelFile | None
+    simulated: list[Simulated]
+    residuals: list[Array]
+    errors: ErrorSummary
+    trials: list[ErrorSummary]
+    floor: NoiseFloor
+    regimes: list[Regime]
+    sentences: list[str]
+    whiteness: list[Whiteness]
+    cross_correlations: list[CrossCorrelation]
+    stretches: list[Stretch]
+    band: Band | None
+
+    @property
+    def ratio(self) -> float:
+        """Error over noise floor."""
+        return self.errors.overall / self.floor.overall
+
+
+def compare(
+    recording: Recording,
+    model: ModelFile | None = None,
+    engine: Engine = "fast",
+    step: float = 0.002,
+    simulations: int = 0,
+    spread: Mapping[str, float] | None = None,
+    seed: int = 0,
+    floor: NoiseFloor | None = None,
+) -> Comparison:
+    """Simulate every trial freely from its start and describe what is left.
+
+    Args:
+        recording: what was measured.
+        model: the model file, simulated with the joint offsets of each initialisation that suit it best; None for the
+            values in recording.yaml and no offsets.
+        engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
+        step: simulation step [s].
+        simulations: how many randomised simulations make the band; 0 for none.
+        spread: relative half widths of constants without an interval, `offset` in rad.
+        seed: of the randomised simulations.
+        floor: noise floor, if it is known already; by default found here.
+    """
+    if model is not None:
+        require_same_joints(recording, model)
+    parameters = nominal_parameters(recording, model)
+    postures = fitted_postures(recording, parameters, step) if model is not None else no_postures(recording)
+    simulated = replay_each(recording, parameters, postures, engine, step)
+    if floor is None:
+        floor = noise_floor(recording, step_size_error(recording, parameters, postures, simulated, step))
+    band = simulate_band(recording, model, simulations, spread or {}, step, seed) if simulations else None
+    return describe(recording, model, simulated, floor, band)
+
+
+def describe(
+    recording: Recording, model: ModelFile | None, simulated: list[Simulated], floor: NoiseFloor, band: Band | None
+) -> Comparison:
+    """What simulations of the trials, one each, leave of the measurement, and where."""
+    trials, joints = recording.trials, recording.joints
+    errors = residuals(trials, [one.position for one in simulated])
+    summary = summarise(errors, joints)
+    table = regimes(trials, errors, joints)
+    return Comparison(
+        recording=recording,
+        model=model,
+        simulated=simulated,
+        residuals=errors,
+        errors=summary,
+        trials=[summarise([error], joints) for error in errors],
+        floor=floor,
+        regimes=table,
+        sentences=where_it_fails(table, summary.joints, floor),
+        whiteness=whiteness(trials, errors, joints),
+        cross_correlations=cross_correlations(trials, errors, joints),
+        stretches=_stretches(recording, errors, floor),
+        band=band,
+    )
+
+
+def step_size_error(
+    recording: Recording,
+    parameters: Parameters,
+    postures: Mapping[int, Array],
+    simulated: list[Simulated],
+    step: float,
+) -> ErrorSummary:
+    """Difference between a simulation and the same one in much smaller steps."""
+    fine = replay_each(recording, parameters, postures, "fast", step / FINER)
+    return summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
+
+
+def _stretches(recording: Recording, errors: list[Array], floor: NoiseFloor) -> list[Stretch]:
+    return [
+        stretch
+        for trial, error in zip(recording.trials, errors, strict=True)
+        for index, joint in enumerate(recording.joints)
+        for stretch in failing_stretches(trial.name, joint, trial.time, error[:, index], floor.joints[joint])
+    ]
+
+
+def as_json(comparison: Comparison) -> dict[str, Any]:
+    """The content of comparison.json: plain numbers, errors in rad, times in s."""
+    recording, floor, band = comparison.recording, comparison.floor, comparison.band
+    return {
+        "recording": str(recording.folder),
+        "error": asdict(comparison.errors),
+        "noise_floor": {
+            "overall": floor.overall,
+            "joints": floor.joints,
+            "source": "repeats" if floor.source == "repeats" else "guess",  # scripts know these two
+            "repeats": floor.repeats,
+            "step_size": floor.step_size,
+        },
+        "regimes": [asdict(one) for one in comparison.regimes],
+        "trials": [
+            {"name": trial.name, "file": trial.file, "kind": trial.kind, "initialisation": trial.initialisation}
+            | {"error": asdict(errors)}
+            for trial, errors in zip(recording.trials, comparison.trials, strict=True)
+        ],
+        "where": comparison.sentences,
+        "stretches": [asdict(one) for one in comparison.stretches],
+        "whiteness": [asdict(one) for one in comparison.whiteness],
+        "cross_correlations": [asdict(one) for one in comparison.cross_correlations],
+        "band": None
+        if band is None
+        else {"simulations": band.simulations, "inside": band.inside, "joints": band.joints},
+        "warnings": list(recording.warnings),
+    }

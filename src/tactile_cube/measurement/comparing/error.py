@@ -1,0 +1,56 @@
+"""How far a simulation is from a measurement: RMS position error, the constant joint offsets removed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.recordings.trial import Trial
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ErrorSummary:
+    """RMS error [rad] pooled over samples: over all joints, and joint by joint."""
+
+    overall: float
+    joints: dict[str, float]
+
+
+def joint_offsets(trials: Sequence[Trial], simulated: Sequence[Array]) -> dict[int, Array]:
+    """Mean of measured - simulated for each robot initialisation, initialisation -> (joints,) [rad]."""
+    offsets = {}
+    for initialisation in sorted({trial.initialisation for trial in trials}):
+        differences = [
+            (trial.position - positions)[trial.valid]
+            for trial, positions in zip(trials, simulated, strict=True)
+            if trial.initialisation == initialisation
+        ]
+        offsets[initialisation] = np.concatenate(differences).mean(axis=0)
+    return offsets
+
+
+def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
+    """Measured - simulated without the constant offset of each joint and robot initialisation.
+
+    Args:
+        trials: what was measured.
+        simulated: (n, joints) positions of each trial [rad].
+
+    Returns:
+        (n, joints) of each trial [rad]; nan where a dropped sample was bridged.
+    """
+    offsets = joint_offsets(trials, simulated)
+    return [
+        np.where(trial.valid[:, None], trial.position - positions - offsets[trial.initialisation], np.nan)
+        for trial, positions in zip(trials, simulated, strict=True)
+    ]
+
+
+def summarise(errors: Sequence[Array], joints: Sequence[str]) -> ErrorSummary:
+    """RMS of residuals (n, joints), nan left out, overall and per joint."""
+    squares = np.concatenate([error**2 for error in errors])
+    by_joint = np.sqrt(np.nanmean(squares, axis=0))
+    return ErrorSummary(float(np.sqrt(np.nanmean(squares))), dict(zip(joints, map(float, by_joint), strict=True)))

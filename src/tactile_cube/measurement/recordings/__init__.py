@@ -1,0 +1,1 @@
+"""A recording on disk: what it may say, read, checked and written."""

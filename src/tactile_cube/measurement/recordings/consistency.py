@@ -1,0 +1,100 @@
+"""Does recording.yaml agree with itself and with the URDF? Joints, couplings, gains, nominal values."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
+from tactile_cube.measurement.recordings.rig import Rig
+from tactile_cube.measurement.recordings.trial import Gains
+
+Array = NDArray[np.float64]
+
+
+def check_joints(description: Description, rig: Rig, file: Path) -> None:
+    """Refuse joints that the URDF does not have, and couplings to joints that are not actuated."""
+    named = [(joint, "joints") for joint in description.joints]
+    named += [(joint, "coupled") for joint in description.coupled]
+    named += [(coupling.joint, f"coupled.{joint}.joint") for joint, coupling in description.coupled.items()]
+    for joint, key in named:
+        if joint not in rig.joints:
+            raise InputError(
+                f"{file}: key '{key}': joint '{joint}' is not in {rig.path} (its movable joints: {list(rig.joints)})"
+            )
+    for joint, coupling in description.coupled.items():
+        if coupling.joint not in description.joints:
+            raise InputError(
+                f"{file}: key 'coupled.{joint}.joint': '{coupling.joint}' is not among joints {description.joints}"
+            )
+        if joint in description.joints:
+            raise InputError(f"{file}: key 'coupled.{joint}': the joint is actuated too (joints {description.joints})")
+
+
+def check_coupling(description: Description, rig: Rig) -> list[str]:
+    """Warnings where the URDF and recording.yaml disagree on which joint follows which."""
+    mimics = {name: joint.mimics for name, joint in rig.joints.items() if joint.mimics is not None}
+    warnings = []
+    for name, leader in mimics.items():
+        said = description.coupled.get(name)
+        if name in description.joints or (said is not None and said.joint == leader):
+            continue
+        warnings.append(
+            f"key 'coupled': the URDF lets '{name}' mimic '{leader}', recording.yaml says "
+            f"{said.joint if said else 'nothing of it'}"
+        )
+    free = [name for name in rig.joints if name not in {*description.joints, *description.coupled, *mimics}]
+    if free:
+        warnings.append(
+            f"key 'joints': {free} of the URDF are in neither 'joints' nor 'coupled': they are held at zero"
+        )
+    return warnings
+
+
+def gains_of(description: Description, entry: TrialEntry | None, key: str) -> Gains:
+    """The gains of a trial, or the recording's own without `entry`; `key` is what an error names.
+
+    Raises:
+        ValueError: gains with which no command could move a joint.
+    """
+    controller, joints = description.controller, tuple(description.joints)
+    change = entry.controller if entry is not None else None
+    values = {}
+    for name in ("kp", "kd", "torque_limit"):
+        own = getattr(change, name) if change is not None else None
+        values[name] = per_joint(getattr(controller, name) if own is None else own, joints, f"{key}.{name}")
+    gains = Gains(**values)
+    if controller.mode == "position":
+        _require_gains(gains, joints, key)
+    return gains
+
+
+def _require_gains(gains: Gains, joints: tuple[str, ...], key: str) -> None:
+    for name, values in (("kp", gains.kp), ("torque_limit", gains.torque_limit)):
+        if not (values > 0).all():
+            wrong = int(np.argmin(values > 0))
+            raise ValueError(
+                f"key '{key}.{name}': received {values[wrong]:g} for {joints[wrong]}: with it no command can "
+                "move the joint; give the gain of the controller that made the recording"
+            )
+    if not (gains.kd >= 0).all() or not np.isfinite(gains.kp).all() or not np.isfinite(gains.kd).all():
+        raise ValueError(
+            f"key '{key}': received kp {gains.kp.tolist()}, kd {gains.kd.tolist()}; expected finite gains, kd >= 0"
+        )
+
+
+def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
+    """Refuse nominal values that are no physical constants."""
+    for key, values in nominal.items():
+        if np.isnan(values).any() or (values < 0).any():
+            raise ValueError(
+                f"key 'nominal.{key}': received {values.tolist()}; expected numbers >= 0 for {list(joints)}"
+            )
+    if (nominal.get("stiffness", np.ones(1)) == 0).any():
+        raise ValueError("key 'nominal.stiffness': received 0: the drive would transmit nothing; .inf means rigid")
+
+
+def joints_where(mask: NDArray[np.bool_], joints: tuple[str, ...]) -> str:
+    """The names of the joints that a mask marks."""
+    return ", ".join(joint for joint, wrong in zip(joints, mask, strict=True) if wrong)

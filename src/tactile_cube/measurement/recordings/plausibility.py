@@ -1,0 +1,126 @@
+"""Do the numbers fit the rig? Degrees, swapped joints, a flipped sign, a joint that never moves."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.columns import Columns
+from tactile_cube.measurement.recordings.rig import RigJoint
+from tactile_cube.measurement.recordings.trial import Gains
+
+Array = NDArray[np.float64]
+DEGREE = math.pi / 180.0
+SLACK = 0.1  # [rad] beyond a joint's limit that offsets and soft stops explain
+MOVES = 0.02  # [rad] range below which a signal says nothing about its neighbours
+
+
+def check_units(columns: Columns, joints: list[RigJoint], gains: Gains, path: Path) -> list[str]:
+    """Warnings about angles outside the joints' limits.
+
+    Raises:
+        InputError: angles that only make sense in degrees, or that make no sense at all.
+    """
+    warnings: list[str] = []
+    for index, joint in enumerate(joints):
+        for signal, values in (("position", columns.position), ("command", columns.command)):
+            warnings += _check_reach(f"{joint.name}.{signal}", values[:, index], joint, path)
+        _check_one_in_degrees(joint.name, columns.command[:, index], columns.position[:, index], path)
+        if columns.torque is not None:
+            warnings += _check_gain(joint.name, columns, index, gains, path)
+    return warnings
+
+
+def _check_reach(name: str, values: Array, joint: RigJoint, path: Path) -> list[str]:
+    lower, upper = max(joint.lower, -2 * math.pi), min(joint.upper, 2 * math.pi)
+    outside = np.maximum(values - upper, lower - values)
+    row = int(np.argmax(outside))
+    limits = f"[{joint.lower:.4g}, {joint.upper:.4g}] rad of joint '{joint.name}' in the URDF"
+    if outside[row] > 0.5 * (upper - lower) + 0.35:
+        fits = np.max(np.maximum(values * DEGREE - upper, lower - values * DEGREE)) < SLACK
+        hint = "this looks like degrees: multiply by pi/180" if fits else "check unit and joint"
+        raise InputError(
+            f"{path}: column '{name}', row {row}: {values[row]:.4g} is far outside the limits {limits}; {hint}"
+        )
+    if outside[row] > SLACK and name.endswith("position"):
+        return [f"{path}: column '{name}', row {row}: {values[row]:.4g} is outside the limits {limits}; unit? joint?"]
+    return []
+
+
+def _check_one_in_degrees(joint: str, command: Array, position: Array, path: Path) -> None:
+    if min(np.ptp(command), np.ptp(position)) == 0 or _correlation(command, position) < 0.95:
+        return
+    ratio = float(np.ptp(position) / np.ptp(command)) * DEGREE
+    for signal, one in (("position", ratio), ("command", DEGREE**2 / ratio)):
+        if 0.85 < one < 1.18:
+            row = int(np.argmax(np.abs(position if signal == "position" else command)))
+            raise InputError(
+                f"{path}: column '{joint}.{signal}', row {row}: {signal} moves 180/pi times as far as its "
+                "counterpart: this looks like degrees, multiply by pi/180"
+            )
+
+
+def _check_gain(joint: str, columns: Columns, index: int, gains: Gains, path: Path) -> list[str]:
+    """Torque against the impedance law: its slope is 1 in the right units, whatever friction does."""
+    if columns.torque is None:
+        return []
+    position, torque = columns.position[:, index], columns.torque[:, index]
+    velocity = np.gradient(np.convolve(np.pad(position, 5, mode="edge"), np.ones(11) / 11, "valid"), columns.time)
+    expected = gains.kp[index] * (columns.command[:, index] - position) - gains.kd[index] * velocity
+    if np.std(expected) == 0 or _correlation(expected, torque) < 0.8:
+        return []
+    slope = float(np.std(torque) / np.std(expected))
+    if 0.8 < slope / DEGREE < 1.25:
+        row = int(np.argmax(np.abs(expected)))
+        raise InputError(
+            f"{path}: column '{joint}.position', row {row}: {position[row]:.4g}, and the torque is pi/180 of "
+            "kp (command - position): the angles look like degrees, multiply by pi/180"
+        )
+    if not 0.2 < slope < 5:
+        return [
+            f"{path}: column '{joint}.torque' is {slope:.3g} times kp (command - position): check unit (N m) and kp"
+        ]
+    return []
+
+
+def check_assignment(columns: Columns, joints: list[RigJoint], path: Path) -> list[str]:
+    """Warnings about joints that do not answer to their commands.
+
+    Raises:
+        InputError: a joint follows another joint's command, or moves against its own.
+    """
+    warnings: list[str] = []
+    for index, joint in enumerate(joints):
+        position = columns.position[:, index]
+        command = columns.command[:, index]
+        if np.ptp(command) > 5 * MOVES and np.ptp(position) == 0:
+            warnings.append(
+                f"{path}: column '{joint.name}.position' never changes (row 0: {position[0]:.4g}) although "
+                f"the command moves by {np.ptp(command):.3g} rad"
+            )
+        if min(np.ptp(command), np.ptp(position)) < MOVES:
+            continue
+        own = _correlation(command, position)
+        row = int(np.argmax(np.abs(position - command)))
+        if own < -0.8:
+            raise InputError(
+                f"{path}: column '{joint.name}.position', row {row}: {position[row]:.4g} at command "
+                f"{command[row]:.4g}: the joint moves against its command (correlation {own:.2f}); flip the sign"
+            )
+        others = [_correlation(other, position) if np.ptp(other) > MOVES else 0.0 for other in columns.command.T]
+        leader = int(np.argmax(others))
+        if own < 0.4 and others[leader] > 0.9:
+            raise InputError(
+                f"{path}: column '{joint.name}.position', row {row}: it follows the command of "
+                f"'{joints[leader].name}' (correlation {others[leader]:.2f}), not its own ({own:.2f}); "
+                "are the joints swapped?"
+            )
+    return warnings
+
+
+def _correlation(first: Array, second: Array) -> float:
+    a, b = first - first.mean(), second - second.mean()
+    scale = float(np.sqrt(np.sum(a * a) * np.sum(b * b)))
+    return float(np.sum(a * b)) / scale if scale > 0 else 0.0

@@ -1,0 +1,103 @@
+"""A recording on disk: recording.yaml, the rig's URDF and one table a trial, read and checked."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from tactile_cube.drivetrain.plain_yaml import read_schema
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.columns import pick_columns
+from tactile_cube.measurement.recordings.consistency import (
+    check_coupling,
+    check_joints,
+    check_nominal,
+    gains_of,
+    joints_where,
+)
+from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
+from tactile_cube.measurement.recordings.plausibility import check_assignment, check_units
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.rig import Rig, read_rig
+from tactile_cube.measurement.recordings.statics import swap_warning
+from tactile_cube.measurement.recordings.tables import read_table
+from tactile_cube.measurement.recordings.timing import check_time, on_grid
+from tactile_cube.measurement.recordings.trial import Trial, load_of
+
+DESCRIPTION = "recording.yaml"
+
+
+def read_recording(folder: str | Path) -> Recording:
+    """The recording in a folder, checked and on a uniform time grid.
+
+    Raises:
+        InputError: naming file, column, row and value of what cannot be used.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"recording={folder}: no such folder; a recording is a folder with {DESCRIPTION} in it")
+    file = folder / DESCRIPTION
+    description = read_schema(file, Description)
+    rig = read_rig(_inside(folder, description.rig, "rig"))
+    check_joints(description, rig, file)
+    try:
+        recording = _assemble(folder, description, rig)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"{file}: {error}") from None
+    swapped = swap_warning(recording)
+    return recording if swapped is None else replace(recording, warnings=(*recording.warnings, swapped))
+
+
+def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
+    joints = tuple(description.joints)
+    nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
+    check_nominal(nominal, joints)
+    warnings = [f"{folder / DESCRIPTION}: {line}" for line in check_coupling(description, rig)]
+    trials, gains = [], gains_of(description, None, "controller")
+    if description.controller.mode != "torque" and (gains.kd == 0).any():
+        warnings.append(
+            f"{folder / DESCRIPTION}: key 'controller.kd': 0 for {joints_where(gains.kd == 0, joints)}: no damping"
+        )
+    for index, entry in enumerate(description.trials):
+        trial = read_trial(folder, entry, description, rig, f"trials.{index}.controller")
+        trials.append(trial)
+        warnings += trial.warnings
+    return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
+
+
+def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
+    """One trial, checked and on the uniform grid of the recording's rate."""
+    path = _inside(folder, entry.file, "trials.file")
+    joints = tuple(description.joints)
+    gains = gains_of(description, entry, key)
+    columns, warnings = pick_columns(read_table(path), joints, path)
+    columns, time_warnings = check_time(columns, description.rate_hz, path)
+    limits = [rig.joints[joint] for joint in joints]
+    if description.controller.mode == "position":
+        warnings += check_units(columns, limits, gains, path)
+        warnings += check_assignment(columns, limits, path) if entry.object is None else []
+    grid, valid = on_grid(columns, description.rate_hz)
+    return Trial(
+        path.stem,
+        entry.file,
+        entry.kind,
+        entry.initialisation,
+        grid.time,
+        grid.command,
+        grid.position,
+        grid.torque,
+        valid,
+        gains,
+        entry.force,
+        entry.clamped,
+        entry.touch,
+        tuple(warnings + time_warnings),
+        load_of(description.object, entry.object) if description.object and entry.object else None,
+    )
+
+
+def _inside(folder: Path, name: str, key: str) -> Path:
+    path = folder / name
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise InputError(f"{folder / DESCRIPTION}: key '{key}': '{name}' lies outside the recording's folder")
+    return path

@@ -1,0 +1,91 @@
+"""What was measured on a rig: its description, the mechanism, the controller and the trials."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.recordings.description import Coupling, Description
+from tactile_cube.measurement.recordings.rig import Rig
+from tactile_cube.measurement.recordings.trial import Gains, Trial
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was measured on a rig.
+
+    Attributes:
+        folder: where it lies.
+        description: recording.yaml.
+        rig: the mechanism.
+        gains: the controller, each gain of shape (joints,).
+        nominal: what the owner believes, key -> (joints,).
+        trials: in the order of recording.yaml.
+        warnings: what was odd but could be used, one line each.
+    """
+
+    folder: Path
+    description: Description
+    rig: Rig
+    gains: Gains
+    nominal: dict[str, Array]
+    trials: tuple[Trial, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.resolve().name
+
+    @property
+    def urdf(self) -> str:
+        """Text of the URDF."""
+        return self.rig.text
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Actuated joints in column order."""
+        return tuple(self.description.joints)
+
+    @property
+    def coupled(self) -> dict[str, Coupling]:
+        """Joints that follow another one."""
+        return self.description.coupled
+
+    @property
+    def gravity(self) -> Array:
+        """Gravity in the base frame, shape (3,) [m/s^2]."""
+        return np.asarray(self.description.gravity, dtype=np.float64)
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return self.description.rate_hz
+
+    @property
+    def step(self) -> float:
+        """Time between samples [s]."""
+        return 1.0 / self.rate
+
+    @property
+    def read(self) -> Literal["after", "before"]:
+        """Whether a row shows the state at the end of the period in which its command acted, or at its beginning."""
+        return self.description.sensors.read
+
+    @property
+    def torque_controlled(self) -> bool:
+        """Whether commands are torques [N m]."""
+        return self.description.controller.mode == "torque"
+
+    def stated(self, constant: str, joint: str) -> float | None:
+        """What the owner states of a constant of one joint, or None."""
+        values = getattr(self.gains, constant, self.nominal.get(constant))
+        return None if values is None else float(values[self.joints.index(joint)])
+
+    def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> "Recording":
+        """The same rig with these trials alone."""
+        return replace(self, trials=tuple(trials))

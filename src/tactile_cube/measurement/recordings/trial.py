@@ -1,0 +1,116 @@
+"""One trial on a uniform time grid: what was commanded and what was measured."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.recordings.description import Grasp, HeldObject, KnownForce, Touch
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Controller of one trial: kp [N m/rad], kd [N m s/rad], torque_limit [N m], each of shape (joints,)."""
+
+    kp: Array
+    kd: Array
+    torque_limit: Array
+
+
+@dataclass(frozen=True)
+class Load:
+    """The object of a trial in which the hand holds one.
+
+    Attributes:
+        size: edge lengths (3,) [m].
+        mass: [kg].
+        com: centre of mass from the box's centre, in its frame (3,) [m].
+        position: of its centre in the rig's base frame at the start (3,) [m].
+        quaternion: of its orientation there (4,), xyzw.
+        released: until when its weight is borne by something else [s].
+    """
+
+    size: Array
+    mass: float
+    com: Array
+    position: Array
+    quaternion: Array
+    released: float
+
+
+def load_of(held: HeldObject, grasp: Grasp) -> Load:
+    """The recording's object as a trial has it."""
+    size = held.size if grasp.size is None else grasp.size
+    return Load(
+        size=np.broadcast_to(np.asarray(size, dtype=np.float64), (3,)).copy(),
+        mass=held.mass if grasp.mass is None else grasp.mass,
+        com=np.array(held.com if grasp.com is None else grasp.com, dtype=np.float64),
+        position=np.array(grasp.position, dtype=np.float64),
+        quaternion=np.array(grasp.quaternion, dtype=np.float64),
+        released=grasp.released,
+    )
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial; `command[k]` acts from `time[k]` to `time[k + 1]`, `sensors.read` says when `position[k]` was read.
+
+    Attributes:
+        name: file name without its ending.
+        file: path inside the recording's folder.
+        kind: kind of excitation; trials of one kind repeat one command.
+        initialisation: robot initialisation it belongs to; each has joint offsets of its own.
+        time: (n,) uniform, starts at 0 [s].
+        command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
+        position: (n, joints) measured position, on the motor side [rad].
+        torque: (n, joints) measured torque [N m], or None.
+        valid: (n,) False where a dropped sample was interpolated; such samples count in no error.
+        gains: the controller in this trial.
+        force: a known force on a link, or None.
+        clamped: the links were held still.
+        touch: the link ended at a known place, or None.
+        load: the object that the hand held, or None.
+    """
+
+    name: str
+    file: str
+    kind: str
+    initialisation: int
+    time: Array
+    command: Array
+    position: Array
+    torque: Array | None
+    valid: NDArray[np.bool_]
+    gains: Gains
+    force: KnownForce | None = None
+    clamped: bool = False
+    touch: Touch | None = None
+    warnings: tuple[str, ...] = field(default=(), repr=False)
+    load: Load | None = None
+
+    @property
+    def is_bench(self) -> bool:
+        """Whether it is a bench test, and not free motion."""
+        return self.clamped or any(one is not None for one in (self.force, self.touch, self.load))
+
+    @property
+    def step(self) -> float:
+        """Time between samples [s]."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def duration(self) -> float:
+        """Length of the trial [s]."""
+        return float(self.time[-1])
+
+    def velocity(self, window: float = 0.03) -> Array:
+        """Measured velocity (n, joints) [rad/s]: slope of a straight line through a sliding window [s].
+
+        The window keeps quantisation out; a recording's sensor gives no velocity of its own.
+        """
+        half = max(1, min(round(0.5 * window / self.step), (len(self.time) - 1) // 2))
+        lever = np.arange(-half, half + 1) / self.step / np.sum(np.arange(-half, half + 1) ** 2)
+        padded = np.pad(self.position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+        return np.stack([np.convolve(column, lever[::-1], mode="valid") for column in padded.T], axis=1)

@@ -1,0 +1,71 @@
+"""Write a recording: recording.yaml, rig.urdf and one table a trial."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars
+import yaml
+from numpy.typing import NDArray
+
+from tactile_cube.measurement.recordings.description import Description, TrialEntry
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TrialTable:
+    """One trial to be written: its entry, time (n,) [s] and signals (n, joints); torque may be None."""
+
+    entry: TrialEntry
+    time: Array
+    command: Array
+    position: Array
+    torque: Array | None = None
+
+
+@dataclass(frozen=True)
+class RecordingTables:
+    """A recording to be written: recording.yaml (its trials come from the tables), the URDF's text, the trials."""
+
+    description: Description
+    urdf: str
+    tables: Sequence[TrialTable]
+
+
+def write_recording(folder: Path, recording: RecordingTables) -> None:
+    """Write a recording into a folder."""
+    description, tables = recording.description, recording.tables
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / description.rig).write_text(recording.urdf, encoding="utf-8")
+    entries = [table.entry for table in tables]
+    data = description.model_dump(exclude_defaults=True, exclude_none=True, exclude={"trials"})
+    ordered = {"format": 1, "rig": description.rig} | data | {"trials": [_entry(entry) for entry in entries]}
+    text = yaml.safe_dump(ordered, sort_keys=False, allow_unicode=True)
+    (folder / "recording.yaml").write_text(text, encoding="utf-8")
+    for table in tables:
+        write_table(folder / table.entry.file, table, description.joints)
+
+
+def _entry(entry: TrialEntry) -> dict[str, object]:
+    """File, initialisation and kind always, the rest where it was said."""
+    always = {"file": entry.file, "initialisation": entry.initialisation, "kind": entry.kind}
+    return always | entry.model_dump(exclude_defaults=True, exclude_none=True)
+
+
+def write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
+    """Write one trial as Parquet, CSV or NPZ, by the ending of `path`; signals as 32-bit numbers, time as 64-bit."""
+    columns: dict[str, NDArray[np.floating]] = {"time": table.time}
+    for index, joint in enumerate(joints):
+        columns[f"{joint}.command"] = table.command[:, index].astype(np.float32)
+        columns[f"{joint}.position"] = table.position[:, index].astype(np.float32)
+        if table.torque is not None:
+            columns[f"{joint}.torque"] = table.torque[:, index].astype(np.float32)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix == ".npz":
+        np.savez_compressed(path, allow_pickle=False, **columns)
+    elif path.suffix == ".csv":
+        polars.DataFrame(columns).write_csv(path)
+    else:
+        polars.DataFrame(columns).write_parquet(path)

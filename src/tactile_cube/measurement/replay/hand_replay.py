@@ -1,0 +1,171 @@
+"""Trials in which the whole hand holds an object, simulated in the world that training uses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.errors import InputError
+from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand.model import JOINTS_PER_FINGER
+from tactile_cube.measurement.recordings.reading import DESCRIPTION
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Load, Trial
+from tactile_cube.measurement.replay.parameters import Parameters
+from tactile_cube.measurement.replay.rig_replay import Simulated
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
+from tactile_cube.simulation.contact_effects import contact_catalogue
+from tactile_cube.simulation.pose import to_world
+
+Array = NDArray[np.float64]
+NO_FILTER = 1e-6  # [s] a recording's commands are what reaches the controller, already filtered
+RIGID = 1e6  # [N m/rad] of a drive without a stated elasticity
+LEAST_INERTIA = 5e-4  # [kg m^2] below which the torque loop is unstable; the world's own value is taken instead
+START = 3  # first samples, whose mean is the start
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Values of contact effects, effect -> parameter -> value; what is left out is neutral."""
+
+    values: Mapping[str, Mapping[str, float]]
+
+    def apply(self, constants: EpisodeConstants) -> EpisodeConstants:
+        """The constants of an episode with these effects."""
+        for name, values in self.values.items():
+            constants = contact_catalogue()[name].apply(constants, values)
+        return constants
+
+    def without_neutral(self) -> frozenset[tuple[str, str, float]]:
+        """(effect, parameter, value) of all that differs from the world of the paper."""
+        neutral = {(name, p.name): p.neutral for name in self.values for p in contact_catalogue()[name].parameters}
+        every = [(name, key, value) for name, values in self.values.items() for key, value in values.items()]
+        return frozenset(one for one in every if one[2] != neutral[one[:2]])
+
+    def changed(self, effect: str, **values: float) -> Contact:
+        """The same with other values of one effect."""
+        return Contact({**self.values, effect: {**self.values.get(effect, {}), **values}})
+
+
+def contact_of(model: ModelFile | None) -> Contact:
+    """What a model file says about fingertips and object."""
+    effects = model.object_effects if model is not None else []
+    return Contact({one.name: {key: e.value for key, e in one.parameters.items()} for one in effects})
+
+
+class HandReplay:
+    """One world for all trials with an object of a recording.
+
+    Attributes:
+        finger_of: which finger each joint of the recording belongs to (joints,).
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        parameters: Parameters,
+        step: float = 0.002,
+        iterations: int = 30,
+        hand: HandModel = DLR_HAND2,
+    ) -> None:
+        """Builds the world.
+
+        Args:
+            recording: of the whole hand.
+            parameters: constants and effects of the drivetrain; their posture is not used.
+            step: longest physics step [s].
+            iterations: of the contact solver.
+            hand: the hand that was recorded.
+
+        Raises:
+            InputError: the recording is of another mechanism, or its commands are torques.
+        """
+        _require_hand(recording, hand)
+        self.recording, self.hand = recording, hand
+        self._order = [recording.joints.index(name) for name in hand.joint_names]
+        self._back = np.argsort(self._order)
+        self.finger_of = self._back // JOINTS_PER_FINGER
+        self._parameters = parameters
+        substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
+        options = SimulationOptions(dt=recording.step / substeps, substeps=substeps, solver_iterations=iterations)
+        effects = [
+            cls(joint, **values)
+            for name, values in self._parameters.effects
+            for cls, joint in resolve([name], recording.joints)
+        ]
+        self._world = World(hand, options, effects)
+        self._nominal = self._constants()
+
+    def close(self) -> None:
+        """Ends the physics server."""
+        self._world.close()
+
+    def simulate(self, trial: Trial, contact: Contact, offset: Array, until: float = np.inf) -> Simulated:
+        """One trial from its measured start.
+
+        Args:
+            trial: with an object.
+            contact: values of contact effects.
+            offset: what the sensors read too much (joints,) [rad].
+            until: time at which the simulation may end [s].
+        """
+        load = trial.load
+        assert load is not None, "only trials with an object are simulated here"
+        constants = contact.apply(replace(self._of_load(load), joint_offset=offset[self._order]))
+        self._world.reset(constants, self._start(trial, load, offset, np.asarray(constants.stiffness)))
+        rows = min(len(trial.time), round(min(until, trial.duration + trial.step) * self.recording.rate))
+        position, torque = np.zeros((2, rows, len(self._order)))
+        before = self.recording.read == "before"
+        for k, command in enumerate(trial.command[:rows, self._order]):
+            if not before:
+                self._world.step(command)
+            position[k], torque[k] = self._world.q_m, self._world.torque
+            if before:
+                self._world.step(command)
+        return Simulated(position[:, self._back], torque[:, self._back])
+
+    def _constants(self) -> EpisodeConstants:
+        """What is known of the drivetrain, as the world names it."""
+        own = {key: value[self._order] for key, value in self._parameters.constants.items()}
+        inertia, default = own["reflected_inertia"], EpisodeConstants().reflected_inertia
+        gravity = self.hand.rotation @ self.recording.gravity
+        strength = float(np.linalg.norm(gravity))
+        return EpisodeConstants(
+            gravity=strength or 1e-9,
+            gravity_direction=gravity / strength if strength else (0.0, 0.0, -1.0),
+            filter_time=NO_FILTER,
+            torque_limit=float(own["torque_limit"].min()),
+            kp=own["kp"],
+            kd=own["kd"],
+            stiffness=np.minimum(own["stiffness"], RIGID),
+            static_friction=own["static_friction"],
+            reflected_inertia=np.where(inertia < LEAST_INERTIA, default, inertia),
+        )
+
+    def _of_load(self, load: Load) -> EpisodeConstants:
+        onset = round(load.released * self.recording.rate)
+        return replace(self._nominal, cube_size=load.size, cube_mass=load.mass, cube_com=load.com, gravity_onset=onset)
+
+    def _start(self, trial: Trial, load: Load, offset: Array, stiffness: Array) -> Start:
+        position = trial.position[:START].mean(axis=0)
+        twist = (trial.gains.kp * (trial.command[0] - position))[self._order] / stiffness
+        place, quaternion = to_world(self.hand, load.position, load.quaternion)
+        angles = (position - offset)[self._order] - twist
+        return Start(angles, place, quaternion, target=trial.command[0, self._order])
+
+
+def _require_hand(recording: Recording, hand: HandModel) -> None:
+    file = recording.folder / DESCRIPTION
+    if sorted(recording.joints) != sorted(hand.joint_names):
+        raise InputError(
+            f"{file}: key 'joints': received {list(recording.joints)}; trials with an object are simulated with the "
+            f"whole hand and need its joints {list(hand.joint_names)} and its rig.urdf "
+            "(python -m tactile_cube.record source=grasp writes them)"
+        )
+    if recording.torque_controlled:
+        raise InputError(f"{file}: key 'controller.mode': received torque; trials with an object need mode position")

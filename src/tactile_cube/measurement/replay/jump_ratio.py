@@ -1,0 +1,50 @@
+"""How much of a jump of the command the sensors show at once, whatever effects lie between."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain import Plant
+from tactile_cube.drivetrain.effects.backlash import Backlash
+from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION, TORQUE
+from tactile_cube.measurement.replay.read_out import free_way
+
+Array = NDArray[np.float64]
+PROBE = 0.05  # [rad] beyond every dead zone, below the torque limits
+
+
+def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Array]:
+    """Jump of the measured position [1] and of the torque [N m/rad] per jump of the command that acts, each (n,).
+
+    What a motor follows freely within a gap is no part of either, see `free_way`.
+
+    Two steps of a copy, with and without a jump in the second one. An effect that holds the command back, such as a
+    delay, does not let the probe pass; then the plain drive's ratio holds, for the jump comes later.
+
+    Args:
+        plant: the drivetrain.
+        memory: (size,) the model at the start of a trial; left as it is.
+        command: (n,) [rad].
+    """
+    seen = []
+    for jump in (0.0, PROBE):
+        copy = memory.copy()
+        plant.kernel.step(command, copy)
+        plant.kernel.step(command + jump, copy)
+        seen.append([plant.signal(copy, row).copy() for row in (MOTOR_POSITION, TORQUE, COMMAND, LEAD)])
+    position, torque, acted, _ = np.array(seen[1]) - np.array(seen[0])
+    passed = np.abs(acted) > 0.5 * PROBE
+    free = free_way(seen[1][-1], acted, gaps(plant, memory))
+    position, acted = position - free, np.where(passed, acted - free, 1.0)
+    kp, compliance = plant.view(memory, "kp"), plant.view(memory, "compliance")
+    plain = kp / (1.0 + kp * compliance)
+    return np.where(passed, position / acted, plain * compliance), np.where(passed, torque / acted, plain)
+
+
+def gaps(plant: Plant, memory: Array) -> Array:
+    """Width of the gap in each joint's transmission (n,) [rad]; 0 without one. `memory` is (size,)."""
+    if Backlash not in plant.effects:
+        return np.zeros(len(plant.joint_names))
+    width = plant.view(memory, "parameters:backlash")[:, [p.name for p in Backlash.parameters].index("gap")]
+    return np.asarray(np.where(plant.view(memory, "active:backlash") != 0.0, width, 0.0))

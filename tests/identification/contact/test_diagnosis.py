@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.model_file import ModelFile, Provenance
+from tactile_cube.identification.contact.choice import ContactSearch
+from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, verdict_of, with_contact
+from tactile_cube.measurement.comparing.error import ErrorSummary
+from tactile_cube.measurement.replay.hand_replay import Contact
+from tests.identification.easy_contact import EasyTrial, GrippedTrial, friction
+
+
+def search(lateral: float = 0.9, spinning: float = 0.1) -> ContactSearch:
+    trials = [friction(kind, k, lateral, spinning) for k in range(3) for kind in ("hold", "twist")]
+    made = ContactSearch(trials[:4], trials[4:], lambda line: None)  # type: ignore[arg-type]
+    made.run(Contact({}))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("truth", "names"),
+    [
+        ({}, []),
+        ({"lateral": 0.5}, ["lateral_friction"]),
+        ({"spinning": 0.02}, ["spinning_friction"]),
+        ({"lateral": 0.5, "spinning": 0.02}, ["spinning_friction", "lateral_friction"]),
+    ],
+)
+def test_the_effects_that_are_missing_are_found_and_no_others(truth: dict[str, float], names: list[str]) -> None:
+    found = search(**truth)
+    assert [one.effect.name for one in found.found] == names
+    assert verdict_of(found, 1e-3) == ("missing_effect" if names else "adequate")
+
+
+@pytest.mark.parametrize(("size", "names"), [(0.0, []), (0.006, ["object_size"])])
+def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list[str]) -> None:
+    trials = [GrippedTrial("hold", k, {("object_size", "excess"): size}, {}) for k in range(4)]
+    found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
+    found.run(Contact({}))
+    assert [one.effect.name for one in found.found] == names
+    assert [one.gain_of for one in found.found] == ["offsets"] * len(names)  # and not of the error, which stays
+    assert found.rivals == []
+
+
+def test_what_no_effect_explains_is_unknown() -> None:
+    found = search()
+    assert verdict_of(found, 0.02) == "unknown_effect"
+
+
+def test_an_effect_that_explains_as_much_is_a_rival() -> None:
+    key, other = ("lateral_friction", "coefficient"), ("tip_compliance", "compliance")
+
+    class Confused(EasyTrial):
+        def residual(self, contact: Contact) -> np.ndarray:
+            soft = contact.values.get(other[0], {}).get(other[1], 0.0)
+            rough = contact.values.get(key[0], {}).get(key[1], 0.9)
+            off = min(abs(np.log(rough / 0.5)), abs(soft / 1e-3 - 1))
+            return 1e-3 * self.noise + 1e-2 * off
+
+    trials = [Confused("hold", k, {}, {}) for k in range(4)]
+    found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
+    found.run(Contact({}))
+    assert verdict_of(found, 1e-3) == "ambiguous"
+    named = {found.found[-1].effect.name, *(one.effect.name for one in found.rivals)}
+    assert named == {"lateral_friction", "tip_compliance"}
+
+
+def diagnosis(lateral: float) -> ContactDiagnosis:
+    made = search(lateral)
+    stages = {key: ErrorSummary(1e-3, {"a": 1e-3}) for key in ("nominal", "with_effects")}
+    return ContactDiagnosis(verdict_of(made, 1e-3), made.found, made.rivals, made.tried, {}, stages, 2e-4, ["hold_3"])
+
+
+def test_the_answer_has_the_keys_of_diagnosis_json() -> None:
+    result = diagnosis(0.5).as_json()
+    assert result["verdict"] == "missing_effect"
+    (entry,) = result["effects"]
+    assert (entry["name"], entry["rivals"]) == ("lateral_friction", [])
+    assert entry["heldout_gain"] > 0.5
+    assert entry["p_value"] < 0.05
+    assert set(entry["parameters"]["coefficient"]) == {"value", "low", "high", "unit"}
+    assert set(result["error"]) == {"nominal", "refitted", "with_effects", "noise_floor"}
+
+
+@pytest.mark.parametrize(
+    ("drive", "lateral", "verdict"),
+    [
+        ("adequate", 0.9, "adequate"),
+        ("adequate", 0.5, "missing_effect"),
+        ("missing_effect", 0.9, "missing_effect"),
+        ("unknown_effect", 0.5, "unknown_effect"),
+    ],
+)
+def test_the_verdicts_on_drivetrain_and_contact_become_one(drive: str, lateral: float, verdict: str) -> None:
+    result = {"verdict": drive, "effects": [], "partial_effects": []}
+    assert with_contact(result, diagnosis(lateral))["verdict"] == verdict
+
+
+def test_the_model_file_tells_which_trials_judged() -> None:
+    model = ModelFile(joints=["a"], provenance=Provenance(trials=["hold_0", "hold_3"]))
+    made = diagnosis(0.5).into(model, alone=True)
+    assert (made.provenance.trials, made.provenance.held_out) == (["hold_0"], ["hold_3"])
+
+
+def test_an_adequate_contact_adds_nothing_to_the_model() -> None:
+    model = ModelFile(joints=["a"])
+    assert diagnosis(0.9).into(model, alone=False).effects == []

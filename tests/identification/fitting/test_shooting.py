@@ -1,0 +1,79 @@
+"""Multiple shooting against the free-running replay, where a gap of the transmission hides the links."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.drivetrain.effects.backlash import Backlash
+from tactile_cube.identification.fitting.base import nominal_model
+from tactile_cube.identification.fitting.beginnings import with_beginnings
+from tactile_cube.identification.fitting.model import Model, Term
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.stretches import Stretches, cut
+from tactile_cube.identification.free_run import free_run
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tests.measurement.small_rig import write
+
+GAP = 0.03
+NOISE = np.full(2, 1e-4)
+EFFECTS = tuple(catalogue().values())  # as the replay: one kernel is compiled for both
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    """Commands of two joints at 100 Hz, far apart: every row's jump moves a free motor at once."""
+    whole = read_recording(write(tmp_path))
+    return whole.with_trials(whole.trials[:1])
+
+
+def with_gap(recording: Recording) -> Model:
+    plain = nominal_model(recording)
+    return replace(plain, terms=(Term(Backlash, "b", {"play": 0.0, "gap": GAP}, ("gap",)),))
+
+
+def measured(recording: Recording, model: Model) -> Recording:
+    """The recording as a fine free-running simulation would have logged it."""
+    (result,) = free_run(recording, model, "fast", 5e-4)
+    return recording.with_trials((replace(recording.trials[0], position=result.position),))
+
+
+@pytest.mark.parametrize("gap", [True, False])
+def test_segments_show_what_the_replay_logs(recording: Recording, gap: bool) -> None:
+    model = with_gap(recording) if gap else nominal_model(recording)
+    logged = measured(recording, model)
+    stretches = cut(logged, NOISE)
+    error = (Shooting(logged, EFFECTS).positions([model], stretches)[0] - stretches.measured)[stretches.weight > 0.0]
+    assert np.sqrt(np.mean(error**2)) < 5e-4, "a motor that floats jumps with the whole command"
+
+
+def hidden_start(recording: Recording, place: float) -> tuple[Shooting, Model, Stretches]:
+    """Stretches whose measurement began with the link of b at `place` [rad] from the middle of its gap, at rest."""
+    model, stretches = with_gap(recording), cut(recording, NOISE)
+    shooting = Shooting(recording, EFFECTS)
+    beginning = np.zeros_like(stretches.beginning)
+    beginning[:, 1], beginning[:, 3] = place, -stretches.speed[:, 0, 1]
+    seen = shooting.positions_from(model, [beginning], stretches)[0]
+    return shooting, model, replace(stretches, measured=seen)
+
+
+@pytest.mark.parametrize("place", [-0.4 * GAP, 0.3 * GAP])
+def test_the_place_of_a_hidden_link_at_the_start_is_found(recording: Recording, place: float) -> None:
+    shooting, model, stretches = hidden_start(recording, place)
+    found = with_beginnings(shooting, model, stretches)
+
+    def error(of: Stretches) -> float:
+        residual = (shooting.positions([model], of)[0] - of.measured)[:, : of.segment]
+        return float(np.sqrt(np.mean(residual**2)))
+
+    assert error(found) < 0.2 * error(stretches)
+    assert np.all(found.beginning[:, [0, 2]] == 0.0), "the joint without a gap is where its sensor says"
+    assert found.beginning[0, 1] == pytest.approx(place, abs=0.1 * GAP)
+
+
+def test_without_a_gap_every_trial_begins_where_its_sensors_say(recording: Recording) -> None:
+    stretches = cut(recording, NOISE)
+    assert with_beginnings(Shooting(recording, EFFECTS), nominal_model(recording), stretches) is stretches

@@ -1,0 +1,86 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.identification.fitting.noise import sensor_noise
+from tactile_cube.identification.fitting.stretches import Drive, _states, cut, steps_per_row
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tests.measurement.small_rig import write
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    return read_recording(write(tmp_path))
+
+
+def test_the_sensor_noise_is_read_from_the_positions(recording: Recording) -> None:
+    assert sensor_noise(recording) == pytest.approx([2e-4, 2e-4], rel=0.25)
+
+
+def test_every_sample_is_in_exactly_one_segment(recording: Recording) -> None:
+    stretches = cut(recording, np.array([2e-4, 2e-4]))
+    counted = np.count_nonzero(stretches.weight[..., 0])
+    assert counted == sum(len(trial.time) for trial in recording.trials)
+
+
+def test_dropped_samples_weigh_nothing(recording: Recording) -> None:
+    trial = recording.trials[0]
+    trial.valid[10:20] = False
+    weight = cut(recording, np.array([2e-4, 2e-4]), [trial]).weight
+    assert np.count_nonzero(weight[0, 10:20]) == 0
+    assert np.count_nonzero(weight[0, :10]) == 20
+
+
+def test_segments_start_where_the_joint_was_measured(recording: Recording) -> None:
+    stretches = cut(recording, np.array([2e-4, 2e-4]), recording.trials[:1])
+    row = 3 * stretches.segment
+    phase = 2 * np.pi * 0.8 * (row / 100 - 0.02)
+    assert stretches.position[0, 3, 0] == pytest.approx(0.3 * np.sin(phase), abs=1e-3)
+    assert stretches.speed[0, 3, 0] == pytest.approx(0.3 * 2 * np.pi * 0.8 * np.cos(phase), abs=0.05)
+
+
+def test_slow_recordings_are_simulated_in_finer_steps(recording: Recording) -> None:
+    stretches = cut(recording, np.array([2e-4, 2e-4]))
+    assert steps_per_row(recording) == stretches.substeps == 5
+    rows = stretches.history + stretches.measured.shape[1]
+    assert stretches.commands.shape[1] == 5 * rows
+
+
+def test_the_first_step_of_a_row_takes_the_mean_of_two_commands(recording: Recording) -> None:
+    trial = recording.trials[0]
+    stretches = cut(recording, np.array([2e-4, 2e-4]), [trial])
+    first = stretches.history * stretches.substeps
+    assert stretches.commands[0, first] == pytest.approx(0.5 * (trial.command[0] + trial.command[1]))
+    assert stretches.commands[0, first + 1] == pytest.approx(trial.command[1])
+
+
+def test_taking_stretches_keeps_rows_together(recording: Recording) -> None:
+    stretches = cut(recording, np.array([2e-4, 2e-4]))
+    last = stretches.take(np.array([len(stretches) - 1]))
+    assert last.trial.tolist() == [1]
+    assert np.array_equal(last.measured[0], stretches.measured[-1])
+
+
+def test_a_later_stretch_wakes_the_memories_of_effects_before_its_samples_count(recording: Recording) -> None:
+    stretches = cut(recording, np.array([2e-4, 2e-4]), segment=10)
+    later = stretches.time > 0.0
+    assert later.any()
+    assert not stretches.weight[later, :10].any()
+    assert stretches.weight[later, 10:11].all()
+
+
+def test_a_start_in_the_middle_of_a_jerk_is_read_without_bias(recording: Recording) -> None:
+    """3 rad/s reached and lost within 60 ms, sampled at 500 Hz, under a command with a kink."""
+    time, row = np.arange(200) / 500.0, 88
+    pulse = np.exp(-0.5 * ((time - time[100]) / 0.03) ** 2)
+    link = np.repeat(np.cumsum(3.0 * pulse)[:, None] / 500.0, 2, axis=1)
+    command = link + np.maximum(time - time[row], 0.0)[:, None]
+    drive = Drive(*(np.full(2, value) for value in (4.0, 0.0, 1.0, 0.04)))
+    motor = (link + 4.0 * 0.04 * command) / (1.0 + 4.0 * 0.04)
+    trial = replace(recording.trials[0], time=time, position=motor)
+    position, speed, _ = _states(trial, command, np.zeros_like(command), drive, np.array([row]))
+    assert position[0] == pytest.approx(motor[row])
+    assert speed[0] == pytest.approx(3.0 * pulse[row], abs=0.06)

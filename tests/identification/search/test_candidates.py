@@ -1,0 +1,64 @@
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.search.candidates import Candidate, _mirrored, candidates
+from tactile_cube.identification.search.screening import Score
+from tactile_cube.identification.search.shortlist import resized
+from tactile_cube.measurement.recordings.reading import read_recording
+from tests.measurement.small_rig import write
+
+SCORE = Score(Candidate(find_effect("command_delay"), ("q1",), {"delay": 0.005}), Model({}, (), {}), 1.0, 3.0)
+
+
+def test_several_numbers_start_with_either_sign() -> None:
+    form = {"difference": 0.02, "friction": 0.02}
+    assert _mirrored(find_effect("asymmetric_friction"), form) == [{"difference": -0.02, "friction": 0.02}]
+
+
+def test_a_single_number_and_a_place_have_no_other_sign() -> None:
+    assert _mirrored(find_effect("torque_bias"), {"bias": 0.005}) == []
+    assert _mirrored(find_effect("joint_stop"), {"upper": 1.0, "stiffness": 5.0}) == []
+
+
+def test_a_single_number_starts_as_large_as_the_first_look_says() -> None:
+    assert resized(SCORE).form["delay"] == pytest.approx(0.015)
+
+
+@pytest.mark.parametrize(
+    "score",
+    [
+        replace(SCORE, factor=50.0),
+        replace(SCORE, candidate=Candidate(find_effect("torque_saturation"), ("q1",), {"limit": 0.1})),
+    ],
+    ids=["not believed", "a limit is no size"],
+)
+def test_other_starts_stay(score: Score) -> None:
+    assert resized(score) is score.candidate
+
+
+def test_a_stiffening_drive_starts_where_its_bend_can_be_seen(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))
+    found = [c for c in candidates(recording, [find_effect("stiffening_elasticity")]) if c.joints == ("a",)]
+    torque = [3.0 * (t.command - t.position) - 0.2 * t.velocity() for t in recording.trials]
+    usual = float(np.quantile(np.abs(np.concatenate(torque)[:, 0]), 0.9))
+    bends = [c.form["cubic"] * (c.form["compliance"] * usual) ** 3 / usual for c in found]
+    assert sorted(bends) == pytest.approx([1.0, 100.0, 1e4], rel=0.01)  # beyond, at and below the usual torques
+
+
+def test_where_torques_are_commanded_a_saturation_starts_among_them(tmp_path: Path) -> None:
+    def commanded(data: dict[str, Any]) -> None:
+        data["controller"] = {"mode": "torque"}
+
+    recording = read_recording(write(tmp_path, commanded))
+    found = candidates(recording, [find_effect("torque_saturation")])
+    largest = max(np.abs(t.command[:, 0]).max() for t in recording.trials)
+    starts = [c.form["limit"] for c in found if c.joints == ("a",)]
+    assert len(starts) == 9
+    assert all(0.2 * largest < start <= largest for start in starts)
+    np.testing.assert_allclose(np.diff(np.log(starts)), np.log(starts[1] / starts[0]))  # no wide gap between any two

@@ -1,0 +1,33 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.measurement.comparing.error import residuals, summarise
+from tactile_cube.measurement.recordings.reading import read_recording
+from tests.measurement.small_rig import write
+
+
+def test_the_offset_of_each_initialisation_is_removed_and_nothing_else(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))
+    trials = recording.trials
+    wave = 1e-3 * np.sin(np.linspace(0, 20 * np.pi, 300, endpoint=False))[:, None] * [1.0, 0.0]
+    simulated = [t.position - wave + 0.02 * (t.initialisation + 1) for t in trials]
+    summary = summarise(residuals(trials, simulated), recording.joints)
+    assert summary.joints["a"] == pytest.approx(1e-3 / np.sqrt(2), rel=1e-6)
+    assert summary.joints["b"] == pytest.approx(0.0, abs=1e-12)
+    assert summary.overall == pytest.approx(1e-3 / 2, rel=1e-6)
+
+
+def test_bridged_samples_count_in_no_error(tmp_path: Path) -> None:
+    def spoil(columns: dict) -> None:
+        rows = np.delete(np.arange(300), [100])
+        for name in columns:
+            columns[name] = columns[name][rows]
+
+    recording = read_recording(write(tmp_path, spoil=spoil))
+    simulated = [trial.position.copy() for trial in recording.trials]
+    simulated[0][100] += 1.0
+    errors = residuals(recording.trials, simulated)
+    assert np.isnan(errors[0][100]).all()
+    assert summarise(errors, recording.joints).overall == 0.0

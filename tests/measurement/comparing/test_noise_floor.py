@@ -1,0 +1,61 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.measurement.comparing.error import ErrorSummary
+from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
+from tactile_cube.measurement.comparing.repeats import aligned_repeats
+from tactile_cube.measurement.recordings.reading import read_recording
+from tests.measurement.small_rig import table, write
+
+
+def test_repeats_give_the_sensor_noise_and_not_the_joint_offset(tmp_path: Path) -> None:
+    floor = noise_floor(read_recording(write(tmp_path)))
+    assert floor.source == "repeats"
+    assert floor.repeats == 2
+    assert floor.overall == pytest.approx(2e-4, rel=0.1)
+
+
+def test_a_repeat_that_starts_later_is_aligned(tmp_path: Path) -> None:
+    def spoil(columns: dict) -> None:
+        late = table(5, samples=312)
+        for name in columns:
+            columns[name] = columns["time"] if name == "time" else late[name][12:]
+
+    recording = read_recording(write(tmp_path, spoil=spoil))
+    assert len(aligned_repeats(recording.trials)) == 1
+    assert noise_floor(recording).overall == pytest.approx(2e-4, rel=0.1)
+
+
+def test_the_wait_at_the_start_is_no_noise(tmp_path: Path) -> None:
+    def spoil(columns: dict) -> None:
+        columns["a.position"][:5] += 0.005
+
+    assert noise_floor(read_recording(write(tmp_path, spoil=spoil))).joints["a"] < 3e-4
+
+
+def test_another_command_is_no_repeat_and_the_floor_is_a_guess(tmp_path: Path) -> None:
+    def spoil(columns: dict) -> None:
+        for signal in ("command", "position"):
+            columns[f"a.{signal}"] *= 0.5
+
+    floor = noise_floor(read_recording(write(tmp_path, spoil=spoil)))
+    assert floor.source == "guess"
+    assert floor.overall == pytest.approx(2e-4, rel=0.5)
+
+
+def test_a_coarse_sensor_bounds_the_guess(tmp_path: Path) -> None:
+    def change(data: dict) -> None:
+        data["sensors"]["position_resolution"] = 0.01
+
+    assert np.all(sensor_noise(read_recording(write(tmp_path, change))) >= 0.01 / np.sqrt(12))
+
+
+def test_the_step_size_error_is_part_of_the_floor(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))
+    floor = noise_floor(recording, ErrorSummary(3e-4, {"a": 4e-4, "b": 0.0}))
+    plain = noise_floor(recording)
+    assert floor.joints["a"] == pytest.approx(np.hypot(plain.joints["a"], 4e-4))
+    assert floor.joints["b"] == plain.joints["b"]
+    assert floor.step_size == {"a": 4e-4, "b": 0.0}

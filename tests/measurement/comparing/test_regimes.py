@@ -1,0 +1,73 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.measurement.comparing.error import summarise
+from tactile_cube.measurement.comparing.in_words import where_it_fails
+from tactile_cube.measurement.comparing.noise_floor import noise_floor
+from tactile_cube.measurement.comparing.regimes import after_reversal, latest_direction, regimes
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tests.measurement.small_rig import write
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    return read_recording(write(tmp_path))
+
+
+def rows(recording: Recording, errors: list[np.ndarray], joint: str) -> dict[str, float]:
+    return {row.regime: row.error for row in regimes(recording.trials, errors, recording.joints) if row.joint == joint}
+
+
+def words(recording: Recording, errors: list[np.ndarray]) -> list[str]:
+    table = regimes(recording.trials, errors, recording.joints)
+    return where_it_fails(table, summarise(errors, recording.joints).joints, noise_floor(recording))
+
+
+def test_an_error_after_reversals_stands_out_there(recording: Recording) -> None:
+    errors = []
+    for trial in recording.trials:
+        error = 1e-4 * np.ones_like(trial.position)
+        velocity = trial.velocity()[:, 0]
+        error[:, 0] -= 0.005 * after_reversal(velocity, trial.step) * latest_direction(velocity)
+        errors.append(error)
+    table = rows(recording, errors, "a")
+    assert table["just after reversals"] > 10 * table["away from reversals"]
+    assert words(recording, errors)[0].startswith("a lags just after reversals, 5")
+
+
+def test_an_error_in_proportion_to_speed_is_a_lag_that_grows_with_speed(recording: Recording) -> None:
+    errors = [-0.003 * trial.velocity() * [0.0, 1.0] + 1e-5 for trial in recording.trials]
+    table = rows(recording, errors, "b")
+    assert table["medium speed"] > 3 * table["low speed"]
+    assert words(recording, errors)[0].startswith("b lags ")
+
+
+def test_an_error_of_one_posture_is_named(recording: Recording) -> None:
+    errors = [0.004 * (trial.position > 0.25) * [0.0, 1.0] + 1e-5 for trial in recording.trials]
+    table = rows(recording, errors, "b")
+    assert table["high third of the range"] > 3 * table["middle third of the range"]
+    assert "sits too high in the high third of the range" in words(recording, errors)[0]
+
+
+def test_a_joint_at_the_floor_follows_the_model(recording: Recording) -> None:
+    rng = np.random.default_rng(0)
+    errors = [2e-4 * rng.normal(size=trial.position.shape) for trial in recording.trials]
+    assert all("follows the model" in line for line in words(recording, errors))
+
+
+def test_the_kinds_partition_the_samples(recording: Recording) -> None:
+    errors = [trial.position * 0 for trial in recording.trials]
+    shares: dict[str, float] = {}
+    for row in regimes(recording.trials, errors, recording.joints):
+        if row.joint == "a":
+            shares[row.dimension] = shares.get(row.dimension, 0.0) + row.share
+    for dimension in ("reversal", "posture", "time", "kind", "load"):
+        assert shares[dimension] == pytest.approx(1.0)
+
+
+def test_a_reversal_lasts_a_fifth_of_a_second() -> None:
+    velocity = np.concatenate([np.ones(100), np.zeros(30), -np.ones(100)])
+    assert np.flatnonzero(after_reversal(velocity, 0.01)).tolist() == list(range(130, 150))

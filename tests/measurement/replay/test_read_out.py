@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from tactile_cube.measurement.replay.read_out import free_way, half_jumps, impulses, read_out
+
+
+def test_the_next_command_is_not_felt_yet() -> None:
+    """One joint at rest at q = 0: half of a command step of 0.1 rad is in the simulation and none of it in the log."""
+    stiffness, jump = 20.0, np.array([[0.05]])
+    slope = np.array([3.0 * stiffness / (3.0 + stiffness)])
+    torque = slope * jump
+    position, felt = read_out(torque / stiffness, torque, jump, (slope / stiffness, slope), np.array([1.0]))
+    assert felt == pytest.approx(0.0)
+    assert position == pytest.approx(0.0)
+
+
+def test_a_rigid_drive_moves_only_with_its_link() -> None:
+    position = np.array([[0.1], [0.2]])
+    jump = np.array([[0.5], [0.4]])
+    read, _ = read_out(position, np.zeros((2, 1)), jump, (np.zeros(1), np.array([3.0])), np.array([1.0]))
+    assert read[:, 0].tolist() == [0.1, 0.2]
+
+
+def test_a_torque_at_its_limit_does_not_jump() -> None:
+    torque = np.array([[1.0]])
+    _, felt = read_out(torque, torque, np.array([[5.0]]), (np.array([0.1]), np.array([2.6])), np.array([1.0]))
+    assert felt[0, 0] == 1.0
+
+
+@pytest.mark.parametrize(("lead", "jump", "free"), [(0.1, 0.05, 0.0), (0.001, 0.003, 0.003), (0.1, 0.097, 0.007)])
+def test_a_motor_follows_the_command_freely_as_far_as_the_gap_goes(lead: float, jump: float, free: float) -> None:
+    """A gap of 0.02 rad: beyond it all the time, within it all the time, and coming out of it."""
+    assert free_way(np.array([lead]), np.array([jump]), np.array([0.02])) == pytest.approx(free)
+    read, torque = read_out(np.zeros((1, 1)), np.zeros((1, 1)), jump, (0.1, 2.0), 1.0, free)  # type: ignore[arg-type]
+    assert (read[0, 0], torque[0, 0]) == pytest.approx((-free - 0.1 * (jump - free), -2.0 * (jump - free)))
+
+
+@pytest.mark.parametrize("substeps", [2, 5])
+def test_the_first_step_of_a_row_takes_the_mean_of_two_commands(substeps: int) -> None:
+    command = np.array([[0.0], [1.0], [3.0]])
+    fine = impulses(command, substeps)
+    assert fine[::substeps, 0].tolist() == [0.0, 0.5, 2.0]
+    assert fine[1::substeps, 0].tolist() == [0.0, 1.0, 3.0]
+    assert half_jumps(fine, substeps)[:, 0].tolist() == [0.0, 0.5, 1.0]
