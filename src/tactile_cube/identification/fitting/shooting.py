@@ -45,14 +45,12 @@ class Shooting:
 
     def positions(self, models: Sequence[Model], stretches: Stretches) -> Array:
         """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
-        return self._simulate(
-            models, np.zeros((len(models), 2 * len(self.recording.joints))), [stretches] * len(models)
-        )
+        return self._simulate(models, [stretches] * len(models))
 
     def positions_from(self, model: Model, beginnings: Sequence[Array], stretches: Stretches) -> Array:
         """The same for one model from several `beginning`s, (beginnings, S, K segment, n) [rad]."""
         begun = [replace(stretches, beginning=one) for one in beginnings]
-        return self._simulate([model] * len(begun), np.zeros((len(begun), 2 * len(self.recording.joints))), begun)
+        return self._simulate([model] * len(begun), begun)
 
     def gaps(self, model: Model) -> Array:
         """Width of the gap in each joint's transmission (n,) [rad]."""
@@ -63,17 +61,20 @@ class Shooting:
         joints = len(self.recording.joints)
         nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
         count = 2 * joints + 1
-        moved = self._simulate([model] * count, np.vstack([nudge, np.zeros(2 * joints)]), [stretches] * count)
+        moved = self._simulate([model] * count, [stretches] * count, np.vstack([nudge, np.zeros(2 * joints)]))
         slopes: Array = (moved[:-1] - moved[-1]) / nudge.max(axis=1)[:, None, None, None]
         return slopes
 
-    def _simulate(self, models: Sequence[Model], nudge: Array, stretches: Sequence[Stretches]) -> Array:
+    def _simulate(self, models: Sequence[Model], stretches: Sequence[Stretches], nudges: Array | None = None) -> Array:
+        """Each model through its stretches, the start of each segment moved by the model's nudge."""
         out = np.zeros((len(models), *stretches[0].measured.shape))
+        if nudges is None:
+            nudges = np.zeros((len(models), 2 * len(self.recording.joints)))
         with ThreadPoolExecutor(self.workers) as pool:
-            list(pool.map(self._one, models, nudge, stretches, out))
+            list(pool.map(self._one, models, stretches, nudges, out))
         return out
 
-    def _one(self, model: Model, nudge: Array, stretches: Stretches, out: Array) -> None:
+    def _one(self, model: Model, stretches: Stretches, nudge: Array, out: Array) -> None:
         memory = self._memory(model, stretches)
         count, fine = len(stretches), stretches.substeps
         felt, _ = jump_ratio(self.plant, memory[0], stretches.commands[0, stretches.history * fine])
