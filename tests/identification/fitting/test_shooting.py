@@ -77,3 +77,15 @@ def test_the_place_of_a_hidden_link_at_the_start_is_found(recording: Recording, 
 def test_without_a_gap_every_trial_begins_where_its_sensors_say(recording: Recording) -> None:
     stretches = cut(recording, NOISE)
     assert with_beginnings(Shooting(recording, EFFECTS), nominal_model(recording), stretches) is stretches
+
+
+@pytest.mark.parametrize("models", [1, 2, 3])
+def test_any_number_of_cores_gives_the_same_bits(recording: Recording, models: int) -> None:
+    stretches = cut(recording, NOISE, segment=10)
+    assert len(stretches) > 1
+    shooting = Shooting(recording, EFFECTS)
+    wanted = [with_gap(recording), nominal_model(recording), with_gap(recording)][:models]
+    shooting.workers = 1
+    alone = shooting.positions(wanted, stretches)
+    shooting.workers = 2
+    np.testing.assert_array_equal(shooting.positions(wanted, stretches), alone)

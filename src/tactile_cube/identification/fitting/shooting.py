@@ -70,34 +70,47 @@ class Shooting:
         out = np.zeros((len(models), *stretches[0].measured.shape))
         if nudges is None:
             nudges = np.zeros((len(models), 2 * len(self.recording.joints)))
+        whole = len(models) - len(models) % self.workers  # a model a core; the last ones' stretches go to all cores
         with ThreadPoolExecutor(self.workers) as pool:
-            list(pool.map(self._one, models, stretches, nudges, out))
+            list(pool.map(self._one, models[:whole], stretches[:whole], nudges, out))
+            for k in range(whole, len(models)):
+                self._one(models[k], stretches[k], nudges[k], out[k], pool)
         return out
 
-    def _one(self, model: Model, stretches: Stretches, nudge: Array, out: Array) -> None:
+    def _one(
+        self, model: Model, stretches: Stretches, nudge: Array, out: Array, pool: ThreadPoolExecutor | None = None
+    ) -> None:
         memory = self._memory(model, stretches)
         count, fine = len(stretches), stretches.substeps
         felt, _ = jump_ratio(self.plant, memory[0], stretches.commands[0, stretches.history * fine])
         gap = gaps(self.plant, memory[0])
         rows = np.array([MOTOR_POSITION, COMMAND, *([LEAD] if gap.any() else [])])
         signals = np.zeros((count, out.shape[1] * fine, len(rows), out.shape[2]))
-        self.plant.kernel.segments_batch(
-            stretches.commands,
-            np.arange(count),
-            np.full(count, signals.shape[1]),
-            stretches.history * fine,
-            1,
-            stretches.segment * fine,
-            stretches.position,
-            stretches.speed,
-            stretches.beginning,
-            np.tile(nudge, (count, 1)),
-            memory,
-            rows,
-            0,
-            count,
-            signals,
-        )
+
+        def run(first: int, last: int) -> None:
+            self.plant.kernel.segments_batch(
+                stretches.commands,
+                np.arange(count),
+                np.full(count, signals.shape[1]),
+                stretches.history * fine,
+                1,
+                stretches.segment * fine,
+                stretches.position,
+                stretches.speed,
+                stretches.beginning,
+                np.tile(nudge, (count, 1)),
+                memory,
+                rows,
+                first,
+                last,
+                signals,
+            )
+
+        if pool is None:
+            run(0, count)
+        else:
+            parts = [count * k // self.workers for k in range(self.workers + 1)]
+            list(pool.map(run, parts[:-1], parts[1:]))
         jump = _jumps(signals[:, :, 1], stretches)
         free = free_way(signals[:, ::fine, 2], jump, gap) if gap.any() else 0.0
         out[:] = signals[:, ::fine, 0] - free - felt * (jump - free)
