@@ -13,7 +13,7 @@ from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings
-from tactile_cube.identification.search.worth import SMALLEST_GAIN, least_gain, worthwhile
+from tactile_cube.identification.search.worth import FEW_SEGMENTS, SMALLEST_GAIN, least_gain, unproven, worthwhile
 from tactile_cube.identification.verdict import decide, unexplained_joints
 
 MODEL = Model({}, (), {})
@@ -224,3 +224,12 @@ def test_a_further_effect_has_to_finish_what_is_nearly_explained() -> None:
     assert least_gain(nearly, base) == pytest.approx((1.5**2 - 1.1**2) / (1.5**2 + 1.0))
     assert least_gain(far, base) == SMALLEST_GAIN, "most of what is left may be anything"
     assert least_gain(partly, replace(base, judgement=judged(6.0))) == SMALLEST_GAIN, "much is not explained yet"
+
+
+def test_much_that_few_segments_do_not_tell_from_chance_is_unproven_not_unknown() -> None:
+    found = replace(explanation("backlash", 9.0), p_value=0.02)
+    few = replace(found.judgement, samples=np.where(np.arange(60) < FEW_SEGMENTS - 1, 100, 0))
+    assert unproven(replace(found, judgement=few))
+    assert not unproven(found), "with so many segments chance is no excuse"
+    assert not unproven(replace(found, judgement=few, p_value=1e-5)), "proven"
+    assert not unproven(replace(found, judgement=few, gain=0.1)), "too little to speak of"

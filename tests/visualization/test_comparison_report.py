@@ -146,6 +146,16 @@ def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Compariso
     assert "my_rig.MyEffect@b" in text
 
 
+def test_what_the_trials_do_not_prove_is_named_and_more_is_asked_for(comparison: Comparison, tmp_path: Path) -> None:
+    maybe = {"effects": ["backlash@a"], "heldout_gain": 0.72, "p_value": 0.023, "segments": 8}
+    unsure = DIAGNOSIS | {"verdict": "unknown_effect", "effects": [], "unproven_effects": [maybe]}
+    text = page(diagnosis_report(unsure, comparison, None, "cmd"), tmp_path / "d.html")
+    assert "these trials do not suffice to prove what" in text
+    assert "backlash@a would take 72 % of the held-out squared error away (p 0.023)" in text
+    assert "8 held-out segments do not tell that from chance" in text
+    assert "python -m tactile_cube.diagnose recording=" in text
+
+
 def test_the_identification_page_shows_the_staircase(comparison: Comparison, tmp_path: Path) -> None:
     joints = {"nominal": {"a": 0.007, "b": 0.006}, "with_effects": {"a": 0.0006, "b": 0.0005}}
     text = page(identification_report(comparison, DIAGNOSIS["error"], joints, "cmd", "model.yaml"), tmp_path / "i.html")

@@ -16,6 +16,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.verdict import unexplained_joints
 
 RANKED = 20
+UNPROVEN = 3
 
 
 def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> dict[str, Any]:
@@ -44,6 +45,7 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
         },
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
         "partial_effects": effects if verdict.kind == "unknown_effect" else [],
+        "unproven_effects": _unproven(diagnosis) if verdict.kind == "unknown_effect" else [],
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "next_experiment": str(experiment) if experiment else None,
         "held_out": diagnosis.held_out,
@@ -70,6 +72,19 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             judged.add(name)
             rows.append({"effects": name, "held_out_error_over_noise": None, "gain": None, "p_value": None})
     return rows
+
+
+def _unproven(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """What would explain much beside the chosen effects, were the held-out segments enough to show it."""
+    return [
+        {
+            "effects": _names(one),
+            "heldout_gain": round(one.gain, 6),
+            "p_value": one.p_value,
+            "segments": int((one.judgement.samples > 0).sum()),
+        }
+        for one in diagnosis.findings.unproven[:UNPROVEN]
+    ]
 
 
 def _label(candidate: Candidate) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
@@ -14,6 +14,7 @@ OPENING = {
     "ambiguous": "An effect is missing, but this recording cannot tell these apart:",
     "unknown_effect": "Something is missing that no effect of the catalogue explains.",
 }
+UNPROVEN = "Something is missing, and these trials do not suffice to prove what."
 GAIN_OF = {"error": "the held-out error", "offsets": "the joint offsets that the grips need"}
 HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
 
@@ -21,11 +22,14 @@ HELD = "Nothing is missing that these grasps show: the world follows them about 
 def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     """A few lines for the terminal, from the content of diagnosis.json."""
     grasps = result.get("noise_floor_source") == "contact"
-    lines = [HELD if grasps and result["verdict"] == "adequate" else OPENING[result["verdict"]]]
+    unproven = result.get("unproven_effects")
+    opening = UNPROVEN if unproven else OPENING[result["verdict"]]
+    lines = [HELD if grasps and result["verdict"] == "adequate" else opening]
     lines += [_effect(entry) for entry in result["effects"]]
     if partial := result.get("partial_effects"):
         lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
         lines += [_effect(entry) for entry in partial]
+    lines += [f"  {line}" for line in unproven_effects(unproven)] if unproven else []
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     lines += [f"  {common_offset(entry)}" for entry in result.get("common_offsets", [])]
     error = result["error"]
@@ -62,6 +66,19 @@ def _unexplained(entry: dict[str, Any]) -> str:
         f"{entry['depends_most_on']}; beside the recommended model a black box could explain "
         f"{100 * entry['black_box']:.0f} % of it"
     )
+
+
+def unproven_effects(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Effects of which one may be the missing one, and what to do about it."""
+    lines = [
+        f"{' & '.join(one['effects'])} would take {100 * one['heldout_gain']:.0f} % of the held-out squared error away "
+        f"(p {one['p_value']:.2g})"
+        for one in entries
+    ]
+    return [
+        *lines,
+        f"{entries[0]['segments']} held-out segments do not tell that from chance: record more trials, or longer ones.",
+    ]
 
 
 def common_offset(entry: Mapping[str, Any]) -> str:

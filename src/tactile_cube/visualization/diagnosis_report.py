@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactile_cube.identification.in_words import common_offset
+from tactile_cube.identification.in_words import UNPROVEN, common_offset, unproven_effects
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
@@ -55,6 +55,8 @@ def diagnosis_report(
         experiment: what would tell the rivals apart.
     """
     tone, said = VERDICTS[diagnosis["verdict"]]
+    if diagnosis.get("unproven_effects"):
+        said = UNPROVEN
     names = _names(diagnosis["effects"], " or " if diagnosis["verdict"] == "ambiguous" else " and ")
     sections = [
         _verdict_section(diagnosis),
@@ -127,6 +129,8 @@ def identification_report(
 def _verdict_section(diagnosis: Mapping[str, Any]) -> Section:
     lines = [_in_a_line(effect) for effect in diagnosis["effects"]]
     lines += [f"helps, but is not the whole of it: {_in_a_line(one)}" for one in diagnosis.get("partial_effects", [])]
+    if unproven := diagnosis.get("unproven_effects"):
+        lines += unproven_effects(unproven)
     lines += [common_offset(entry) for entry in diagnosis.get("common_offsets", [])]
     for joint in diagnosis["unexplained_joints"]:
         lines.append(f"not explained: {joint}{_ceiling(diagnosis, joint)}")

@@ -144,6 +144,9 @@ def next_section(
             "Fit exactly these effects, and train with the result:",
             [f"{identify}=[{','.join(names)}]", train],
         )
+    elif diagnosis.get("unproven_effects"):
+        said = "Record more trials of each kind, or longer ones, into the same recording, and ask again:"
+        lines = [f"python -m tactile_cube.diagnose recording={folder}"]
     else:
         joint = (diagnosis["unexplained_joints"] or ["JOINT"])[0]
         said = "Look at the shapes above, write the law as an effect of your own, and fit it:"

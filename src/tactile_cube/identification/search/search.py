@@ -25,7 +25,7 @@ from tactile_cube.identification.search.shared_offset import shared_offset
 from tactile_cube.identification.search.shortlist import of_each, with_groups
 from tactile_cube.identification.search.simplicity import simplest
 from tactile_cube.identification.search.special_laws import special_candidates
-from tactile_cube.identification.search.worth import FAR_FROM_FLOOR, least_gain, worthwhile
+from tactile_cube.identification.search.worth import FAR_FROM_FLOOR, least_gain, unproven, worthwhile
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -50,12 +50,14 @@ class Findings:
         nominal: the model before any fit, judged on the held-out trials.
         levels: explanations with 1, 2, ... effects, best first; at the end pairs that second thoughts found.
         scores: screening of the first level, best first.
+        unproven: where the search ended, what would explain much and may be chance, best first.
     """
 
     base: Explanation
     nominal: Judgement
     levels: tuple[tuple[Explanation, ...], ...]
     scores: tuple[Score, ...]
+    unproven: tuple[Explanation, ...] = ()
 
 
 class Search:
@@ -99,6 +101,7 @@ class Search:
         nominal = judge(self.judges, self.held_out, self.with_postures(self.start))
         levels: list[tuple[Explanation, ...]] = []
         scores: tuple[Score, ...] = ()
+        doubtful: list[Explanation] = []
         beam: tuple[Explanation, ...] = (base,)
         while len(levels) < DEEPEST and not any(e.complete for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
@@ -107,6 +110,7 @@ class Search:
                 self.left_behind = list(self.last_behind)
             better = [e for parent, e in found if worthwhile(e, parent, base, self.fitted.joints)]
             if not better:
+                doubtful = sorted((e for _, e in found if unproven(e)), key=lambda e: e.error)
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
             better[0] = self.pruned(better[0])
@@ -118,7 +122,7 @@ class Search:
             levels += [level] if (level := self.second_thoughts(base)) else []
         if not levels and base.error <= FLOOR and (shared := shared_offset(base, self.fitted, self.effects)):
             levels.append((shared,))
-        return Findings(base, nominal, tuple(levels), scores)
+        return Findings(base, nominal, tuple(levels), scores, tuple(doubtful))
 
     def second_thoughts(self, base: Explanation) -> tuple[Explanation, ...]:
         """Pairs that begin with an effect which was left behind: alone, each of two may look worse than a third one."""

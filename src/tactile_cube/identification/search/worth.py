@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from tactile_cube.identification.search.explanation import FLOOR, Explanation
 
 FAR_FROM_FLOOR = 4.0  # error / sensor noise of an explanation that is none by itself
@@ -11,6 +13,7 @@ NEARLY_ALL = 0.9  # share of what it leaves that a further effect then has to ex
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
 SIGNIFICANT = 2e-4  # p-value, corrected for the number of effects that were judged on the held-out trials
 LARGE_GAIN, SIGNIFICANT_IF_LARGE = 0.25, 1e-3  # the same for a share that no chance explains: short recordings
+FEW_SEGMENTS = 60  # held-out segments, 24 s
 SIGNIFICANT_IF_ALL = 0.01  # the same for one effect that explains everything
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
 SMALL_PART, LITTLE = 0.001, 1.3  # share of the base error that is a detail, and the error from which on it may be
@@ -40,6 +43,12 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation,
     if parent.explained(base) < REAL_PART:
         return share > COMPLETED
     return parent.error > FAR_FROM_FLOOR and share > NEARLY_ALL
+
+
+def unproven(explanation: Explanation) -> bool:
+    """Whether an effect explains much, and there are too few held-out segments to tell that from chance."""
+    few = np.count_nonzero(explanation.judgement.samples) < FEW_SEGMENTS
+    return bool(few and explanation.gain > LARGE_GAIN and explanation.p_value > SIGNIFICANT_IF_LARGE)
 
 
 def least_gain(parent: Explanation, base: Explanation) -> float:
