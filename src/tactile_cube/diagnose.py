@@ -21,7 +21,7 @@ def main(config: DictConfig) -> None:
     from hydra.core.hydra_config import HydraConfig
 
     from tactile_cube.drivetrain.effects import catalogue, find_effect
-    from tactile_cube.drivetrain.model_file import write_model
+    from tactile_cube.drivetrain.model_file import read_model, write_model
     from tactile_cube.identification.contact.diagnosis import diagnose_contact, with_contact
     from tactile_cube.identification.contact.identification import stated_model
     from tactile_cube.identification.diagnosis import diagnose, write_experiment
@@ -31,6 +31,7 @@ def main(config: DictConfig) -> None:
     from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
     from tactile_cube.measurement.comparing.comparison import compare
     from tactile_cube.measurement.recordings.reading import read_recording
+    from tactile_cube.measurement.replay.parameters import require_same_joints
     from tactile_cube.visualization.comparison_episode import write_comparison
     from tactile_cube.visualization.comparison_summary import markdown
     from tactile_cube.visualization.contact_results import write_contact_diagnosis
@@ -42,6 +43,9 @@ def main(config: DictConfig) -> None:
     everything = recording = read_recording(config.recording)
     for line in recording.warnings:
         print(f"warning: {line}", file=sys.stderr)
+    known = read_model(config.model) if config.model else None
+    if known is not None:
+        require_same_joints(recording, known)
     effects = dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)])
 
     def say(line: str) -> None:
@@ -49,13 +53,18 @@ def main(config: DictConfig) -> None:
 
     command = shlex.join(["python", "-m", "tactile_cube.diagnose", *sys.argv[1:]])
     if with_object(everything).trials and not has_free_motion(everything):
-        grip = diagnose_contact(everything, None, config.step, config.seed, say)
-        model = grip.into(stated_model(everything, command, config.seed), alone=True)
+        grip = diagnose_contact(everything, known, config.step, config.seed, say)
+        model = stated_model(everything, command, config.seed)
+        if known is not None:
+            model = known.model_copy(update={"provenance": model.provenance})
+        model = grip.into(model, alone=True)
         write_contact_diagnosis(grip, model, folder, time.perf_counter() - begin)
         return
     recording = without_touches(everything)
-    diagnosis = diagnose(recording, tuple(effects), config.engine, config.step, config.seed, say)
+    diagnosis = diagnose(recording, tuple(effects), config.engine, config.step, config.seed, say, known)
     model = model_file(recording, diagnosis.fitted, diagnosis.errors(), diagnosis.held_out, command, config.seed)
+    if known is not None:
+        model = model.model_copy(update={"effects": model.with_effects(known.object_effects)})
     result = as_json(diagnosis, write_experiment(diagnosis, folder), time.perf_counter() - begin)
     if with_object(everything).trials:
         grip = diagnose_contact(everything, model, config.step, config.seed, say)
@@ -63,7 +72,7 @@ def main(config: DictConfig) -> None:
         result["seconds"] = round(time.perf_counter() - begin, 2)
     write_model(model, folder / "model.yaml")
     (folder / "diagnosis.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
-    before = compare(recording, None, "fast", config.step, floor=diagnosis.floor)
+    before = compare(recording, known, "fast", config.step, floor=diagnosis.floor)
     after = compare(recording, model, config.engine, config.step, floor=diagnosis.floor)
     shapes = [shape for one in diagnosis.unexplained for shape in one.shapes[:SHAPES]]
     path = str(folder / "model.yaml")

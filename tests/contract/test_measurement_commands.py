@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tactile_cube.drivetrain.model_file import read_model
 from tests.measurement.small_rig import URDF, write
 
 
@@ -35,6 +36,33 @@ def test_record_then_compare(tmp_path: Path) -> None:
     assert result["error"]["overall"] > 0
     for file in ("report.html", "comparison.rrd"):
         assert (tmp_path / "run" / file).is_file()
+
+
+def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:
+    (tmp_path / "two.urdf").write_text(URDF)
+    settings = ["source.duration=4", "source.initialisations=2", "source.kinds=[ramps,multisine]"]
+    hidden = 'source.hidden=["torque_bias@b: bias=0.05"]'
+    made = run("record", "out=made", "source=rig", "source.urdf=two.urdf", *settings, hidden, folder=tmp_path)
+    assert made.returncode == 0, made.stderr
+    words = ["recording=made", "engine=fast"]
+    fitted = run("identify", *words, "effects=[torque_bias@b]", "hydra.run.dir=known", folder=tmp_path)
+    assert fitted.returncode == 0, fitted.stderr
+    words += ["rerun=false", "hydra.run.dir=run"]
+    asked = run("diagnose", *words, "model=known/model.yaml", folder=tmp_path)
+    assert asked.returncode == 0, asked.stderr
+    result = json.loads((tmp_path / "run" / "diagnosis.json").read_text())
+    assert (result["verdict"], result["effects"]) == ("adequate", [])
+    assert result["known_effects"] == ["torque_bias@b"]
+    assert result["error"]["nominal"] < 2 * result["error"]["noise_floor"], "the error of the model that was given"
+    assert "beside what was known: torque_bias@b" in asked.stdout
+    (effect,) = read_model(tmp_path / "run" / "model.yaml").effects
+    assert effect.effect == "torque_bias@b"
+    assert effect.parameters["bias"].low <= 0.05 <= effect.parameters["bias"].high
+
+    (tmp_path / "other.yaml").write_text("joints: [x]\n")
+    refused = run("diagnose", *words, "model=other.yaml", folder=tmp_path)
+    assert refused.returncode == 2
+    assert "model: joints ['x'] are not those of the recording" in refused.stderr
 
 
 def test_a_grasp_is_compared_too(tmp_path: Path) -> None:

@@ -126,6 +126,11 @@ class ModelFile(_Strict):
         """The effects of fingertips and object."""
         return [one for one in self.effects if one.of_object]
 
+    def with_effects(self, found: Sequence[EffectEstimate]) -> list[EffectEstimate]:
+        """Its effects and those found, which take the place of those of the same name."""
+        names = {one.effect for one in found}
+        return [*(one for one in self.effects if one.effect not in names), *found]
+
     @model_validator(mode="after")
     def _known_joints(self) -> "ModelFile":
         named = {joint: f"values.{key}" for key, joints in self.values.items() for joint in joints}

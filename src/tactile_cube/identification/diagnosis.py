@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.model_file import ModelErrors
+from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
@@ -58,6 +58,7 @@ class Diagnosis:
         unexplained: what is left, joint by joint; empty unless something is.
         experiment: what would tell the rivals apart; None without rivals.
         held_out: names of the held-out trials.
+        known: effects of the model that it began with, NAME@JOINT.
         common: joint offsets that may be the encoder's or the initialisations'.
     """
 
@@ -70,6 +71,7 @@ class Diagnosis:
     unexplained: list[Unexplained]
     experiment: Experiment | None
     held_out: list[str]
+    known: tuple[str, ...] = ()
     common: tuple[CommonOffset, ...] = ()
 
     def errors(self) -> ModelErrors:
@@ -86,6 +88,7 @@ def diagnose(
     step: float = 0.002,
     seed: int = 0,
     say: Callable[[str], None] = print,
+    known: ModelFile | None = None,
 ) -> Diagnosis:
     """Find out which effect a recording's nominal model lacks.
 
@@ -96,14 +99,15 @@ def diagnose(
         step: its simulation step [s].
         seed: which trials are held out.
         say: takes progress lines.
+        known: the model to begin with, whose effects are no news; None: what the recording's owner states.
     """
     fitted_part, held_out = held_out_split(recording, seed=seed)
     noise = sensor_noise(recording)
-    search = Search(fitted_part, held_out, noise, effects, say)
+    search = Search(fitted_part, held_out, noise, effects, say, known)
     findings = search.run()
     verdict, floor = decide(findings), noise_floor(recording)
     problem = Problem(search.shooting, search.all_stretches)
-    fitted = final_fit(problem, fitted_part, verdict.chosen.fit.model)
+    fitted = final_fit(problem, verdict.chosen.fit.model, search.unknowns(verdict.chosen.fit.model))
     stages = {
         "nominal": search.start_held_out,
         "refitted": findings.base.judgement.model,
@@ -117,7 +121,7 @@ def diagnose(
         verdict = replace(verdict, kind="unknown_effect", rivals=())
         unexplained = _unexplained(search, verdict, findings.base)
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
-    rivals = tuple((one, final_fit(problem, fitted_part, one.fit.model)) for one in verdict.rivals)
+    rivals = tuple((one, final_fit(problem, one.fit.model, search.unknowns(one.fit.model))) for one in verdict.rivals)
     experiment = None
     if rivals:
         models = {verdict.chosen.label: fitted.model} | {one.label: fit.model for one, fit in rivals}
@@ -132,6 +136,7 @@ def diagnose(
         unexplained=unexplained,
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
+        known=tuple(term.label for term in search.start.terms),
         common=common_offsets(findings.base, recording.joints) if verdict.kind == "adequate" else (),
     )
 

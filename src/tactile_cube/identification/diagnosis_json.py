@@ -46,6 +46,7 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
         "partial_effects": effects if verdict.kind == "unknown_effect" else [],
         "unproven_effects": _unproven(diagnosis) if verdict.kind == "unknown_effect" else [],
+        "known_effects": list(diagnosis.known),
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "next_experiment": str(experiment) if experiment else None,
         "held_out": diagnosis.held_out,
@@ -98,7 +99,8 @@ def _names(explanation: Explanation) -> list[str]:
 def _effects(explanation: Explanation, fitted: Fitted, rivals: list[str]) -> list[dict[str, Any]]:
     known = bounds(fitted)
     entries = []
-    for place, term in enumerate(fitted.model.terms):
+    first = len(fitted.model.terms) - explanation.terms
+    for place, term in enumerate(fitted.model.terms[first:], start=first):
         estimate: EffectEstimate = effect_estimate(term, place, known)
         entries.append(
             {

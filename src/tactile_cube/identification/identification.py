@@ -11,14 +11,13 @@ from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors
 from tactile_cube.identification.diagnosis import with_offsets
-from tactile_cube.identification.fitting.base import base_unknowns
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.free_run import free_run, free_run_error
-from tactile_cube.identification.search.candidates import candidates, model_unknowns
+from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import judge
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search
@@ -89,7 +88,7 @@ def identify(
         label = current.model.terms[-1].label
         stages[f"+ {label}"] = _judged(search, held_out, current.model)
         say(f"fitted {label}")
-    fitted = final_fit(Problem(search.shooting, search.all_stretches), fitted_part, current.model)
+    fitted = final_fit(Problem(search.shooting, search.all_stretches), current.model, search.unknowns(current.model))
     last = list(stages)[-1]
     stages[last] = with_offsets(fitted.model, stages[last])
     say("simulating the held-out trials")
@@ -113,4 +112,4 @@ def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str)
     refitted = [search.refit(frozen, option)[1] for option in options]
     best = refitted[int(np.argmin([one.cost for one in refitted]))]
     search.problem.linearise_starts(best.model)
-    return fit(search.problem, best.model, (*base_unknowns(search.fitted), *model_unknowns(best.model)), iterations=4)
+    return fit(search.problem, best.model, search.unknowns(best.model), iterations=4)

@@ -26,6 +26,8 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     opening = UNPROVEN if unproven else OPENING[result["verdict"]]
     lines = [HELD if grasps and result["verdict"] == "adequate" else opening]
     lines += [_effect(entry) for entry in result["effects"]]
+    if known := result.get("known_effects"):
+        lines.append(f"  beside what was known: {', '.join(known)}")
     if partial := result.get("partial_effects"):
         lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
         lines += [_effect(entry) for entry in partial]
@@ -35,7 +37,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     error = result["error"]
     refitted = f"{_mrad(error['refitted'])} with constants refitted, " if not grasps else ""
     lines.append(
-        f"Held-out error: {_mrad(error['nominal'])} as stated by the owner, {refitted}"
+        f"Held-out error: {_mrad(error['nominal'])} as stated, {refitted}"
         f"{_mrad(error['with_effects'])} with the recommended model; noise floor {_mrad(error['noise_floor'])}."
     )
     if experiment is not None:

@@ -128,6 +128,8 @@ def identification_report(
 
 def _verdict_section(diagnosis: Mapping[str, Any]) -> Section:
     lines = [_in_a_line(effect) for effect in diagnosis["effects"]]
+    if known := diagnosis.get("known_effects"):
+        lines.append(f"beside what was known: {', '.join(known)}")
     lines += [f"helps, but is not the whole of it: {_in_a_line(one)}" for one in diagnosis.get("partial_effects", [])]
     if unproven := diagnosis.get("unproven_effects"):
         lines += unproven_effects(unproven)
@@ -158,7 +160,7 @@ def _tiles(diagnosis: Mapping[str, Any]) -> list[Tile]:
     tiles = [Tile(diagnosis["verdict"].replace("_", " "), "verdict", VERDICTS[diagnosis["verdict"]][0])]
     guessed = diagnosis.get("noise_floor_source") == "guess"
     for key, label in (
-        ("nominal", "held-out error as stated by the owner"),
+        ("nominal", "held-out error as stated"),
         ("with_effects", "held-out error with the recommended model"),
         ("noise_floor", "noise floor (a guess: no repeats)" if guessed else "noise floor"),
     ):

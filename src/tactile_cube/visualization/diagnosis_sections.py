@@ -14,7 +14,7 @@ from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_
 
 WIDE = 6  # joints from which on a table has them in its rows
 STAGES = {
-    "nominal": "as stated by the owner",
+    "nominal": "as stated",
     "refitted": "known constants refitted",
     "with_effects": "with what was found",
 }
@@ -139,7 +139,8 @@ def next_section(
     if diagnosis["verdict"] == "adequate":
         said, lines = "Train with the refitted constants:", [train]
     elif diagnosis["verdict"] == "missing_effect":
-        names = [_typed(effect["name"], joint) for effect in diagnosis["effects"] for joint in effect["joints"]]
+        found = [_typed(effect["name"], joint) for effect in diagnosis["effects"] for joint in effect["joints"]]
+        names = [*diagnosis.get("known_effects", []), *found]
         said, lines = (
             "Fit exactly these effects, and train with the result:",
             [f"{identify}=[{','.join(names)}]", train],

@@ -58,7 +58,7 @@ class ContactDiagnosis:
 
     def into(self, model: ModelFile, alone: bool) -> ModelFile:
         """The model with these effects; `alone`: nothing else was diagnosed, so its errors are these."""
-        update: dict[str, Any] = {"effects": [*model.drive_effects, *self.effects()]}
+        update: dict[str, Any] = {"effects": model.with_effects(self.effects())}
         if alone:
             overall: dict[str, Any] = {key: summary.overall for key, summary in self.stages.items()}
             update["errors"] = ModelErrors(**overall, noise_floor=self.noise_floor)

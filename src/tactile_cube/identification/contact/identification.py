@@ -43,7 +43,7 @@ class ContactIdentification:
 
     def into(self, model: ModelFile, alone: bool) -> ModelFile:
         """The model with these effects; `alone`: nothing else was identified, so its errors are these."""
-        effects = [*model.drive_effects, *self.effects()]
+        effects = model.with_effects(self.effects())
         if not alone:
             return model.model_copy(update={"effects": effects})
         overall = {key: summary.overall for key, summary in self.stages.items()}

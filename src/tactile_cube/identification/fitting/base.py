@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.model import Model, Unknown
+from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.model_file import EffectEstimate, ModelFile
+from tactile_cube.identification.fitting.model import Model, Term, Unknown
 from tactile_cube.measurement.comparing.postures import LARGEST_OFFSET
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import TORQUE_MODE_GAIN
+from tactile_cube.measurement.replay.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 TOLERANCE = {
@@ -25,20 +29,22 @@ OFFSET_SPREAD = 0.01  # [rad]
 LARGEST_CREEP = 1.0  # [rad/s per N m] joints that stick give way slowly where friction is regularised
 
 
-def nominal_model(recording: Recording) -> Model:
-    """What the recording's owner states."""
-    n = len(recording.joints)
-    gains = recording.gains
-    constants = {
-        "kp": np.full(n, TORQUE_MODE_GAIN) if recording.torque_controlled else np.array(gains.kp, dtype=float),
-        "kd": np.zeros(n) if recording.torque_controlled else np.array(gains.kd, dtype=float),
-        "torque_limit": np.array(gains.torque_limit, dtype=float),
-        "stiffness": np.array(recording.nominal.get("stiffness", np.full(n, np.inf)), dtype=float),
-        "static_friction": np.array(recording.nominal.get("static_friction", np.zeros(n)), dtype=float),
-        "reflected_inertia": np.array(recording.nominal.get("reflected_inertia", np.zeros(n)), dtype=float),
-        "friction_creep": np.zeros(n),
-    }
-    return Model(constants, (), {trial.initialisation: np.zeros(n) for trial in recording.trials})
+def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model:
+    """What the recording's owner states, or what is known since; of effects, numbers with an interval are free."""
+    constants = nominal_parameters(recording, known).constants
+    terms = tuple(term for one in (known.drive_effects if known else ()) for term in _terms(one, recording))
+    return Model(
+        constants, terms, {trial.initialisation: np.zeros(len(recording.joints)) for trial in recording.trials}
+    )
+
+
+def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:
+    given = {name: estimate.value for name, estimate in one.parameters.items()}
+    free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
+    return [
+        Term(effect, joint, {p.name: p.neutral for p in effect.parameters} | given, free)
+        for effect, joint in resolve([one.effect], recording.joints)
+    ]
 
 
 def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
@@ -54,9 +60,8 @@ def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
     return TOLERANCE | wide
 
 
-def base_unknowns(recording: Recording) -> tuple[Unknown, ...]:
-    """Constants that a refit may change, and the joint offsets of each initialisation."""
-    nominal = nominal_model(recording).constants
+def base_unknowns(recording: Recording, nominal: Mapping[str, Array]) -> tuple[Unknown, ...]:
+    """Constants that a refit may change, about their `nominal` values, and the joint offsets of each initialisation."""
     joints = range(len(recording.joints))
     constants = [
         _around_nominal(key, j, float(nominal[key][j]), low, high)

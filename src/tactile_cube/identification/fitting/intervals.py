@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.base import base_unknowns
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.fitting.model import Model, read_all
+from tactile_cube.identification.fitting.model import Model, Unknown, read_all
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.search.candidates import model_unknowns
-from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 NORMAL_95 = 1.96
@@ -27,10 +25,10 @@ class Fitted:
     half_width: Array
 
 
-def final_fit(problem: Problem, recording: Recording, model: Model, iterations: int = 3) -> Fitted:
+def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], iterations: int = 3) -> Fitted:
     """Refit constants and effects of a model on all stretches, with intervals."""
     problem.linearise_starts(model)
-    fitted = fit(problem, model, (*base_unknowns(recording), *model_unknowns(model)), iterations)
+    fitted = fit(problem, model, unknowns, iterations)
     return Fitted(fitted.model, fitted, NORMAL_95 * standard_errors(problem, fitted))
 
 

@@ -45,6 +45,11 @@ class Explanation:
         """Numbers fitted beyond the base."""
         return sum(c.size for c in self.effects)
 
+    @property
+    def terms(self) -> int:
+        """How many of the model's terms it adds to those that were known before."""
+        return sum(len(c.joints) for c in self.effects)
+
     def explained(self, base: Explanation) -> float:
         """Share of the base model's excess over the sensor noise that is explained."""
         return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.base import base_unknowns, nominal_model
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
-from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.stretches import Stretches, cut
@@ -70,6 +71,7 @@ class Search:
         noise: Array,
         effects: Sequence[type[Effect]],
         say: Callable[[str], None],
+        known: ModelFile | None = None,
     ) -> None:
         """Prepare the problems.
 
@@ -79,17 +81,18 @@ class Search:
             noise: (n,) of the position sensors [rad].
             effects: classes to search.
             say: takes progress lines.
+            known: the model to begin with; None: what the recording's owner states.
         """
         self.say = say
         self.fitted, self.held_out = fitted, held_out
+        self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
+        effects = tuple(dict.fromkeys([*effects, *(term.effect for term in self.start.terms)]))
         self.shooting = Shooting(fitted, effects)
         self.all_stretches = cut(fitted, noise)
         self.problem = Problem(self.shooting, some(self.all_stretches, SEGMENTS))
         self.judges = Problem(self.shooting, some(cut(held_out, noise), SEGMENTS))
-        self.effects = tuple(effects)
+        self.effects = effects
         self.candidates = candidates(fitted, effects)
-        self.start = nominal_model(fitted)
-        self.start_held_out = nominal_model(held_out)
         self.postures = dict(self.start_held_out.posture)
         self.last_scores: list[Score] = []
         self.last_behind: list[tuple[Candidate, Fit]] = []
@@ -140,7 +143,7 @@ class Search:
     def fit_base(self) -> Explanation:
         """Refit what the model already has."""
         self.problem.linearise_starts(self.start)
-        first = fit(self.problem, self.start, base_unknowns(self.fitted), iterations=4)
+        first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
         self.problem.linearise_starts(first.model)
         second = fit(self.problem, first.model, first.unknowns, iterations=3)
         self.judges.linearise_starts(self.with_postures(second.model))
@@ -149,6 +152,10 @@ class Search:
         self.say(f"base refitted: held-out error {judgement.error:.2f} x sensor noise")
         return Explanation((), second, judgement, 1.0, 0.0)
 
+    def unknowns(self, model: Model) -> tuple[Unknown, ...]:
+        """Everything that a refit of the model may change."""
+        return (*base_unknowns(self.fitted, self.start.constants), *model_unknowns(model))
+
     def with_postures(self, model: Model) -> Model:
         """The model with joint offsets for the held-out initialisations too."""
         return Model(model.constants, model.terms, {**self.postures, **model.posture})
@@ -156,7 +163,7 @@ class Search:
     def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
         frozen = self.frozen(parent.fit)
-        wanted = [*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)]
+        wanted = self.new([*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)])
         self.last_scores = screen(self.problem, frozen, wanted, [placed(c, self.fitted) for c in wanted])
         chosen = with_groups(self.last_scores, least_gain(parent, base) * frozen.cost)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
@@ -166,9 +173,14 @@ class Search:
         judged = (*raced, *special)
         return [self.finish(parent, candidate, fitted, len(judged)) for candidate, fitted in judged]
 
+    def new(self, wanted: Sequence[Candidate]) -> list[Candidate]:
+        """Without effects that the model to begin with has at that joint already."""
+        known = {(term.effect, term.joint) for term in self.start.terms}
+        return [one for one in wanted if not any((one.effect, joint) in known for joint in one.joints)]
+
     def special(self, frozen: Fit, candidate: Candidate, fitted: Fit) -> list[tuple[Candidate, Fit]]:
         """Simpler laws that a fitted profile looks like, fitted, but for those that stay far behind it."""
-        wanted = special_candidates(candidate, fitted.model.terms[-1], self.effects)
+        wanted = self.new(special_candidates(candidate, fitted.model.terms[-1], self.effects))
         # beside the joint offsets and constants that were fitted together with the profile
         before = replace(fitted.model, terms=fitted.model.terms[:-1])
         tried = [self.refit(frozen, one, LONG, before) for one in wanted]
@@ -243,9 +255,8 @@ class Search:
 
     def settled(self, model: Model) -> tuple[Fit, Judgement]:
         """A model with everything refitted, and how it does on the held-out trials."""
-        unknowns = (*base_unknowns(self.fitted), *model_unknowns(model))
         self.problem.linearise_starts(model)
-        fitted = fit(self.problem, model, unknowns, LONG)
+        fitted = fit(self.problem, model, self.unknowns(model), LONG)
         found = self.with_postures(fitted.model)
         self.judges.linearise_starts(found)
         return fitted, judge(self.judges, self.held_out, found)
@@ -271,7 +282,8 @@ def pursued(better: Sequence[Explanation]) -> list[Explanation]:
 def without_effect(explanation: Explanation, place: int) -> Model:
     """The fitted model without one of its effects."""
     model = explanation.fit.model
-    first = sum(len(candidate.joints) for candidate in explanation.effects[:place])
+    known = len(model.terms) - explanation.terms
+    first = known + sum(len(candidate.joints) for candidate in explanation.effects[:place])
     last = first + len(explanation.effects[place].joints)
     return replace(model, terms=(*model.terms[:first], *model.terms[last:]))
 
