@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tactile_cube.drivetrain.effects.backlash import Backlash
 from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.beginnings import with_beginnings
 from tactile_cube.identification.fitting.model import Model, Term
+from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.stretches import Stretches, cut
 from tactile_cube.identification.free_run import free_run
@@ -89,3 +91,23 @@ def test_any_number_of_cores_gives_the_same_bits(recording: Recording, models: i
     alone = shooting.positions(wanted, stretches)
     shooting.workers = 2
     np.testing.assert_array_equal(shooting.positions(wanted, stretches), alone)
+
+
+def test_a_simulation_that_runs_away_swamps_no_other(recording: Recording) -> None:
+    class Away(Shooting):
+        """Its first simulation ends nowhere, its second one far off."""
+
+        def _simulate(self, *given: Any) -> Any:
+            out = super()._simulate(*given)
+            out[0], out[1] = np.nan, 1e200
+            return out
+
+    stretches, model = cut(recording, NOISE), nominal_model(recording)
+    problem = Problem(Away(recording, EFFECTS), stretches)
+    problem.linearise_starts(model)
+    sane = Shooting(recording, EFFECTS)
+    residual = problem.residual(stretches.by_segment(sane.positions([model], stretches)[0])[None])[0]
+    assert np.isfinite(problem.cost(residual)).all()
+    slopes = Away(recording, EFFECTS).start_sensitivity(model, stretches)
+    assert not slopes[0].any()
+    np.testing.assert_array_equal(slopes[2:], sane.start_sensitivity(model, stretches)[2:])

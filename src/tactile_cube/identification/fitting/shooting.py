@@ -62,8 +62,9 @@ class Shooting:
         nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
         count = 2 * joints + 1
         moved = self._simulate([model] * count, [stretches] * count, np.vstack([nudge, np.zeros(2 * joints)]))
-        slopes: Array = (moved[:-1] - moved[-1]) / nudge.max(axis=1)[:, None, None, None]
-        return slopes
+        # a simulation that ran away has no slope; it would swamp those of all others
+        change = np.clip(np.nan_to_num(moved[:-1] - moved[-1], nan=0.0), -1.0, 1.0)
+        return np.asarray(change / nudge.max(axis=1)[:, None, None, None])
 
     def _simulate(self, models: Sequence[Model], stretches: Sequence[Stretches], nudges: Array | None = None) -> Array:
         """Each model through its stretches, the start of each segment moved by the model's nudge."""
