@@ -8,7 +8,7 @@ import pytest
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.diagnosis import Unexplained, follows_signals
 from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation
@@ -233,3 +233,19 @@ def test_much_that_few_segments_do_not_tell_from_chance_is_unproven_not_unknown(
     assert not unproven(found), "with so many segments chance is no excuse"
     assert not unproven(replace(found, judgement=few, p_value=1e-5)), "proven"
     assert not unproven(replace(found, judgement=few, gain=0.1)), "too little to speak of"
+
+
+def with_waves(one: Explanation, sine: float) -> Explanation:
+    values = {"sine": sine, "cosine": 0.0, "harmonic": 4.5}
+    term = Term(find_effect("transmission_error"), "q1", values, tuple(values))
+    return replace(one, fit=replace(FIT, model=Model({}, (term,), {})))
+
+
+def test_an_effect_whose_number_ends_at_the_edge_of_the_plausible_stands_in_for_another() -> None:
+    (edge,) = (p.high for p in find_effect("transmission_error").parameters if p.name == "sine")
+    one = explanation("transmission_error", 1.2)
+    assert decide(findings(20.0, with_waves(one, 0.9 * edge))).kind == "missing_effect"
+    assert decide(findings(20.0, with_waves(one, edge))).kind == "unknown_effect"
+    other = explanation("load_dependent_friction", 1.2)
+    verdict = decide(findings(20.0, with_waves(one, edge), other))
+    assert (verdict.kind, verdict.chosen, verdict.rivals) == ("missing_effect", other, ())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -48,12 +49,32 @@ def decide(findings: Findings, as_repeats: bool = False) -> Verdict:
         return Verdict("adequate" if base.error <= ADEQUATE else "unknown_effect", base)
     found = [one for level in findings.levels for one in level]
     chosen = simplest(found)
+    if stretched(chosen):
+        plausible = [one for one in found if not stretched(one) and not worse(one.judgement, chosen.judgement)]
+        if not plausible:
+            return Verdict("unknown_effect", chosen)
+        chosen = simplest(plausible)
     near = chosen.explained(base) > EXPLAINED and (chosen.error < TOLERATED_IF_EXPLAINED or as_repeats)
     far = chosen.error > ADEQUATE and chosen.explained(base) < MOST
     if far or (chosen.error > TOLERATED and not near):
         return Verdict("unknown_effect", chosen)
-    rivals = find_rivals(chosen, found)
+    rivals = find_rivals(chosen, [one for one in found if not stretched(one)])
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
+
+
+def stretched(one: Explanation) -> bool:
+    """Whether a number of its effects ends at the edge of what such a number may be.
+
+    Then the law stands in for another one: so do waves longer than the range of motion for any bent curve.
+    """
+    terms = one.fit.model.terms
+    return any(
+        math.isclose(term.values[p.name], edge, rel_tol=1e-6) and edge != p.neutral
+        for term in terms[max(len(terms) - one.terms, 0) :]
+        for p in term.effect.parameters
+        if p.name in term.fitted
+        for edge in (p.low, p.high)
+    )
 
 
 def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:

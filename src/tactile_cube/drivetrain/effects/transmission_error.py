@@ -16,8 +16,8 @@ class TransmissionError(Effect):
     name = "transmission_error"
     stage = Stage.POSITION_SENSOR
     parameters = (
-        Parameter("sine", unit="rad", neutral=0.0, low=-0.1, high=0.1, typical=0.003, source="1 arcmin to 0.5 deg"),
-        Parameter("cosine", unit="rad", neutral=0.0, low=-0.1, high=0.1, typical=0.0, source="1 arcmin to 0.5 deg"),
+        Parameter("sine", unit="rad", neutral=0.0, low=-0.02, high=0.02, typical=0.003, source="1 arcmin to 0.5 deg"),
+        Parameter("cosine", unit="rad", neutral=0.0, low=-0.02, high=0.02, typical=0.0, source="1 arcmin to 0.5 deg"),
         harmonic(source="eccentric pulleys to teeth"),
     )
 
