@@ -227,12 +227,14 @@ def test_a_further_effect_has_to_finish_what_is_nearly_explained() -> None:
 
 
 def test_much_that_few_segments_do_not_tell_from_chance_is_unproven_not_unknown() -> None:
-    found = replace(explanation("backlash", 9.0), p_value=0.02)
+    base = findings(20.0).base
+    found = replace(explanation("backlash", 9.0), gain=0.5, p_value=0.02)
     few = replace(found.judgement, samples=np.where(np.arange(60) < FEW_SEGMENTS - 1, 100, 0))
-    assert unproven(replace(found, judgement=few))
-    assert not unproven(found), "with so many segments chance is no excuse"
-    assert not unproven(replace(found, judgement=few, p_value=1e-5)), "proven"
-    assert not unproven(replace(found, judgement=few, gain=0.1)), "too little to speak of"
+    assert unproven(replace(found, judgement=few), base)
+    assert not unproven(found, base), "with so many segments chance is no excuse"
+    assert not unproven(replace(found, judgement=few, p_value=1e-5), base), "proven"
+    assert not unproven(replace(found, judgement=few, gain=0.1), base), "too little to speak of"
+    assert not unproven(replace(found, judgement=few, gain=0.9, p_value=0.005), base), "so much needs hardly any proof"
 
 
 def with_waves(one: Explanation, sine: float) -> Explanation:

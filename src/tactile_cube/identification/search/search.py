@@ -113,7 +113,7 @@ class Search:
                 self.left_behind = list(self.last_behind)
             better = [e for parent, e in found if worthwhile(e, parent, base, self.fitted.joints)]
             if not better:
-                doubtful = sorted((e for _, e in found if unproven(e)), key=lambda e: e.error)
+                doubtful = sorted((e for parent, e in found if unproven(e, parent)), key=lambda e: e.error)
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
             better[0] = self.pruned(better[0])

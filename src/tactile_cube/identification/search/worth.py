@@ -13,6 +13,7 @@ NEARLY_ALL = 0.9  # share of what it leaves that a further effect then has to ex
 SMALLEST_GAIN = 0.04  # share of the held-out squared error that an effect has to explain
 SIGNIFICANT = 2e-4  # p-value, corrected for the number of effects that were judged on the held-out trials
 LARGE_GAIN, SIGNIFICANT_IF_LARGE = 0.25, 1e-3  # the same for a share that no chance explains: short recordings
+MOST_OF_IT, SIGNIFICANT_IF_MOST = 0.75, 1e-2  # and for a share that needs hardly any proof
 FEW_SEGMENTS = 60  # held-out segments, 24 s
 SIGNIFICANT_IF_ALL = 0.01  # the same for one effect that explains everything
 REAL_PART = 0.98  # share of the excess error up to which an explanation is far from complete
@@ -28,10 +29,7 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation,
     cannot be a detail of the effect before.
     What is next to nothing beside the whole is a detail too, where there is little left anyway.
     """
-    enough = SIGNIFICANT_IF_LARGE if explanation.gain > LARGE_GAIN else SIGNIFICANT
-    if explanation.complete and not parent.effects:
-        enough = SIGNIFICANT_IF_ALL
-    if explanation.gain < SMALLEST_GAIN or explanation.p_value > enough:
+    if explanation.gain < SMALLEST_GAIN or not proven(explanation, parent):
         return False
     if not parent.effects:
         return True
@@ -45,10 +43,22 @@ def worthwhile(explanation: Explanation, parent: Explanation, base: Explanation,
     return parent.error > FAR_FROM_FLOOR and share > NEARLY_ALL
 
 
-def unproven(explanation: Explanation) -> bool:
+def proven(explanation: Explanation, parent: Explanation) -> bool:
+    """Whether held-out segments tell what the last effect explains from chance; the more it is, the less it takes."""
+    enough = SIGNIFICANT
+    if explanation.gain > LARGE_GAIN:
+        enough = SIGNIFICANT_IF_LARGE
+    if explanation.gain > MOST_OF_IT:
+        enough = SIGNIFICANT_IF_MOST
+    if explanation.complete and not parent.effects:
+        enough = SIGNIFICANT_IF_ALL
+    return explanation.p_value <= enough
+
+
+def unproven(explanation: Explanation, parent: Explanation) -> bool:
     """Whether an effect explains much, and there are too few held-out segments to tell that from chance."""
     few = np.count_nonzero(explanation.judgement.samples) < FEW_SEGMENTS
-    return bool(few and explanation.gain > LARGE_GAIN and explanation.p_value > SIGNIFICANT_IF_LARGE)
+    return bool(few and explanation.gain > LARGE_GAIN and not proven(explanation, parent))
 
 
 def least_gain(parent: Explanation, base: Explanation) -> float:
