@@ -63,9 +63,10 @@ def main(config: DictConfig) -> None:
     recording = without_touches(everything)
     diagnosis = diagnose(recording, tuple(effects), config.engine, config.step, config.seed, say, known)
     model = model_file(recording, diagnosis.fitted, diagnosis.errors(), diagnosis.held_out, command, config.seed)
+    result = as_json(diagnosis, write_experiment(diagnosis, folder), time.perf_counter() - begin)
     if known is not None:
         model = model.model_copy(update={"effects": model.with_effects(known.object_effects)})
-    result = as_json(diagnosis, write_experiment(diagnosis, folder), time.perf_counter() - begin)
+        result["known_effects"] += [one.effect for one in known.object_effects]
     if with_object(everything).trials:
         grip = diagnose_contact(everything, model, config.step, config.seed, say)
         model, result = grip.into(model, alone=False), with_contact(result, grip)

@@ -32,7 +32,9 @@ def write_contact_results(found: ContactIdentification, model: ModelFile, folder
 def write_contact_diagnosis(found: ContactDiagnosis, model: ModelFile, folder: Path, seconds: float) -> None:
     """Write model.yaml, diagnosis.json and report.html, and print the answer."""
     write_model(model, folder / "model.yaml")
-    result = found.as_json() | {"seconds": round(seconds, 2)}
+    news = {one.effect for one in found.effects()}
+    known = [one.effect for one in model.effects if one.effect not in news]
+    result = found.as_json() | {"known_effects": known, "seconds": round(seconds, 2)}
     (folder / "diagnosis.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
     path, made = str(folder / "model.yaml"), model.provenance
     page = contact_diagnosis_report(result, model.rig, made.command, made.recording, path)
