@@ -7,7 +7,7 @@ import pytest
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import table, write
 
-SHARED = Path(__file__).parents[3] / "shared" / "recordings"
+SHARED = Path(__file__).parents[4] / "shared" / "recordings"
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz"])

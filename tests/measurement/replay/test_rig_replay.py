@@ -15,7 +15,7 @@ from tactile_cube.measurement.replay.parameters import draw_parameters, nominal_
 from tactile_cube.measurement.replay.rig_replay import Replay, replay
 from tests.measurement.small_rig import write
 
-SHARED = Path(__file__).parents[3] / "shared" / "recordings"
+SHARED = Path(__file__).parents[4] / "shared" / "recordings"
 TRUE = {
     "kd": np.array([0.23595, 0.22932, 0.22615]),
     "static_friction": np.array([0.02432, 0.02429, 0.01524]),
