@@ -42,7 +42,7 @@ def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:
     given = {name: estimate.value for name, estimate in one.parameters.items()}
     free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
     return [
-        Term(effect, joint, {p.name: p.neutral for p in effect.parameters} | given, free)
+        Term(effect, joint, effect(joint, **given).values, free)
         for effect, joint in resolve([one.effect], recording.joints)
     ]
 
