@@ -57,6 +57,7 @@ def identification(
     mujoco = find_peer("mujoco", section.missing) if peers else None
     sysid = find_peer("mujoco.sysid", section.missing, needs="optimize") if mujoco is not None else None
     found: dict[str, tuple[list[float], float]] = {}
+    _ours(fitted, held_out)  # compiles the finger's kernels
     for _ in range(min(rounds, 3)):
         _note(found, "tactile_cube, base fit", *_ours(fitted, held_out))
         if mujoco is not None and sysid is not None:

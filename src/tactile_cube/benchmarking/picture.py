@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from tactile_cube.benchmarking.report import Growth, Section
 
 COLUMNS = 2
+LABEL = 30
+"""Letters a line of a bar's name."""
 OURS, THEIRS = "#2b6cb0", "#a0aec0"
 
 
@@ -27,7 +31,7 @@ def write_picture(sections: Sequence[Section], path: Path) -> None:
     if panels == 0:
         return
     rows = -(-panels // COLUMNS)
-    canvas = Canvas(figsize=(7.0 * COLUMNS, 2.6 * rows), layout="constrained")
+    canvas = Canvas(figsize=(7.0 * COLUMNS, 2.6 * rows), layout=ConstrainedLayoutEngine(h_pad=0.12))
     axes = [axis for line in canvas.subplots(rows, COLUMNS, squeeze=False) for axis in line]
     for axis, (section, unit) in zip(axes, bars, strict=False):
         _draw_bars(axis, section, unit)
@@ -40,7 +44,7 @@ def write_picture(sections: Sequence[Section], path: Path) -> None:
 
 def _draw_bars(axis: Axes, section: Section, unit: str) -> None:
     figures = [figure for figure in section.figures if figure.unit == unit][::-1]
-    names, values = [figure.name for figure in figures], [figure.value for figure in figures]
+    names, values = [fill(figure.name, LABEL) for figure in figures], [figure.value for figure in figures]
     spread = [[f.value - f.low for f in figures], [f.high - f.value for f in figures]]
     peers = {"PyBullet", "MuJoCo", "mujoco", "Stable"}
     colours = [THEIRS if any(name.startswith(peer) for peer in peers) else OURS for name in names]
