@@ -12,7 +12,7 @@ def main(config: DictConfig) -> None:
     """Gather results files and training runs into one page and one picture."""
     from pathlib import Path
 
-    from tactile_cube.evaluation.paper_table import paper_page, read_all
+    from tactile_cube.evaluation.paper_table import paper_page, read_all, read_comparison
     from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
     from tactile_cube.evaluation.training_curve import read_curve
     from tactile_cube.visualization.curves import write_learning_curves
@@ -23,7 +23,8 @@ def main(config: DictConfig) -> None:
     page = Path(config.page)
     page.parent.mkdir(parents=True, exist_ok=True)
     table1 = read_sweep(Path(config.table1)) if config.table1 else {}
-    page.write_text(paper_page(read_all(Path(config.runs)), curves, table1), encoding="utf-8")
+    free_finger = read_comparison(Path(config.free_finger)) if config.free_finger else None
+    page.write_text(paper_page(read_all(Path(config.runs)), curves, table1, free_finger), encoding="utf-8")
     print(f"page: {page}")
     if curves:
         write_learning_curves(curves, Path(config.picture), config.title)

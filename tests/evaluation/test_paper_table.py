@@ -4,7 +4,10 @@ from typing import Any
 
 import pytest
 
-from tactile_cube.evaluation.paper_table import ROWS, paper_page, read_all
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.model_card import read_card
+from tactile_cube.evaluation.paper_table import ROWS, paper_page, read_all, read_comparison
+from tactile_cube.evaluation.policy_path import SHIPPED
 from tactile_cube.evaluation.results_file import FORMAT
 from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1
 from tactile_cube.evaluation.training_curve import Curve
@@ -43,7 +46,7 @@ def line(page: str, what: str) -> str:
 
 def test_rows_that_were_not_run_give_their_command() -> None:
     page = paper_page([], [])
-    assert page.count("not run") == len(ROWS) + len(PAPER_TABLE_1)
+    assert page.count("not run") == len(ROWS) + 1 + len(PAPER_TABLE_1)
     assert "`python -m tactile_cube.evaluate protocol=endurance`" in line(page, "endurance")
     assert "Not run: `python -m tactile_cube.evaluate protocol=sim_to_sim`" in page
 
@@ -73,6 +76,52 @@ def test_variants_are_listed() -> None:
     assert "| nominal | 11.00 +- 0.50 | 12.00 | 8/10 | 8 regrasping, 2 dropped |" in paper_page(
         [results("sim_to_sim")], []
     )
+
+
+def variant(name: str, angle: float, kept: int = 5, **where: object) -> dict[str, Any]:
+    summary = {"mean_angle": angle, "std_angle": 0.5, "best_angle": angle, "kept": kept, "episodes": 5, "verdicts": {}}
+    return {"variant": {"name": name, **where}, "summary": summary, "episodes": []}
+
+
+def test_one_axis_of_the_map_is_one_row() -> None:
+    found = results("perturbations")
+    found["variants"] = [
+        variant("nominal", 15.0),
+        variant("cube 70 mm", 10.62, 4, axis="cube edge [mm]", value=70),
+        variant("cube 90 mm", 4.7, 2, axis="cube edge [mm]", value=90),
+        variant("mass 25 g", 12.0, 3, axis="cube mass [g]", value=25),
+    ]
+    shown = "cube edge [mm] 70: 4/5 kept, 10.6 rad; 90: 2/5 kept, 4.7 rad; nominal 15.0 rad"
+    assert f"| {shown} |" in line(paper_page([found], []), "other cubes")
+
+
+def test_what_breaks_the_policy_is_named_the_worst_first() -> None:
+    found = results("sim_to_sim")
+    found["variants"] = [variant("nominal", 10.0), variant("cogging", 8.1), variant("delay", 7.9), variant("lag", 2.0)]
+    assert "the first to identify: lag (2.0 rad), delay (7.9 rad)." in paper_page([found], [])
+
+
+def test_what_training_cost_is_read_from_the_shipped_card() -> None:
+    card = read_card(SHIPPED / "default.md")["CPU hours"]
+    assert float(card.split()[0]) > 0
+    assert f"| 600 | {card} | default, 0 |" in line(paper_page([results("paper", "default")], []), "CPU hours")
+
+
+def test_a_finger_in_free_space_stands_beside_figure_4(tmp_path: Path) -> None:
+    trials = [{"initialisation": 0}, {"initialisation": 0}, {"initialisation": 1}]
+    file = tmp_path / "comparison.json"
+    file.write_text(json.dumps({"band": {"inside": 0.934, "simulations": 40}, "trials": trials, "seconds": 36}))
+    row = line(paper_page([], [], free_finger=read_comparison(file)), "one finger")
+    assert (
+        "| 93 % of the samples of 3 recordings of 2 initialisations of a simulated finger lie among 40 | | 0.01" in row
+    )
+
+
+def test_a_comparison_without_a_band_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "comparison.json"
+    file.write_text(json.dumps({"band": None}))
+    with pytest.raises(InputError, match=r"no band of randomised simulations; run compare with band\.simulations=50"):
+        read_comparison(file)
 
 
 def test_training_runs_tell_when_regrasping_began() -> None:

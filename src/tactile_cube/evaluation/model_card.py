@@ -69,6 +69,14 @@ def model_card(
     return "\n".join(lines)
 
 
+def read_card(path: Path) -> dict[str, str]:
+    """Read the table of facts at the head of a card that `model_card` wrote."""
+    cells = [
+        line.strip("| ").split(" | ") for line in path.read_text(encoding="utf-8").splitlines() if line[:2] == "| "
+    ]
+    return {row[0]: row[1] for row in cells if len(row) == 2}
+
+
 def _total(runs: Mapping[str, Mapping[str, float]], *names: str) -> float:
     return sum(costs[name] for costs in runs.values() for name in names)
 

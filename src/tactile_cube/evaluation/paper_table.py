@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.model_card import read_card
+from tactile_cube.evaluation.policy_path import SHIPPED
 from tactile_cube.evaluation.results_file import read_results
 from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1, sweep_table
 from tactile_cube.evaluation.training_curve import ANGLE, REGRASPING, STEPS, Curve, cpu_hours, regrasping_begins
@@ -15,7 +19,12 @@ from tactile_cube.evaluation.training_curve import ANGLE, REGRASPING, STEPS, Cur
 Results = dict[str, Any]
 EVALUATE = "python -m tactile_cube.evaluate"
 TABLE_1 = "python -m tactile_cube.train -m +experiment=table1"
+TRAIN = "python -m tactile_cube.train +experiment=curriculum`, then `+experiment=finetune"
 SCRIPTED = "scripted"
+FINGER = "outputs/finger"
+FREE_FINGER = f"python -m tactile_cube.record out={FINGER}` and `python -m tactile_cube.compare recording={FINGER}"
+BREAKS = 0.8
+"""Share of the nominal condition's mean angle below which another simulation is said to break the policy."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +37,7 @@ class Row:
         protocol: of conf/protocol that repeats it.
         ours: our number from the results.
         policy: "scripted" for the hand-crafted trajectory; "" for any trained policy.
+        made_by: the command, where it is not the evaluation.
     """
 
     what: str
@@ -35,10 +45,13 @@ class Row:
     protocol: str
     ours: Callable[[Results], str]
     policy: str = ""
+    made_by: str = ""
 
     @property
     def command(self) -> str:
         """The command that fills the row."""
+        if self.made_by:
+            return self.made_by
         policy = f"policy={self.policy} " if self.policy else ""
         return f"{EVALUATE} {policy}protocol={self.protocol}"
 
@@ -53,7 +66,10 @@ class Row:
 
 
 def paper_page(
-    results: Sequence[Results], curves: Sequence[Curve], table1: Mapping[str, Mapping[int, Curve]] | None = None
+    results: Sequence[Results],
+    curves: Sequence[Curve],
+    table1: Mapping[str, Mapping[int, Curve]] | None = None,
+    free_finger: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the page: the paper's rows, robustness, other simulations, Table I, training runs.
 
@@ -61,10 +77,11 @@ def paper_page(
         results: what `read_results` gave, the newest last; the newest that fits fills a row.
         curves: training runs.
         table1: the runs of `+experiment=table1`, as `read_sweep` gives them.
+        free_finger: the comparison.json of a finger in free space, the paper's figure 4.
     """
-    parts = ["# The paper's results beside ours", INTRODUCTION, _paper_rows(results)]
-    parts += _variant_section("Robustness", "perturbations", results)
-    parts += _variant_section("Other simulations", "sim_to_sim", results)
+    parts = ["# The paper's results beside ours", INTRODUCTION, _paper_rows(results, free_finger)]
+    parts += [*_variant_section("Robustness", "perturbations", results), ROBUSTNESS_MAP]
+    parts += [*_variant_section("Other simulations", "sim_to_sim", results), *_what_breaks(results)]
     parts += _table1_section(table1 or {})
     parts += _training_section(curves)
     return "\n\n".join(parts) + "\n"
@@ -79,16 +96,48 @@ def _newest(results: Sequence[Results], fits: Callable[[Results], bool]) -> Resu
     return next((one for one in reversed(results) if fits(one)), None)
 
 
-def _paper_rows(results: Sequence[Results]) -> str:
+def read_comparison(path: Path) -> dict[str, Any]:
+    """Read the comparison.json of `compare`.
+
+    Raises:
+        InputError: it cannot be read, or has no band of randomised simulations.
+    """
+    try:
+        comparison = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: not the comparison.json of compare: {error}") from error
+    if not isinstance(comparison, dict) or not isinstance(comparison.get("band"), dict):
+        raise InputError(f"{path}: no band of randomised simulations; run compare with band.simulations=50")
+    return comparison
+
+
+def _paper_rows(results: Sequence[Results], free_finger: Mapping[str, Any] | None) -> str:
     lines = ["| experiment | paper | here | policy, seed | CPU hours | command |", "|---|---|---|---|---|---|"]
     for row in ROWS:
         found = _newest(results, row.fits)
         if found is None:
             lines.append(f"| {row.what} | {row.paper} | not run | | | `{row.command}` |")
             continue
-        made = f"{found['policy']['label']}, {found['seed']} | {found['cpu_hours']:.2f} | `{found['command']}`"
+        cost = "" if row.made_by else f"{found['cpu_hours']:.2f}"
+        made = f"{found['policy']['label']}, {found['seed']} | {cost} | `{row.made_by or found['command']}`"
         lines.append(f"| {row.what} | {row.paper} | {row.ours(found)} | {made} |")
+    lines.append(_free_finger_row(free_finger))
     return "\n".join(lines)
+
+
+def _free_finger_row(comparison: Mapping[str, Any] | None) -> str:
+    """The paper's figure 4: what is measured lies among randomised simulations."""
+    what = "one finger in free space, open loop (figure 4)"
+    paper = "15 recordings of 3 initialisations lie among 50 randomised simulations"
+    if comparison is None:
+        return f"| {what} | {paper} | not run | | | `{FREE_FINGER}` |"
+    band, trials = comparison["band"], comparison["trials"]
+    starts = len({trial["initialisation"] for trial in trials})
+    ours = (
+        f"{100 * band['inside']:.0f} % of the samples of {len(trials)} recordings of {starts} initialisations of a "
+        f"simulated finger lie among {band['simulations']}"
+    )
+    return f"| {what} | {paper} | {ours} | | {comparison['seconds'] / 3600:.2f} | `{FREE_FINGER}` |"
 
 
 def _summary(results: Results, variant: int = 0) -> dict[str, Any]:
@@ -128,16 +177,48 @@ def _with_endings(results: Results) -> str:
     return f"best {summary['best_angle']:.1f}, mean {summary['mean_angle']:.1f} rad; {kept}"
 
 
+def _verdicts(name: str) -> Callable[[Results], str]:
+    """How many episodes ended with a verdict."""
+    return lambda results: f"{_summary(results)['verdicts'][name]}/{_summary(results)['episodes']}"
+
+
+def _along(axis: str) -> Callable[[Results], str]:
+    """Where the cube was kept along one axis of the robustness map, and how far it was turned there."""
+
+    def ours(results: Results) -> str:
+        along = [one for one in results["variants"] if one["variant"].get("axis") == axis]
+        points = [(f"{one['variant']['value']:g}", one["summary"]) for one in along]
+        shown = [f"{at}: {of['kept']}/{of['episodes']} kept, {of['mean_angle']:.1f} rad" for at, of in points]
+        return f"{axis} {'; '.join(shown)}; nominal {_summary(results)['mean_angle']:.1f} rad"
+
+    return ours
+
+
+def _training_cost(results: Results) -> str:
+    """What the policy's card says, where it comes with the package."""
+    card = SHIPPED / f"{results['policy']['label']}.md"
+    return read_card(card)["CPU hours"] if card.is_file() else "see the ledger of its run"
+
+
 ROWS = (
+    Row("CPU hours of training", "600", "paper", _training_cost, made_by=TRAIN),
     Row("10 runs of 40 s, at least 80 % of the best run", "robot 8/10, simulation 9/10", "paper", _successes),
     Row("best of these runs", "15 rad", "paper", _best),
     Row("the same, 100 runs", "-", "many", _successes),
     Row("endurance, at most 16 min", "289 rad, 46 turns, stopped by hand", "endurance", _longest),
     Row("open-loop replay of a successful run", "fails after pi/2", "replay", _replayed),
     Row("hand-crafted trajectory", "11 rad, then drops", "paper", _with_endings, SCRIPTED),
+    Row("failure (a): stuck with twisted fingers", "until q1 was penalised", "many", _verdicts("stuck_twisted")),
+    Row("failure (c): turns on and drops it", "seen", "many", _verdicts("spun_and_dropped")),
+    Row("a finger is pulled", "withstands", "perturbations", _along("ring finger pulled [N]")),
+    Row("other orientations", "withstands", "perturbations", _along("hand tilted [deg]")),
+    Row("other cubes", "withstands, over 2 cm", "perturbations", _along("cube edge [mm]")),
+    Row("cuboids", "after fine-tuning", "perturbations", _along("cuboid: longer in x [mm]")),
 )
 """Source: paper, section IV, and the authors' website."""
 
+ROBUSTNESS_MAP = "![how far the cube is turned, and how often it is kept, along each axis](robustness.png)"
+"""The robustness.png that `evaluate protocol=perturbations` writes, copied beside the page."""
 INTRODUCTION = (
     "Written by `python -m tactile_cube.results` from the results files under docs/results/runs. Paper: Sievers, Pitz, "
     "Bäuml, *Learning Purely Tactile In-Hand Manipulation with a Torque-Controlled Hand*, ICRA 2022. Here everything "
@@ -160,6 +241,18 @@ def _variant_section(title: str, protocol: str, results: Sequence[Results]) -> l
             f"| {summary['best_angle']:.2f} | {summary['kept']}/{summary['episodes']} | {verdicts} |"
         )
     return [f"## {title}", head, "\n".join(lines)]
+
+
+def _what_breaks(results: Sequence[Results]) -> list[str]:
+    """The conditions that cost most, the worst first: what a lab should identify before anything else."""
+    found = _newest(results, lambda one: bool(one["protocol"] == "sim_to_sim"))
+    if found is None:
+        return []
+    nominal = _summary(found)["mean_angle"]
+    angles = {one["variant"]["name"]: one["summary"]["mean_angle"] for one in found["variants"]}
+    broken = sorted((name for name, angle in angles.items() if angle < BREAKS * nominal), key=angles.__getitem__)
+    named = ", ".join(f"{name} ({angles[name]:.1f} rad)" for name in broken) or "none"
+    return [f"Below {100 * BREAKS:.0f} % of the nominal angle, the worst first, and so the first to identify: {named}."]
 
 
 def _table1_section(table1: Mapping[str, Mapping[int, Curve]]) -> list[str]:

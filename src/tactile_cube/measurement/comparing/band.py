@@ -1,4 +1,4 @@
-"""N randomised simulations and the share of what was measured that lies among them (figure 3 of the paper)."""
+"""N randomised simulations and the share of what was measured that lies among them (figure 4 of the paper)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
