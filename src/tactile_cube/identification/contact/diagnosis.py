@@ -12,14 +12,9 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
 from tactile_cube.identification.contact.choice import GOOD, ContactSearch, Tried, mean_squares, some_of_each_kind
 from tactile_cube.identification.contact.fit import fit_contact
-from tactile_cube.identification.contact.trial import SIGMA, ContactTrial
-from tactile_cube.measurement.bench import with_object
+from tactile_cube.identification.contact.grasps import open_grasps
 from tactile_cube.measurement.comparing.error import ErrorSummary, summarise
-from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.hand_replay import HandReplay, contact_of
-from tactile_cube.measurement.replay.parameters import nominal_parameters
-from tactile_cube.measurement.split import held_out_split
 
 Array = NDArray[np.float64]
 Verdict = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
@@ -129,31 +124,22 @@ def diagnose_contact(
         seed: which trials are held out.
         say: takes progress lines.
     """
-    held = with_object(recording)
-    fitted_part, held_out = held_out_split(held, seed=seed)
-    replay = HandReplay(held, nominal_parameters(held, model), step)
-    try:
-        trials = some_of_each_kind([ContactTrial(replay, trial) for trial in fitted_part.trials], FITTED)
-        judges = some_of_each_kind([ContactTrial(replay, trial) for trial in held_out.trials], JUDGED)
-        start = contact_of(model)
+    with open_grasps(recording, model, step, seed) as grasps:
+        trials = some_of_each_kind(grasps.fitted, FITTED)
+        judges = some_of_each_kind(grasps.held_out, JUDGED)
         search = ContactSearch(trials, judges, say)
-        search.run(start)
-        estimates = {}
+        search.run(grasps.start)
+        estimates, end = {}, search.first
         if search.found:
-            effects = [one.effect for one in search.found]
-            fit = fit_contact(trials, effects, start, say)
+            fit = fit_contact(trials, [one.effect for one in search.found], grasps.start, say)
             estimates, end = fit.estimates, mean_squares(judges, fit.contact)
-        else:
-            end = search.first
-    finally:
-        replay.close()
-    stages = {
-        key: summarise(list(np.sqrt(s)), held.joints) for key, s in (("nominal", search.first), ("with_effects", end))
-    }
-    noise = float(np.hypot(np.sqrt(np.mean(sensor_noise(held) ** 2)), SIGMA))
+    errors = {"nominal": search.first, "with_effects": end}
+    stages = {key: summarise(list(np.sqrt(squares)), grasps.joints) for key, squares in errors.items()}
     names = [one.trial.name for one in judges]
     verdict = verdict_of(search, stages["with_effects"].overall)
-    return ContactDiagnosis(verdict, search.found, search.rivals, search.tried, estimates, stages, noise, names)
+    return ContactDiagnosis(
+        verdict, search.found, search.rivals, search.tried, estimates, stages, grasps.noise_floor, names
+    )
 
 
 def with_contact(result: Mapping[str, Any], found: ContactDiagnosis) -> dict[str, Any]:

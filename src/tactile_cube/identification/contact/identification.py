@@ -13,15 +13,14 @@ import numpy as np
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.fit import ContactFit, fit_contact, shown_by
-from tactile_cube.identification.contact.trial import SIGMA, ContactTrial
+from tactile_cube.identification.contact.grasps import open_grasps
+from tactile_cube.identification.contact.trial import ContactTrial
 from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.comparing.error import ErrorSummary, summarise
-from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, contact_of
+from tactile_cube.measurement.replay.hand_replay import Contact
 from tactile_cube.measurement.replay.parameters import CONTROLLER, nominal_parameters
-from tactile_cube.measurement.split import held_out_split
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
 
 
@@ -133,22 +132,13 @@ def identify_contact(
         seed: which trials are held out.
         say: takes progress lines.
     """
-    held = with_object(recording)
-    fitted_part, held_out = held_out_split(held, seed=seed)
-    replay = HandReplay(held, nominal_parameters(held, model), step)
-    try:
-        trials = [ContactTrial(replay, trial) for trial in fitted_part.trials]
-        start = contact_of(model)
-        fit = fit_contact(trials, effects, start, say)
+    with open_grasps(recording, model, step, seed) as grasps:
+        fit = fit_contact(grasps.fitted, effects, grasps.start, say)
         say("simulating the held-out trials")
-        judges = [ContactTrial(replay, trial) for trial in held_out.trials]
-        judges = list(dict.fromkeys(one for effect in effects for one in shown_by(judges, effect)))
-        stages = {"nominal": start, "with_effects": fit.contact}
-        errors = {key: contact_error(judges, contact, held.joints) for key, contact in stages.items()}
-    finally:
-        replay.close()
-    noise = float(np.hypot(np.sqrt(np.mean(sensor_noise(held) ** 2)), SIGMA))
-    return ContactIdentification(fit, errors, noise, [one.trial.name for one in judges])
+        judges = list(dict.fromkeys(one for effect in effects for one in shown_by(grasps.held_out, effect)))
+        stages = {"nominal": grasps.start, "with_effects": fit.contact}
+        errors = {key: contact_error(judges, contact, grasps.joints) for key, contact in stages.items()}
+    return ContactIdentification(fit, errors, grasps.noise_floor, [one.trial.name for one in judges])
 
 
 def contact_error(trials: Sequence[ContactTrial], contact: Contact, joints: Sequence[str]) -> ErrorSummary:
