@@ -20,7 +20,14 @@ def write_metrics(folder: Path, text: str = METRICS) -> Path:
 
 
 def test_begin_and_end_of_the_curriculum_are_found(tmp_path: Path) -> None:
-    assert curriculum_ends(read_curve(write_metrics(tmp_path), "seed 0")) == [2000, 3000]
+    assert curriculum_ends(read_curve(write_metrics(tmp_path), "seed 0")) == [2, 3]
+
+
+def test_a_curriculum_on_the_filter_constant_alone_is_marked_too(tmp_path: Path) -> None:
+    text = "steps,final_angle,T_s,gravity\n0,,0.25,1\n1000,2,0.3,1\n2000,3,0.5,1\n3000,3,0.5,1\n"
+    assert curriculum_ends(read_curve(write_metrics(tmp_path, text), "seed 0")) == [1, 2]
+    still = text.replace("0.25", "0.5").replace("0.3", "0.5")
+    assert curriculum_ends(read_curve(write_metrics(tmp_path, still), "seed 0")) == []
 
 
 def test_regrasping_begins_when_a_full_window_exceeds_three_radians(tmp_path: Path) -> None:

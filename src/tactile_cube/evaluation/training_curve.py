@@ -9,6 +9,8 @@ from pathlib import Path
 from tactile_cube.errors import InputError
 
 ANGLE, STEPS = "final_angle", "steps"
+CURRICULUM = ("T_s", "gravity")
+"""What a curriculum moves, [s] and share of the weight."""
 COSTS = ("simulating_hours", "learning_hours")
 REGRASPING = 3.0
 """Mean final angle [rad] that shows regrasping in training: with starts turned by up to 43 deg a single twist comes to
@@ -52,12 +54,11 @@ def read_curve(path: Path, label: str) -> Curve:
     return Curve(label, {name: [float(row[name] or "nan") for row in rows] for name in rows[0]})
 
 
-def curriculum_ends(curve: Curve) -> list[float]:
-    """Return the steps at which the curriculum begins and ends, or nothing where it never moved."""
-    values = curve.columns.get("gravity") or curve.columns.get("T_s") or []
-    moving = [
-        step for step, now, last in zip(curve.columns[STEPS][1:], values[1:], values, strict=False) if now != last
-    ]
+def curriculum_ends(curve: Curve) -> list[int]:
+    """Return the rows in which the curriculum begins and ends, or nothing where it never moved."""
+    columns = [curve.columns[name] for name in CURRICULUM if name in curve.columns]
+    values = list(zip(*columns, strict=True))
+    moving = [row for row in range(1, len(values)) if values[row] != values[row - 1]]
     return [moving[0], moving[-1]] if moving else []
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -14,48 +15,42 @@ from matplotlib.figure import Figure
 
 from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.summary import Summary
-from tactile_cube.evaluation.training_curve import ANGLE, REGRASPING, STEPS, Curve, curriculum_ends
+from tactile_cube.evaluation.training_curve import ANGLE, CURRICULUM, REGRASPING, STEPS, Curve, curriculum_ends
 
-CURRICULUM = ("T_s", "gravity")
+DASHES = ("-", ":")
+MARKERS = (">", "s")
 MAP_COLUMNS = 3
 
 
 def write_learning_curves(curves: Sequence[Curve], path: Path, title: str) -> None:
     """Draw mean final angle over environment steps, and below it what the curriculum did.
 
-    Begin and end of the curriculum of the first run are marked by grey lines.
+    A triangle and a square mark where the curriculum of a run begins and ends.
 
     Args:
         curves: the runs, e.g. one a seed.
         path: file to write; its ending (.png, .svg) chooses the format.
         title: of the picture.
     """
-    figure = Figure(figsize=(8, 5), layout="constrained")
+    figure = Figure(figsize=(8, 5.5), layout="constrained")
     angle, schedule = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
-    for curve in curves:
+    for number, curve in enumerate(curves):
         million = [step / 1e6 for step in curve.columns[STEPS]]
-        angle.plot(million, curve.columns[ANGLE], label=curve.label, linewidth=1.2)
+        style: dict[str, Any] = {"color": f"C{number % 10}", "linewidth": 1.2}
+        angle.plot(million, curve.columns[ANGLE], label=curve.label, **style)
+        for row, marker in zip(curriculum_ends(curve), MARKERS, strict=False):
+            angle.plot(million[row], curve.columns[ANGLE][row], marker=marker, markeredgecolor="black", **style)
+        for name, dashes in zip(CURRICULUM, DASHES, strict=True):
+            if name in curve.columns:
+                schedule.plot(million, curve.columns[name], linestyle=dashes, **style)
     angle.axhline(REGRASPING, color="grey", linestyle="--", linewidth=0.8)
-    angle.annotate("regrasping", (1, REGRASPING), xycoords=("axes fraction", "data"), ha="right", va="bottom", size=8)
+    angle.annotate("regrasping", (0, REGRASPING), xycoords=("axes fraction", "data"), ha="left", va="bottom", size=8)
     angle.set(ylabel="mean final angle [rad]", title=title)
     angle.legend(fontsize=8)
-    angle.grid(alpha=0.3)
-    _draw_curriculum([angle, schedule], curves[0])
-    schedule.set_xlabel("environment steps [million]")
+    schedule.set(xlabel="environment steps [million]", ylabel="T_s [s] (solid),\ngravity (dotted)", ylim=(0, None))
+    for axis in (angle, schedule):
+        axis.grid(alpha=0.3)
     figure.savefig(path, dpi=110)
-
-
-def _draw_curriculum(axes: Sequence[Axes], curve: Curve) -> None:
-    million = [step / 1e6 for step in curve.columns[STEPS]]
-    for name, label in zip(CURRICULUM, ("T_s [s]", "gravity"), strict=True):
-        if name in curve.columns:
-            axes[-1].plot(million, curve.columns[name], label=label, linewidth=1.2)
-    for step in curriculum_ends(curve):
-        for axis in axes:
-            axis.axvline(step / 1e6, color="grey", linewidth=0.8)
-    axes[-1].set_ylim(bottom=0)
-    axes[-1].legend(fontsize=8)
-    axes[-1].grid(alpha=0.3)
 
 
 def write_robustness_map(variants: Sequence[VariantResult], nominal_values: Mapping[str, float], path: Path) -> None:
