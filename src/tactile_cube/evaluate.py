@@ -24,6 +24,7 @@ def main(config: DictConfig) -> None:
     from tactile_cube.evaluation.policy_source import find_policy
     from tactile_cube.evaluation.results_file import Run, write_results
     from tactile_cube.evaluation.summary import HEADER, row, sentence
+    from tactile_cube.visualization.curves import write_robustness_map
     from tactile_cube.visualization.showcase import showcase
 
     torch.set_num_threads(1)
@@ -42,6 +43,9 @@ def main(config: DictConfig) -> None:
     write_results(folder / "results.json", run, variants)
     print(*(sentence(variant.variant.name, variant.summary) for variant in variants), sep="\n")
     print(f"results: {folder / 'results.json'}")
+    if any(variant.variant.axis for variant in variants):
+        write_robustness_map(variants, protocol.nominal_values, folder / "robustness.png")
+        print(f"robustness map: {folder / 'robustness.png'}")
     if config.film:
         showcase(evaluation, variants, folder)
 

@@ -25,6 +25,14 @@ def test_a_baseline_is_judged_filmed_and_recorded(tmp_path: Path) -> None:
         assert list((tmp_path / "run").glob(f"episode*{ending}")), ending
 
 
+def test_the_robustness_map_is_drawn_without_a_film_too(tmp_path: Path) -> None:
+    words = ["policy=hold", "protocol=perturbations", "protocol.episodes=1", "protocol.seconds=0.2", "film=false"]
+    run = evaluate(tmp_path, *words, f"hydra.run.dir={tmp_path}/run")
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "run" / "robustness.png").stat().st_size > 10_000
+    assert not list((tmp_path / "run").glob("episode*"))
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

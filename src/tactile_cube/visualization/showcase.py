@@ -6,7 +6,6 @@ from pathlib import Path
 
 from tactile_cube.evaluation.evaluation import Evaluation, VariantResult
 from tactile_cube.evaluation.verdict import EpisodeResult
-from tactile_cube.visualization.curves import write_robustness_map
 from tactile_cube.visualization.episode_recording import write_recording
 from tactile_cube.visualization.film import write_film, write_stills
 
@@ -19,8 +18,8 @@ def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path
         variants: what came of it.
         folder: where the files go.
     """
-    first, protocol = variants[0], evaluation.protocol
-    best = sorted(first.results, key=lambda result: result.final_angle, reverse=True)[: protocol.film]
+    first = variants[0]
+    best = sorted(first.results, key=lambda result: result.final_angle, reverse=True)[: evaluation.protocol.film]
     for result in best:
         record = evaluation.record(first.variant, result)
         file = folder / f"episode{result.episode}"
@@ -29,9 +28,6 @@ def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path
         write_stills(record, file.with_suffix(".png"), every=max(5, record.steps // 30))
         write_recording(record, file.with_suffix(".rrd"), summary=description(result))
         print(f"episode {result.episode}: {file}.gif, stills {file}.png; look inside: rerun {file}.rrd")
-    if any(variant.variant.axis for variant in variants):
-        write_robustness_map(variants, protocol.nominal_values, folder / "robustness.png")
-        print(f"robustness map: {folder / 'robustness.png'}")
 
 
 def description(result: EpisodeResult) -> str:
