@@ -12,7 +12,8 @@ def main(config: DictConfig) -> None:
     """Gather results files and training runs into one page and one picture."""
     from pathlib import Path
 
-    from tactile_cube.evaluation.paper_table import paper_page, read_all, read_comparison
+    from tactile_cube.evaluation.paper_rows import read_comparison
+    from tactile_cube.evaluation.paper_table import paper_page, read_all
     from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
     from tactile_cube.evaluation.training_curve import read_curve
     from tactile_cube.visualization.curves import write_learning_curves

@@ -6,7 +6,8 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.model_card import read_card
-from tactile_cube.evaluation.paper_table import ROWS, paper_page, read_all, read_comparison
+from tactile_cube.evaluation.paper_rows import ROWS, read_comparison
+from tactile_cube.evaluation.paper_table import paper_page, read_all
 from tactile_cube.evaluation.policy_path import SHIPPED
 from tactile_cube.evaluation.results_file import FORMAT
 from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1
