@@ -88,7 +88,8 @@ def _table1_section(table1: Mapping[str, Mapping[int, Curve]]) -> list[str]:
     head = (
         f"`{TABLE_1}`, which goes on where it was when it is called again. Steps until the mean angle of the last 50 "
         "training episodes exceeds 3 rad; with `>`: not until then. A gait shows here how to regrasp and is imitated "
-        "where it pays (docs/results/curriculum); the paper's runs find out by themselves."
+        "where it pays (docs/results/curriculum); the paper's runs find out by themselves. Machines, and runs beside "
+        "these: docs/results/table1."
     )
     return ["## Table I: steps until regrasping", head, sweep_table(table1, tuple(PAPER_TABLE_1))]
 
