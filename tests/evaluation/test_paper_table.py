@@ -50,6 +50,7 @@ def test_rows_that_were_not_run_give_their_command() -> None:
     assert page.count("not run") == len(ROWS) + 1 + len(PAPER_TABLE_1)
     assert "`python -m tactile_cube.evaluate protocol=endurance`" in line(page, "endurance")
     assert "Not run: `python -m tactile_cube.evaluate protocol=sim_to_sim`" in page
+    assert "robustness.png" not in page
 
 
 def test_our_number_stands_beside_the_papers() -> None:
@@ -92,6 +93,7 @@ def test_one_axis_of_the_map_is_one_row() -> None:
         variant("cube 90 mm", 4.7, 2, axis="cube edge [mm]", value=90),
         variant("mass 25 g", 12.0, 3, axis="cube mass [g]", value=25),
     ]
+    assert "(robustness.png)" in paper_page([found], [])
     shown = "cube edge [mm] 70: 4/5 kept, 10.6 rad; 90: 2/5 kept, 4.7 rad; nominal 15.0 rad"
     assert f"| {shown} |" in line(paper_page([found], []), "other cubes")
 

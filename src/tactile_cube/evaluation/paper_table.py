@@ -33,7 +33,8 @@ def paper_page(
         free_finger: the comparison.json of a finger in free space, the paper's figure 4.
     """
     parts = ["# The paper's results beside ours", INTRODUCTION, paper_rows(results, free_finger)]
-    parts += [*_variant_section("Robustness", "perturbations", results), ROBUSTNESS_MAP]
+    parts += _variant_section("Robustness", "perturbations", results)
+    parts += [ROBUSTNESS_MAP] if any(one["protocol"] == "perturbations" for one in results) else []
     parts += [*_variant_section("Other simulations", "sim_to_sim", results), *_what_breaks(results)]
     parts += _table1_section(table1 or {})
     parts += _training_section(curves)
