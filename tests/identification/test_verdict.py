@@ -109,6 +109,12 @@ def test_an_effect_that_explains_half_of_little_is_not_named() -> None:
     assert decide(findings(1.9, explanation("backlash", 1.1, 1.9))).kind == "missing_effect"
 
 
+@pytest.mark.parametrize(("left", "kind"), [(1.5, "missing_effect"), (2.0, "unknown_effect"), (2.9, "unknown_effect")])
+def test_an_effect_that_leaves_twice_the_noise_is_named_only_if_it_explains_nearly_all(left: float, kind: str) -> None:
+    assert decide(findings(9.0, explanation("backlash", left, 9.0))).kind == kind
+    assert decide(findings(90.0, explanation("backlash", left, 90.0))).kind == "missing_effect"
+
+
 def test_an_effect_that_leaves_no_more_than_repeats_differ_is_named_if_it_explains_nearly_all() -> None:
     tipping = findings(100.0, explanation("torque_saturation", 4.5, 100.0))
     assert decide(tipping).kind == "unknown_effect"
@@ -123,7 +129,8 @@ def test_what_a_black_box_still_explains_is_not_noise() -> None:
 
 
 def test_joints_are_unexplained_while_their_error_stays_above_the_noise() -> None:
-    assert unexplained_joints(explanation("backlash", 9.0), ("q1", "q2")) == ["q1"]
+    for error, joints in ((9.0, ["q1"]), (2.0, ["q1"]), (1.5, [])):
+        assert unexplained_joints(explanation("backlash", error), ("q1", "q2")) == joints
 
 
 def test_a_further_effect_needs_a_real_part_of_the_error() -> None:

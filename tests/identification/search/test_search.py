@@ -5,14 +5,16 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.evidence import Judgement, p_value
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.search import Search, pursued
 from tactile_cube.identification.search.shortlist import of_each, with_groups
-from tests.identification.test_verdict import explanation
+from tests.identification.test_verdict import explanation, findings, judged
 
-FIT = SimpleNamespace(cost=0.0)  # stands for a fit: the choice goes by order alone
+FIT = SimpleNamespace(cost=0.0, model=None)  # stands for a fit: the choice goes by order alone
 
 
 @pytest.mark.parametrize(
@@ -77,3 +79,42 @@ def test_where_a_first_look_promises_next_to_nothing_nothing_is_refitted() -> No
     assert with_groups(scores, 400.0) == []
     together = [score("cogging", "q1", 80.0), score("cogging", "q2", 70.0)]
     assert with_groups(together, 400.0)[0].joints == ("q1", "q2"), "at all joints together it promises enough"
+
+
+class Contest(Search):
+    """A search in which given effects come through to the held-out trials, and all do equally well there."""
+
+    def __init__(self, names: list[str], outcome: Judgement) -> None:
+        self.finalists = [(explanation(name, 1.0).effects[0], FIT) for name in names]
+        self.outcome, self.candidates, self.effects = outcome, [], ()  # type: ignore[assignment]
+        self.problem = self.fitted = self.start = SimpleNamespace(terms=())  # type: ignore[assignment]
+        self.say = lambda line: None
+
+    def frozen(self, fitted: object) -> object:  # type: ignore[override]
+        return SimpleNamespace(cost=1.0)
+
+    def race(self, frozen: object, chosen: object) -> list:  # type: ignore[override, type-arg]
+        return self.finalists
+
+    def restarted(self, frozen: object, *pair: object) -> tuple[object, ...]:  # type: ignore[override]
+        return pair
+
+    def special(self, frozen: object, *pair: object) -> list:  # type: ignore[override, type-arg]
+        return []
+
+    def settled(self, model: object) -> tuple[object, Judgement]:  # type: ignore[override]
+        return FIT, self.outcome
+
+
+@pytest.mark.parametrize("names", [["cogging"], ["cogging", "backlash", "payload", "torque_bias"]])
+def test_the_more_effects_are_judged_beside_it_the_less_significant_is_each(
+    names: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for stage in ("residual_candidates", "screen"):
+        monkeypatch.setattr(module, stage, lambda *_: [])
+    base = findings(1.3).base
+    after = judged(1.28, seed=1)  # a gain that chance may well give
+    alone = p_value(base.judgement, after)
+    assert 0.01 < alone < 0.25, "so that four times it is no probability above one"
+    found = Contest(names, after).extend(base, base)
+    assert [one.p_value for one in found] == pytest.approx([len(names) * alone] * len(names))
