@@ -189,3 +189,15 @@ def test_cuda_gives_the_gradients_of_the_cpu() -> None:
     on_gpu = gpu._target(batch, batch.action, torch.zeros(32, 1, device="cuda"))
     torch.testing.assert_close(on_gpu.cpu(), target, rtol=1e-3, atol=1e-4)
     assert torch.isfinite(gpu.update(random_batch())["critic_loss"])
+
+
+def test_bfloat16_learns_on_a_cpu_without_bfloat16_products(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tactile_cube.agent.flat_perceptron.MULTIPLIES_BF16", False)
+    monkeypatch.setattr("tactile_cube.agent.flat_perceptron.FUSES", False)
+    monkeypatch.setattr(torch.ops.mkldnn, "_linear_pointwise", None)
+    torch.manual_seed(3)
+    agent = FastSac(SIZES, **(SETTINGS | {"precision": "bf16"}))
+    before = agent.networks.master.clone()
+    agent.update(random_batch())
+    assert torch.isfinite(agent.networks.master).all()
+    assert not torch.equal(agent.networks.master, before)

@@ -12,7 +12,11 @@ from torch import Tensor, nn
 
 LAYER_NORM_EPS = 1e-5
 
-FUSES = hasattr(torch.ops.mkldnn, "_linear_pointwise")
+MULTIPLIES_BF16 = torch.ops.mkldnn._is_mkldnn_bf16_supported()
+"""Whether oneDNN has bfloat16 products for this CPU (AVX-512 and newer); elsewhere torch's take forty times as long as
+float32's."""
+
+FUSES = MULTIPLIES_BF16 and hasattr(torch.ops.mkldnn, "_linear_pointwise")
 """Whether oneDNN's product with bias and ReLU in one is there; torch's compiler calls it, no public function does."""
 
 Activation = tuple[Tensor, Tensor, Tensor | None, Tensor | None]
@@ -29,8 +33,23 @@ def affine(x: Tensor, weight: Tensor, bias: Tensor, rectify: bool) -> Tensor:
     if x.dtype == torch.bfloat16 and FUSES and not x.is_cuda:
         result: Tensor = torch.ops.mkldnn._linear_pointwise(x, weight.t(), bias, "relu" if rectify else "none", [], "")
         return result
-    product = torch.addmm(bias, x, weight)
+    if _detours(x):
+        product = torch.addmm(bias.float(), x.float(), weight.float()).bfloat16()
+    else:
+        product = torch.addmm(bias, x, weight)
     return product.relu_() if rectify else product
+
+
+def multiply(a: Tensor, b: Tensor, out: Tensor | None = None) -> Tensor:
+    """Matrix product; bfloat16 goes by float32, rounded at the end, where the CPU has no such product."""
+    if not _detours(a):
+        return torch.mm(a, b, out=out)
+    product = (a.float() @ b.float()).bfloat16()
+    return product if out is None else out.copy_(product)
+
+
+def _detours(x: Tensor) -> bool:
+    return x.dtype == torch.bfloat16 and not MULTIPLIES_BF16 and not x.is_cuda
 
 
 def rectify_gradient_(gradient: Tensor, after_relu: Tensor) -> Tensor:
@@ -82,17 +101,17 @@ class FlatPerceptron:
         """
         for index in range(len(self.layers) - 1, -1, -1):
             weight_gradient, bias_gradient = self.gradients[index]
-            torch.mm(kept[index][0][rows].t(), gradient[rows], out=weight_gradient)
+            multiply(kept[index][0][rows].t(), gradient[rows], out=weight_gradient)
             torch.sum(gradient[rows], 0, out=bias_gradient)
             if index > 0:
                 after_relu = kept[index][0]
-                gradient = rectify_gradient_(torch.mm(gradient, self.layers[index][0].t()), after_relu)
+                gradient = rectify_gradient_(multiply(gradient, self.layers[index][0].t()), after_relu)
                 gradient = self._normalise_backward(gradient, kept[index - 1])
         return gradient
 
     def input_gradient(self, first_product_gradient: Tensor, columns: slice) -> Tensor:
         """Gradient with respect to some columns of the input, from what `backward` gave."""
-        return torch.mm(first_product_gradient, self.layers[0][0][columns].t())
+        return multiply(first_product_gradient, self.layers[0][0][columns].t())
 
     def _normalise(self, product: Tensor) -> tuple[Tensor, Tensor | None, Tensor | None]:
         if not self.layer_norm:
