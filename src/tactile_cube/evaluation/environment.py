@@ -14,6 +14,8 @@ from tactile_cube.evaluation.policy_source import PolicySource
 from tactile_cube.transforms import EnvConfig
 
 GROUPS = ("task", "reward", "randomization", "start")
+PUBLISHED_SPINNING_FRICTION = 0.1
+"""What policies were trained at [m] before files stated it: it was the only nominal value then."""
 TRUSTED = "tactile_cube."
 """A policy file is data from somewhere: of the classes it names, only the package's own are made."""
 
@@ -35,6 +37,11 @@ def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
         settings = OmegaConf.create(OmegaConf.to_container(config.untrained, resolve=True))
     else:
         settings = OmegaConf.create(_checked(trained, source.label) | {"curriculum": None, "exploration": None})
+        constants = {
+            "_target_": "tactile_cube.simulation.EpisodeConstants",
+            "tip_spinning_friction": PUBLISHED_SPINNING_FRICTION,
+        }
+        settings.constants = OmegaConf.merge(constants, settings.get("constants") or {})
         if not named:
             _refuse_foreign_effects(trained, source.label)
     if named:

@@ -1,6 +1,7 @@
 """Distributions as values; the constants and the start of one episode drawn from them."""
 
 from tactile_cube.randomization.distributions import (
+    Choice,
     Constant,
     Distribution,
     LogUniform,
@@ -15,6 +16,7 @@ from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.randomization.start_states import StartPoses, StartStates
 
 __all__ = [
+    "Choice",
     "Constant",
     "Distribution",
     "EffectRange",

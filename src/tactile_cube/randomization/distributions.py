@@ -78,6 +78,23 @@ class UniformPerJoint:
 
 
 @dataclass(frozen=True)
+class Choice:
+    """One of `values`, all equally likely."""
+
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuses an empty choice."""
+        if not len(self.values):
+            raise InputError("Choice: values is empty; give at least one number")
+
+    def quantile(self, u: Array) -> Array:
+        """The value in whose equal share of [0, 1) each number of `u` lies."""
+        values = np.asarray(self.values, dtype=np.float64)
+        return np.asarray(values[(np.asarray(u) * len(values)).astype(np.int64)])
+
+
+@dataclass(frozen=True)
 class LogUniform:
     """Equally likely in every factor: the logarithm is uniform in [log low, log high)."""
 
