@@ -136,6 +136,16 @@ def test_bfloat16_follows_float32_roughly() -> None:
     assert not exact.approximations()
 
 
+@pytest.mark.parametrize(("supported", "dtype"), [(True, torch.bfloat16), (False, torch.float32)])
+def test_automatic_precision_is_what_the_processor_multiplies(
+    supported: bool, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tactile_cube.agent.settings.multiplies_bfloat16", lambda: supported)
+    agent = FastSac(SIZES, **(SETTINGS | {"precision": "auto"}))
+    assert agent.networks.working.dtype == dtype
+    assert bool(agent.approximations()) == supported
+
+
 def test_flat_perceptron_equals_torch_perceptron() -> None:
     from tactile_cube.agent.networks import perceptron
 

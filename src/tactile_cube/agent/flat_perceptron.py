@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
+from tactile_cube.agent.settings import multiplies_bfloat16
+
 LAYER_NORM_EPS = 1e-5
 
-MULTIPLIES_BF16 = torch.ops.mkldnn._is_mkldnn_bf16_supported()
-"""Whether oneDNN has bfloat16 products for this CPU (AVX-512 and newer); elsewhere torch's take forty times as long as
-float32's."""
+MULTIPLIES_BF16 = multiplies_bfloat16()
 
 FUSES = MULTIPLIES_BF16 and hasattr(torch.ops.mkldnn, "_linear_pointwise")
 """Whether oneDNN's product with bias and ReLU in one is there; torch's compiler calls it, no public function does."""

@@ -33,7 +33,7 @@ class FlatNetworks:
             "critic": (sizes.critic, *settings.hidden, 1),
         }
         actor, critic = parameter_count(self.layout["actor"]), parameter_count(self.layout["critic"])
-        dtype = torch.bfloat16 if settings.precision == "bf16" else torch.float32
+        dtype = settings.product_dtype
         self.master = torch.zeros(actor + 2 * critic, device=device)
         self.target_master = torch.zeros(2 * critic, device=device)
         self.critic_part = self.master[actor:]
@@ -85,7 +85,7 @@ class FastSac:
 
     def _build_single_pass(self) -> SinglePass | None:
         networks = self.networks
-        if self.settings.precision != "bf16" or self.device.type != "cpu":
+        if self.settings.product_dtype != torch.bfloat16 or self.device.type != "cpu":
             return None
         vectors = (networks.master, networks.working, networks.gradient, networks.target_master)
         return SinglePass(self.optimizer, *vectors, networks.target_working, self.settings.tau)
@@ -238,6 +238,8 @@ class FastSac:
 
     def approximations(self) -> list[str]:
         """What departs from exact float32."""
-        if self.settings.precision != "bf16":
+        if self.settings.product_dtype != torch.bfloat16:
             return []
-        return ["agent.precision=bf16: matrix products and gradients in bfloat16, parameters and optimiser in float32"]
+        return [
+            f"agent.precision={self.settings.precision}: matrix products and gradients in bfloat16, parameters and optimiser in float32"
+        ]

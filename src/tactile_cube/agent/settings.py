@@ -8,6 +8,11 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
 from tactile_cube.errors import InputError
 
 
+def multiplies_bfloat16() -> bool:
+    """Whether oneDNN has bfloat16 products for this CPU (AVX-512 and newer); elsewhere they take many times float32's."""
+    return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported())
+
+
 class AgentSettings(BaseModel):
     """Hyperparameters of SAC; the defaults are the paper's first training where it publishes them.
 
@@ -25,7 +30,8 @@ class AgentSettings(BaseModel):
         demonstration_weight: of imitating a demonstrated action where the critics hold it for better than the actor's
             own (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone, more is for `sac_fast`.
         batch_size: replayed transitions an update.
-        precision: arithmetic of the matrix products; bf16 is for `sac_fast` only.
+        precision: arithmetic of the matrix products: fp32, bf16, or auto: bf16 where the processor multiplies it
+            (AVX-512 and newer), else fp32. More than fp32 is for `sac_fast` only.
         device: "cpu", "cuda" or "cuda:0"; collection stays on the CPU.
 
     Source: website table of the paper.
@@ -45,7 +51,7 @@ class AgentSettings(BaseModel):
     n_step: PositiveInt = 1
     demonstration_weight: float = Field(default=0.0, ge=0.0)
     batch_size: PositiveInt = 256
-    precision: Literal["fp32", "bf16"] = "fp32"
+    precision: Literal["fp32", "bf16", "auto"] = "fp32"
     device: str = Field(default="cpu", pattern=r"^(cpu|cuda(:\d+)?)$")
 
     def torch_device(self) -> torch.device:
@@ -57,6 +63,13 @@ class AgentSettings(BaseModel):
         if self.device != "cpu" and not torch.cuda.is_available():
             raise InputError(f"agent.device={self.device}: torch finds no CUDA device here; use agent.device=cpu")
         return torch.device(self.device)
+
+    @property
+    def product_dtype(self) -> torch.dtype:
+        """What matrices are multiplied in: float32 or bfloat16."""
+        if self.precision == "auto":
+            return torch.bfloat16 if self.device != "cpu" or multiplies_bfloat16() else torch.float32
+        return torch.bfloat16 if self.precision == "bf16" else torch.float32
 
     @property
     def temperature_learning_rate(self) -> float:
