@@ -9,7 +9,7 @@ from tactile_cube.errors import InputError
 
 
 def multiplies_bfloat16() -> bool:
-    """Whether oneDNN has bfloat16 products for this CPU (AVX-512 and newer); elsewhere they take many times float32's."""
+    """Whether oneDNN has bfloat16 products for this CPU (AVX-512 and newer); they are slow elsewhere."""
     return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported())
 
 

@@ -44,9 +44,9 @@ class EpisodeConstants:
         cube_friction: Lateral friction factor of the cube; that of a contact is the product of both bodies'.
         tip_friction: Lateral friction factor of the fingertips.
         link_friction: Lateral friction factor of all other links.
-        tip_spinning_friction: Torque against spinning under a fingertip per normal force [m]. A flat circular contact of
-            radius a bears 2/3 mu a: 3 mm is a = 5 mm at mu = 0.9, a tip of 14 mm pressed in by 0.9 mm. The paper's 0.1 m,
-            which `+experiment=paper` keeps, lies far beyond what a fingertip bears.
+        tip_spinning_friction: Torque against spinning under a fingertip per normal force [m]. A flat circular contact
+            of radius a bears 2/3 mu a: 3 mm is a = 5 mm at mu = 0.9, a tip of 14 mm radius pressed in by 0.9 mm. The
+            paper's 0.1 m, which `+experiment=paper` keeps, lies far beyond what a fingertip bears.
         tip_compliance: How far the tips' skin gives way per normal force on the cube [m/N]; 0: hard.
         table_height: Top of the table in the world [m]; None: no table.
         table_friction: Lateral friction factor of the table.
