@@ -240,6 +240,5 @@ class FastSac:
         """What departs from exact float32."""
         if self.settings.product_dtype != torch.bfloat16:
             return []
-        return [
-            f"agent.precision={self.settings.precision}: matrix products and gradients in bfloat16, parameters and optimiser in float32"
-        ]
+        asked = f"agent.precision={self.settings.precision}"
+        return [f"{asked}: matrix products and gradients in bfloat16, parameters and optimiser in float32"]
