@@ -43,28 +43,6 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
     RunSettings(name=config.name, seed=config.seed)
 
 
-def test_paper_experiment_has_the_published_numbers() -> None:
-    config = composed("+experiment=paper")
-    agent, training, curriculum = config.agent, config.training, config.curriculum
-    assert list(agent.hidden) == [512, 512]
-    assert (agent.gamma, agent.target_entropy, agent.alpha_init) == (0.9, -6, 0.2)
-    assert (agent.weight_decay, agent.batch_size) == (2.5e-4, 256)
-    assert (training.steps_per_iteration, training.updates_per_iteration) == (25, 100)
-    assert (training.learning_starts, training.random_steps, training.replay_size) == (2000, 10000, 150000)
-    assert config.collector.worlds == 12
-    assert (curriculum.begin, curriculum.length) == (2e6, 4e6)
-    assert (curriculum.filter_time, curriculum.gravity_scale) == (0.12, 0.05)
-
-
-def test_finetune_experiment_has_the_published_numbers() -> None:
-    config = composed("+experiment=finetune")
-    assert (config.agent.gamma, config.agent.target_entropy) == (0.92, -8)
-    assert config.training.replay_size == 1_500_000
-    assert config.task.episode_steps == 200
-    assert config.reward.fastest == 0.7
-    assert config.randomization.sensor_noise == 0.02
-
-
 def test_loggers_write_into_the_run_folder(tmp_path: Path) -> None:
     for option in ("default", "csv"):
         (tmp_path / option).mkdir()

@@ -107,6 +107,8 @@ def test_an_evaluation_judges_and_repeats_its_episodes() -> None:
     assert [result.verdict for result in nominal.results] == [Verdict.HOLDING] * 2
     assert [result.seed for result in nominal.results] == [10_000, 10_001]
     assert len(seen) == len(nominal.results) + len(replay.results) == 4
+    first, second = (result.final_angle for result in replay.results)
+    assert first != second, "replays start displaced, each in its own way"
     record = evaluation.record(nominal.variant, nominal.results[1])
     assert record.theta[-1] == nominal.results[1].final_angle
     assert record.steps == 10

@@ -1,0 +1,231 @@
+"""Every published number, and every own one that the results rest on, where a command line configures it.
+
+P: Sievers, Pitz, Bäuml, "Learning Purely Tactile In-Hand Manipulation with a Torque-Controlled Hand", ICRA 2022.
+W: the authors' website for it (dlr-alr.github.io/dlr-tactile-manipulation, ICRA22 page); W23: its page on ICRA23.
+"""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hydra import compose, initialize_config_dir
+from hydra.utils import instantiate
+
+from tactile_cube.cli import CONFIG
+from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1
+from tactile_cube.hand import DLR_HAND2
+from tactile_cube.randomization import Constant, LogUniform, Uniform
+
+Row = tuple[str, Any, str]
+PAPER, FINETUNE, FOLLOW_UP = "train +experiment=paper", "train +experiment=finetune", "train randomization=followup"
+RECIPE = "train +experiment=curriculum"
+
+
+def within(half_width: float) -> Uniform:
+    return Uniform(-half_width, half_width)
+
+
+PUBLISHED: dict[str, list[Row]] = {
+    PAPER: [
+        # task
+        ("env.task.table", False, "P"),
+        ("env.task.gravity_scale", 1.0, "P: full weight"),
+        ("env.task.filter_time", 0.5, "P, W: T_s [s]"),
+        ("env.task.episode_steps", 100, "W: 10 s at 10 Hz"),
+        ("env.task.gravity_onset", 4, "P, W: weightless for less than 0.5 s"),
+        ("env.task.symmetry", 4, "P: critics see sin and cos of 4 theta"),
+        ("env.stack", 5, "P: N_stack"),
+        ("env.exploration.extra", 0.0, "P: nothing but the policy's own randomness"),
+        ("env.start.yaw_range", 0.0, "P: starts aligned with the hand"),
+        # reward
+        ("env.reward.spin", 16, "W: lambda_spin"),
+        ("env.reward.height", 100, "W: lambda_z"),
+        ("env.reward.plane", 300, "W: lambda_plane"),
+        ("env.reward.tilt", 50, "W: lambda_rot"),
+        ("env.reward.proximal", 25, "W: lambda_proxy"),
+        ("env.reward.off_centre", 0, "P: no such term"),
+        ("env.reward.fastest", 1.0, "P, W [rad/s]"),
+        # simulator and hand
+        ("env.simulation.dt", 2e-3, "P: 500 Hz"),
+        ("env.simulation.policy_dt", 0.1, "P: 10 Hz"),
+        ("env.constants.gravity", 9.81, "W [m/s^2]"),
+        ("env.constants.kp", 3.69, "W: K_P [N m/rad]"),
+        ("env.constants.kd", 0.25, "W, table: K_D [N m s/rad]; its picture says 0.28"),
+        ("env.constants.stiffness", 25.0, "W: K_e [N m/rad]"),
+        ("env.constants.static_friction", 0.02, "W, table [N m]; its picture says 0.02, 0.02, 0.08"),
+        ("env.constants.elasticity_sign", 1, "P's recipe for K_e; its eq. (2) is printed with -1"),
+        ("env.constants.tip_friction", 0.9, "W"),
+        ("env.constants.link_friction", 0.09, "W"),
+        ("env.constants.tip_spinning_friction", 0.1, "W, table [m]"),
+        ("env.constants.cube_mass", 0.05, "W [kg]"),
+        ("env.constants.cube_size", 0.08, "W [m]"),
+        # randomisation
+        ("env.randomization.shifts.cube_mass", within(0.005), "W [kg]"),
+        ("env.randomization.cube_position", [within(0.001), within(0.001), within(0.005)], "W [m]"),
+        ("env.randomization.cube_rotation", [within(0.01), within(0.01), within(0.1)], "W [rad]"),
+        ("env.randomization.sensor_noise", 0.002, "W [rad]"),
+        ("env.randomization.sticky_probability", 0.1, "W"),
+        # learning
+        ("curriculum.filter_time", 0.12, "W [s]"),
+        ("curriculum.gravity_scale", 0.05, "W"),
+        ("curriculum.begin", 2e6, "W [steps]"),
+        ("curriculum.length", 4e6, "W [steps]"),
+        ("agent._target_", "tactile_cube.agent.sac.Sac", "P"),
+        ("agent.hidden", [512, 512], "P"),
+        ("agent.gamma", 0.9, "W"),
+        ("agent.target_entropy", -6, "W"),
+        ("agent.alpha_init", 0.2, "W"),
+        ("agent.weight_decay", 2.5e-4, "W"),
+        ("agent.batch_size", 256, "W"),
+        ("agent.n_step", 1, "P"),
+        ("agent.demonstration_weight", 0, "P: from scratch"),
+        ("collector.worlds", 12, "W"),
+        ("training.steps_per_iteration", 25, "W"),
+        ("training.updates_per_iteration", 100, "W"),
+        ("training.learning_starts", 2000, "W"),
+        ("training.random_steps", 10_000, "W"),
+        ("training.replay_size", 150_000, "W"),
+        ("training.steps", 6_500_000, "P, Table I: runs end there"),
+    ],
+    FINETUNE: [
+        ("env.task.episode_steps", 200, "W: 20 s"),
+        ("env.reward.fastest", 0.7, "W [rad/s]"),
+        ("env.randomization.shifts.tip_friction", within(0.1), "W"),
+        ("env.randomization.sensor_noise", 0.02, "W [rad]"),
+        ("agent.gamma", 0.92, "W"),
+        ("agent.target_entropy", -8, "W"),
+        ("training.replay_size", 1_500_000, "W"),
+    ],
+    FOLLOW_UP: [
+        ("env.randomization.values.kp", Constant(5.0), "W23 [N m/rad]"),
+        ("env.randomization.values.kd", Constant(0.36), "W23 [N m s/rad]"),
+        ("env.randomization.values.torque_limit", Constant(1.0), "W23 [N m]"),
+        ("env.randomization.values.tip_spinning_friction", LogUniform(2e-4, 2e-2), "W23 [m]"),
+        ("env.randomization.shifts.cube_mass", within(0.02), "W23 [kg]"),
+        ("env.randomization.shifts.cube_size", within(0.005), "W23 [m]"),
+        ("env.randomization.values.force_mean", Constant(0.04), "W23 [N]"),
+        ("env.randomization.values.force_std", Constant(0.008), "W23 [N]"),
+        ("env.randomization.values.torque_mean", Constant(0.002), "W23 [N m]"),
+        ("env.randomization.values.torque_std", Constant(0.0004), "W23 [N m]"),
+        ("env.randomization.values.force_interval", Constant(0.5), "W23 [s]"),
+    ],
+    "train task=float": [
+        ("env.task.table", False, "P, Table I"),
+        ("env.task.gravity_scale", 0.05, "P, Table I: weight reduced by 95 %"),
+    ],
+    "train task=table": [("env.task.table", True, "P, Table I"), ("env.task.gravity_scale", 1.0, "P, Table I")],
+    "evaluate protocol=paper": [
+        ("protocol.episodes", 10, "P"),
+        ("protocol.seconds", 40, "P"),
+        ("protocol.success_share", 0.8, "P: of the best run's angle"),
+    ],
+    "evaluate protocol=endurance": [("protocol.seconds", 960, "P: nearly 16 min")],
+}
+
+OWN: dict[str, list[Row]] = {
+    PAPER: [
+        ("env.task.plane_range", 0.035, "size not published [m]"),
+        ("env.task.height_range", 0.04, "size not published [m]"),
+        ("env.task.tilt_limit", 0.8, "not published [rad]"),
+        ("env.task.direction", -1, "farther than +1 with this hand pose"),
+        ("env.reward.leaving", 10, "size not published"),
+        ("env.constants.torque_limit", 1.0, "W23 [N m]"),
+        ("env.randomization.joint_offset", within(0.03), "range not published [rad]"),
+        ("env.randomization.start_angles", within(0.03), "range not published [rad]"),
+        ("env.randomization.shifts.cube_size", within(0.002), "range not published [m]"),
+        ("env.randomization.factors.kp", Uniform(0.9, 1.1), "range not published"),
+        ("env.randomization.factors.kd", Uniform(0.8, 1.2), "0.25 and 0.28 are both published"),
+        ("env.randomization.factors.stiffness", Uniform(0.8, 1.2), "range not published"),
+        ("env.randomization.factors.static_friction", Uniform(0.5, 2.0), "0.02 to 0.08 are published"),
+        ("env.randomization.factors.reflected_inertia", Uniform(0.8, 1.3), "estimate"),
+        ("agent.learning_rate", 3e-4, "not published"),
+        ("agent.tau", 0.005, "not published"),
+    ],
+    RECIPE: [
+        ("env.task.gravity_scale", 1.0, "full weight"),
+        ("env.exploration.demonstrations", 0.3, "README: a gait acts in 30 % of the episodes"),
+        ("env.exploration.episodes", 0.0, "nothing else acts"),
+        ("agent.demonstration_weight", 2, "imitates the gait where critics hold it for better"),
+        ("agent.n_step", 3, "regrasping is learned sooner"),
+        ("agent.gamma", 0.95, "a regrasp takes some twenty steps"),
+        ("env.start.yaw_range", 0.75, "phases after the first twist from the start [rad]"),
+    ],
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def hydra_configuration() -> Iterator[None]:
+    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+        yield
+
+
+@cache
+def composed(command: str) -> Any:
+    """The configuration of a command line, its environment as the object it describes."""
+    verb, *overrides = command.split()
+    config = compose(verb, overrides=overrides, return_hydra_config=True)
+    return config, instantiate(config.env) if "env" in config else None
+
+
+def configured(command: str, path: str) -> Any:
+    """What a command line gives a setting; keys of mappings and attributes are both joined by dots."""
+    config, env = composed(command)
+    value = env if path.startswith("env.") else config
+    for name in path.removeprefix("env.").split("."):
+        value = value[name] if hasattr(value, "keys") else getattr(value, name)
+    return value
+
+
+def equal(found: Any, wanted: Any) -> bool:
+    """Whether a setting has a value; a vector over the joints, if all of them have."""
+    if isinstance(wanted, list):
+        return list(found) == wanted
+    return bool(np.all(np.asarray(found) == wanted))
+
+
+def rows(table: dict[str, list[Row]]) -> list[tuple[str, str, Any, str]]:
+    return [(command, *row) for command, settings in table.items() for row in settings]
+
+
+@pytest.mark.parametrize(("command", "path", "value", "source"), rows(PUBLISHED))
+def test_a_setting_has_its_published_value(command: str, path: str, value: Any, source: str) -> None:
+    found = configured(command, path)
+    assert equal(found, value), f"python -m tactile_cube.{command}: {path} is {found}; published: {value} ({source})"
+
+
+@pytest.mark.parametrize(("command", "path", "value", "reason"), rows(OWN))
+def test_a_setting_that_nobody_published_stays_as_documented(command: str, path: str, value: Any, reason: str) -> None:
+    found = configured(command, path)
+    assert equal(found, value), f"python -m tactile_cube.{command}: {path} is {found}, not {value} ({reason})"
+
+
+@pytest.mark.parametrize(
+    ("name", "degrees"),
+    [
+        ("lower", (-30, -20, -10)),  # W: theta_min, hardware
+        ("upper", (30, 86, 105)),  # W: theta_max
+        ("action_lower", (-30, -10, -5)),  # W: theta_lower, simulation
+        ("action_upper", (30, 30, 30)),  # W: theta_upper
+    ],
+)
+def test_joint_limits_are_the_published_ones(name: str, degrees: tuple[float, ...]) -> None:
+    np.testing.assert_allclose(np.degrees(getattr(DLR_HAND2, name)), np.tile(degrees, 4))
+
+
+def test_links_have_the_published_lengths() -> None:
+    assert [link.length for link in DLR_HAND2.links] == [0.0, 0.075, 0.040, 0.045]  # W [m]
+
+
+def test_table_1_is_the_papers_in_six_columns_of_four_runs() -> None:
+    assert PAPER_TABLE_1 == {  # P, Table I: million steps until regrasping
+        "task=table, T_s 0.5 s": "0.3, 0.4, 0.3, 0.4",
+        "task=float, T_s 0.5 s": "2.2, 1.7, 0.9, -",
+        "task=full, T_s 0.5 s": "1.8, -, -, 2.3",
+        "task=table, T_s 0.1 s": "0.4, 0.2, 0.2, 0.2",
+        "task=float, T_s 0.1 s": "1.5, 5.8, -, 2.4",
+        "task=full, T_s 0.1 s": "5.1, 1.7, 6.0, 3.9",
+    }
+    sweep = configured("train +experiment=table1", "hydra.sweeper.params")
+    assert dict(sweep) == {"task": "table,float,full", "task.filter_time": "0.5,0.1", "seed": "0,1,2,3"}
