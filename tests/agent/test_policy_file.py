@@ -2,14 +2,17 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import save_file
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
-from tactile_cube.agent.policy_file import PolicyInfo, load_policy, require_sizes, save_policy
+from tactile_cube.agent.policy_file import WITHOUT_CHECKSUM, PolicyInfo, load_policy, require_sizes, save_policy
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.policy_path import SHIPPED
 
 
 def saved(path: Path) -> Actor:
@@ -41,6 +44,43 @@ def test_damaged_file_is_refused(tmp_path: Path, keep: int) -> None:
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(InputError, match="damaged"):
         load_policy(path)
+
+
+@pytest.mark.parametrize("mask", [0x01, 0x80, 0xFF])
+def test_a_changed_byte_anywhere_is_refused_in_one_line(tmp_path: Path, mask: int) -> None:
+    path = tmp_path / "p.safetensors"
+    saved(path)
+    content = path.read_bytes()
+    load_policy(path)
+    for place in np.linspace(0, len(content) - 1, 64).round().astype(int):
+        damaged = bytearray(content)
+        damaged[place] ^= mask
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"^[^\n]*p\.safetensors: (damaged|not a policy file)[^\n]*$"):
+            load_policy(path)
+
+
+def test_a_file_from_before_checksums_is_read_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    actor = saved(tmp_path / "new.safetensors")
+    with safe_open(tmp_path / "new.safetensors", "pt") as file:
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+        metadata = {"format": WITHOUT_CHECKSUM, "info": file.metadata()["info"]}
+    save_file(tensors, tmp_path / "old.safetensors", metadata)
+    load_policy(tmp_path / "new.safetensors")
+    assert capsys.readouterr().err == ""
+    loaded, _ = load_policy(tmp_path / "old.safetensors")
+    assert "old.safetensors: from before there were checksums" in capsys.readouterr().err
+    assert all(torch.equal(a, b) for a, b in zip(actor.parameters(), loaded.parameters(), strict=True))
+
+
+def test_shipped_policies_carry_a_checksum(capsys: pytest.CaptureFixture[str]) -> None:
+    files = sorted(SHIPPED.glob("*.safetensors"))
+    assert files
+    for path in files:
+        load_policy(path)
+    assert capsys.readouterr().err == ""
 
 
 def test_other_safetensors_file_is_refused(tmp_path: Path) -> None:

@@ -2,24 +2,29 @@
 
 Tensors are named `actor.<layer>.weight` (out, in) and `actor.<layer>.bias` (out,), layer 0 first, ReLU between layers;
 the last layer gives mean and raw log sigma side by side, and the action is tanh(mean).
+The metadata's `sha256` is the digest of the whole file with 64 zeros in the digest's own place: any changed byte shows.
 """
 
+import hashlib
 import json
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any, Self
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, PositiveInt, ValidationError
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor, nn
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.errors import InputError
 
-FORMAT = "tactile_cube policy 1"
+FORMAT = "tactile_cube policy 2"
+WITHOUT_CHECKSUM = "tactile_cube policy 1"
+NO_DIGEST = b"0" * 64
 
 
 class PolicyInfo(BaseModel):
@@ -73,8 +78,14 @@ def save_policy(path: Path, actor: Actor, info: PolicyInfo) -> None:
         tensors[f"actor.{index}.bias"] = layer.bias.detach().cpu().contiguous()
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + ".partial")
-    save_file(tensors, partial, {"format": FORMAT, "info": info.model_dump_json()})
+    partial.write_bytes(sealed(tensors, info.model_dump_json()))
     partial.replace(path)
+
+
+def sealed(tensors: dict[str, Tensor], info: str) -> bytes:
+    """The contents of a policy file: tensors, and metadata with the checksum of all of it."""
+    content = save(tensors, {"sha256": NO_DIGEST.decode(), "format": FORMAT, "info": info})
+    return content.replace(NO_DIGEST, _digest(content), 1)
 
 
 def load_policy(path: Path | str) -> tuple[Actor, PolicyInfo]:
@@ -82,6 +93,8 @@ def load_policy(path: Path | str) -> tuple[Actor, PolicyInfo]:
 
     Raises:
         InputError: the file is missing, damaged, no policy, or its tensors do not have the sizes it states.
+
+    A file from before there were checksums is read with a warning.
     """
     path = Path(path)
     if not path.is_file():
@@ -92,6 +105,7 @@ def load_policy(path: Path | str) -> tuple[Actor, PolicyInfo]:
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - safe_open is no mapping
     except (SafetensorError, OSError, RuntimeError) as error:
         raise InputError(f"{path}: damaged or not a safetensors file ({error})") from error
+    _verify(path, metadata)
     info = _read_info(path, metadata)
     actor = Actor(Sizes(info.observation_size, 0, info.action_size), info.hidden).requires_grad_(False)
     _fill(path, actor, tensors)
@@ -121,9 +135,23 @@ def _linears(actor: Actor) -> list[nn.Linear]:
     return [layer for layer in actor.body if isinstance(layer, nn.Linear)]
 
 
-def _read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
+def _digest(content: bytes) -> bytes:
+    return hashlib.sha256(content).hexdigest().encode()
+
+
+def _verify(path: Path, metadata: dict[str, str]) -> None:
+    """Refuse another format, and contents that the checksum in them does not fit."""
+    if metadata.get("format") == WITHOUT_CHECKSUM:
+        print(f"warning: {path}: from before there were checksums; damage would go unseen", file=sys.stderr)
+        return
     if metadata.get("format") != FORMAT:
         raise InputError(f"{path}: not a policy file (format {metadata.get('format')!r}, expected {FORMAT!r})")
+    stated = metadata.get("sha256", "").encode()
+    if len(stated) != len(NO_DIGEST) or _digest(path.read_bytes().replace(stated, NO_DIGEST, 1)) != stated:
+        raise InputError(f"{path}: damaged, its checksum does not fit its contents; take another copy of the file")
+
+
+def _read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
     try:
         return PolicyInfo.model_validate(json.loads(metadata["info"]))
     except (KeyError, json.JSONDecodeError, ValidationError) as error:
