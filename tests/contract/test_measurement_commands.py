@@ -5,8 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import polars
+
 from tactile_cube.drivetrain.model_file import read_model
-from tests.measurement.small_rig import URDF, write
+from tests.measurement.small_rig import URDF, table, write
 
 
 def run(verb: str, *arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -36,6 +38,29 @@ def test_record_then_compare(tmp_path: Path) -> None:
     assert result["error"]["overall"] > 0
     for file in ("report.html", "comparison.rrd"):
         assert (tmp_path / "run" / file).is_file()
+
+
+def test_a_csv_import_that_failed_does_not_block_the_corrected_command(tmp_path: Path) -> None:
+    (tmp_path / "two.urdf").write_text(URDF)
+    for number in range(2):
+        columns = {name.replace(".", "_"): values for name, values in table(number).items()}
+        polars.DataFrame(columns | {"time": 1000 * columns["time"]}).write_csv(tmp_path / f"sines_{number}.csv")
+    nothing = run("record", "source=csv", "out=rec", folder=tmp_path)
+    assert nothing.returncode == 2
+    assert "source.files=... (" in nothing.stderr
+    assert "source.urdf=... (of the rig)" in nothing.stderr
+    words = ["source=csv", "out=rec", "source.files=[sines_*.csv]", "source.urdf=two.urdf"]
+    words += ["source.controller.kp=3", "source.controller.kd=0.2", "source.nominal.static_friction=0.01"]
+    wrong = run("record", *words, "source.time_unit=s", folder=tmp_path)
+    assert wrong.returncode == 2
+    assert wrong.stderr.startswith("error: sines_0.csv: column 'time', row 1: steps of 10 s")
+    assert "source.time_unit=ms" in wrong.stderr
+    right = run("record", *words, folder=tmp_path)
+    assert right.returncode == 0, right.stderr
+    assert "time        time [ms], 100 Hz" in right.stdout
+    assert "rec: 2 trials (sines), 6 s, joints a, b" in right.stdout
+    assert {path.name for path in tmp_path.iterdir()} >= {"rec", "outputs"}
+    assert not list(tmp_path.glob(".rec*"))
 
 
 def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:

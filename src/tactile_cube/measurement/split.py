@@ -10,7 +10,7 @@ def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> 
     """The trials to fit and the trials to judge by.
 
     Whole robot initialisations are held out where there are several, so that no joint offset is on both sides;
-    otherwise whole trials, at least one of each kind staying in the fit.
+    otherwise whole trials: of each kind that was repeated all but one at most, or, if none was, of all kinds together.
 
     Args:
         recording: at least two trials.
@@ -18,8 +18,13 @@ def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> 
         seed: which ones.
 
     Raises:
-        InputError: a single trial cannot be split.
+        InputError: there is one trial alone.
     """
+    if len(recording.trials) < 2:
+        raise InputError(
+            f"{recording.folder}: 1 trial in all, so none can be held out to judge by; record more, or cut the log in "
+            "several (record source=csv source.length=SECONDS)"
+        )
     rng = np.random.default_rng(seed)
     initialisations = sorted({trial.initialisation for trial in recording.trials})
     if len(initialisations) > 1:
@@ -27,12 +32,9 @@ def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> 
         held = set(rng.permutation(initialisations)[:count].tolist())
         chosen = [trial.initialisation in held for trial in recording.trials]
     else:
-        chosen = _trials_of_each_kind([trial.kind for trial in recording.trials], share, rng)
-    if all(chosen) or not any(chosen):
-        raise InputError(
-            f"{recording.folder}: {len(recording.trials)} trial of each kind and one initialisation: nothing "
-            "can be held out; record every kind at least twice"
-        )
+        kinds = [trial.kind for trial in recording.trials]
+        repeated = len(set(kinds)) < len(kinds)
+        chosen = _trials_of_each_kind(kinds if repeated else ["any"] * len(kinds), share, rng)
     trials = list(zip(recording.trials, chosen, strict=True))
     return (
         recording.with_trials([trial for trial, held_out in trials if not held_out]),

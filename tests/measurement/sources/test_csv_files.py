@@ -1,3 +1,6 @@
+"""Logs as people have them: other names, units, separators and folders; what is understood, and what is asked."""
+
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -6,63 +9,196 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
-from tactile_cube.measurement.recordings.writing import write_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.whole import write_whole
 from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tests.measurement.small_rig import URDF, table
 
+DEGREE = 180 / np.pi
+ONE_JOINT = (
+    URDF[: URDF.index('<link name="lower">')] + URDF[URDF.index('<joint name="a"') : URDF.index('<joint name="b"')]
+)
+ONE_JOINT += "</robot>"
+GAINS = {"kp": 3.0, "kd": 0.2, "torque_limit": 1.0}
 COLUMNS = {"time": "t", "a": {"command": "goal1", "position": "pos1"}, "b": {"command": "goal2", "position": "pos2"}}
+Frame = dict[str, np.ndarray]
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    """A log in degrees and milliseconds with names of its own."""
-    columns, degree = table(), 180 / np.pi
-    frame = {"t": 1000 * columns["time"]}
-    for number, joint in enumerate("ab", 1):
-        frame[f"goal{number}"] = degree * columns[f"{joint}.command"]
-        frame[f"pos{number}"] = degree * columns[f"{joint}.position"]
-    polars.DataFrame(frame).write_csv(tmp_path / "log.csv")
-    (tmp_path / "rig.urdf").write_text(URDF)
-    return tmp_path / "log.csv"
+def imported(folder: Path, logs: dict[str, Frame | str], urdf: str = URDF, **changes: object) -> Recording:
+    """Write the logs (file name -> columns, or the text) and the URDF, import them as `record` does, read them back."""
+    (folder / "rig.urdf").write_text(urdf)
+    for name, log in logs.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        if isinstance(log, str):
+            (folder / name).write_text(log)
+        else:
+            polars.DataFrame(log).write_csv(folder / name)
+    settings = {"files": [str(folder / name) for name in logs], "urdf": str(folder / "rig.urdf"), "controller": GAINS}
+    write_whole(folder / "out", CsvFiles(**(settings | changes)).recordings(0))  # type: ignore[arg-type]
+    return read_recording(folder / "out")
 
 
-def source(log: Path, **changes: object) -> CsvFiles:
-    settings = {
-        "files": [str(log)],
-        "urdf": str(log.parent / "rig.urdf"),
-        "columns": COLUMNS,
-        "controller": {"kp": 3.0, "kd": 0.2, "torque_limit": 1.0},
-        "angle_unit": "deg",
-        "time_unit": "ms",
+def log(names: dict[str, str], time: str = "t", tick: float = 1.0, angle: float = 1.0, seed: int = 0) -> Frame:
+    """Two joints' motion under other names and in other units."""
+    columns = table(seed)
+    scale = {"command": angle, "position": angle, "torque": 1.0}
+    return {time: columns["time"] * tick} | {
+        other: columns[own] * scale[own.rpartition(".")[2]] for own, other in names.items()
     }
-    return CsvFiles(**(settings | changes))  # type: ignore[arg-type]
 
 
-def test_a_log_with_its_own_names_and_units_becomes_a_recording(log: Path, tmp_path: Path) -> None:
-    write_recording(tmp_path / "r", source(log).recordings(0)[""])
-    recording = read_recording(tmp_path / "r")
-    assert recording.warnings == ()
-    assert recording.rate == pytest.approx(100.0)
-    assert np.allclose(recording.trials[0].position[:, 1], table()["b.position"], atol=1e-6)
-    assert recording.trials[0].torque is None
-
-
-def test_without_the_unit_the_degrees_are_noticed(log: Path, tmp_path: Path) -> None:
-    write_recording(tmp_path / "r", source(log, angle_unit="rad").recordings(0)[""])
-    with pytest.raises(InputError, match="degrees"):
-        read_recording(tmp_path / "r")
+NUMBERED = {"a.command": "goal1", "a.position": "pos1", "b.command": "goal2", "b.position": "pos2"}
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("names", "time", "tick", "angle"),
     [
-        ({"columns": COLUMNS | {"time": "clock"}}, "column 'clock' is missing"),
-        ({"columns": {"time": "t"}}, "source.columns: expected"),
-        ({"angle_unit": "grad"}, "source.angle_unit=grad"),
-        ({"kind": ["one", "two"]}, "2 values for 1 files"),
-        ({"files": ["nothing-*.csv"]}, "no such file"),
+        (NUMBERED, "t", 1000.0, DEGREE),
+        ({"a.command": "a_cmd_deg", "a.position": "a_deg", "b.command": "b_cmd_deg", "b.position": "b_deg"},
+         "time", 1, DEGREE),
+        ({"a.command": "a.goal", "a.position": "a", "b.command": "b.goal", "b.position": "b"},
+         "timestamp_us", 1e6, 1.0),
+        ({"a.command": "q_d_0", "a.position": "q_0", "b.command": "q_d_1", "b.position": "q_1"}, "stamp", 1e9, 1.0),
+        ({"a.command": "desired[1] (rad)", "a.position": "measured[1] (rad)", "b.command": "desired[2] (rad)",
+          "b.position": "measured[2] (rad)"}, "Time (s)", 1.0, 1.0),
+        ({"a.command": "action.a.pos", "a.position": "observation.state.a.pos", "b.command": "action.b.pos",
+          "b.position": "observation.state.b.pos"}, "timestamp", 1.0, DEGREE),
+    ],
+)  # fmt: skip
+def test_names_and_units_of_other_programs_are_understood(
+    names: dict[str, str], time: str, tick: float, angle: float, tmp_path: Path
+) -> None:
+    recording = imported(tmp_path, {"log.csv": log(names, time, tick, angle)})
+    assert recording.rate == pytest.approx(100.0)
+    for k, joint in enumerate("ab"):
+        assert np.allclose(recording.trials[0].position[:, k], table()[f"{joint}.position"], atol=1e-6)
+        assert np.allclose(recording.trials[0].command[:, k], table()[f"{joint}.command"], atol=1e-6)
+
+
+def test_torques_are_taken_where_all_joints_have_one_and_converted_by_their_names(tmp_path: Path) -> None:
+    names = NUMBERED | {"a.torque": "tau1 [mNm]", "b.torque": "tau2 [mNm]"}
+    trial = imported(tmp_path, {"log.csv": log(names)}).trials[0]
+    assert trial.torque is not None
+    assert np.allclose(trial.torque[:, 1], 1e-3 * table()["b.torque"], atol=1e-6)
+
+
+def test_command_and_position_may_be_in_different_units(tmp_path: Path) -> None:
+    mixed = log(NUMBERED)
+    mixed["pos1"], mixed["pos2"] = mixed["pos1"] * DEGREE, mixed["pos2"] * DEGREE
+    trial = imported(tmp_path, {"log.csv": mixed}).trials[0]
+    assert np.allclose(trial.position[:, 0], table()["a.position"], atol=1e-6)
+    assert np.allclose(trial.command[:, 0], table()["a.command"], atol=1e-6)
+
+
+def test_a_joint_that_hardly_moved_is_in_its_commands_unit(tmp_path: Path) -> None:
+    stuck = log(NUMBERED, angle=DEGREE)
+    stuck["pos1"] = 0.08 * stuck["pos1"]  # 1.4 degrees of commanded 17: within the limits as radians too
+    trial = imported(tmp_path, {"log.csv": stuck}).trials[0]
+    assert np.ptp(trial.position[:, 0]) == pytest.approx(0.08 * np.ptp(table()["a.position"]), rel=1e-3)
+
+
+def test_a_single_joint_needs_no_number_and_what_is_no_number_is_left_aside(tmp_path: Path) -> None:
+    columns = table()
+    lines = ["time;mode;soll;ist;temperatur"]
+    for t, c, q in zip(columns["time"], columns["a.command"], columns["a.position"], strict=True):
+        numbers = f"{c:.6f};{q:.6f};31.5".replace(".", ",")
+        lines.append(f"2024-05-01 10:00:{t:06.3f};läuft;{numbers}")
+    recording = imported(tmp_path, {"log.csv": "\n".join(lines)}, urdf=ONE_JOINT)
+    assert recording.rate == pytest.approx(100.0)
+    assert np.allclose(recording.trials[0].position[:, 0], columns["a.position"], atol=2e-6)
+
+
+def test_rows_without_time_follow_one_another_at_the_rate_that_is_given(tmp_path: Path) -> None:
+    untimed = log(NUMBERED)
+    del untimed["t"]
+    with pytest.raises(InputError, match=r"no column of time.*source\.rate=HZ"):
+        imported(tmp_path, {"log.csv": untimed})
+    assert imported(tmp_path, {"log.csv": untimed}, rate=100.0).trials[0].duration == pytest.approx(2.99)
+
+
+def test_repeats_are_one_kind_and_numbers_that_mean_something_are_not(tmp_path: Path) -> None:
+    logs: dict[str, Frame | str] = {f"steps_{k}.csv": log(NUMBERED, seed=k) for k in range(3)}
+    for speed in (1, 2):
+        other = log(NUMBERED)
+        other["goal1"] = 0.2 * np.sin(speed * other["t"])
+        logs[f"ramp_{speed}.csv"] = other
+    logs["2024-05-01_10-00-00.csv"] = log(NUMBERED)
+    kinds = [trial.kind for trial in imported(tmp_path, logs).trials]
+    assert kinds == ["steps", "steps", "steps", "ramp_1", "ramp_2", "motion"]
+
+
+def test_files_of_one_name_in_several_folders_stay_apart(tmp_path: Path) -> None:
+    logs = {f"day{k}/run.csv": log(NUMBERED, seed=k) for k in (1, 2)}
+    recording = imported(tmp_path, dict(logs))
+    assert [trial.name for trial in recording.trials] == ["day1_run", "day2_run"]
+    assert {trial.kind for trial in recording.trials} == {"run"}
+
+
+def test_a_long_log_is_cut_into_trials(tmp_path: Path) -> None:
+    trials = imported(tmp_path, {"log.csv": log(NUMBERED)}, length=1.0).trials
+    assert [len(trial.time) for trial in trials] == [100, 100, 100]
+    assert np.allclose(trials[1].position[:, 0], table()["a.position"][100:200], atol=1e-6)
+
+
+def test_commanded_torques_need_no_gains(tmp_path: Path) -> None:
+    names = {"a.torque": "tau_cmd1", "a.position": "pos1", "b.torque": "tau_cmd2", "b.position": "pos2"}
+    recording = imported(tmp_path, {"log.csv": log(names)}, controller={"mode": "torque"})
+    assert recording.torque_controlled
+    assert np.allclose(recording.trials[0].command[:, 0], table()["a.torque"], atol=1e-6)
+
+
+def test_a_failed_import_leaves_nothing_behind_and_names_the_users_file(tmp_path: Path) -> None:
+    backwards = log(NUMBERED)
+    backwards["t"][200] = 0.0
+    with pytest.raises(InputError, match=r"bad\.csv: column 'time', row 200: time runs backwards"):
+        imported(tmp_path, {"good.csv": log(NUMBERED), "bad.csv": backwards})
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.csv", "good.csv", "rig.urdf"]
+    assert len(imported(tmp_path, {"good.csv": log(NUMBERED)}).trials) == 1
+
+
+def test_what_was_understood_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    imported(tmp_path, {f"steps_{k}.csv": log(NUMBERED | {"a.torque": "speed"}, "t", 1e3, DEGREE) for k in (0, 1)})
+    shown = " ".join(capsys.readouterr().out.split())
+    for row in (
+        "time t [ms], 100 Hz steps of 10",
+        "a command goal1 [deg] values -17.2 .. 17.2 and the joint's limits",
+        "kinds steps x 2 file names and commands",
+        "not used speed",
+    ):
+        assert row in shown
+
+
+def test_degrees_that_are_said_to_be_radians_are_answered_with_the_setting(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"log\.csv: .*source\.angle_unit=deg"):
+        imported(tmp_path, {"log.csv": log(NUMBERED, angle=DEGREE)}, angle_unit="rad")
+
+
+def change_goal(frame: Frame) -> Frame:
+    return {("soll_goal1" if name == "pos1" else name): values for name, values in frame.items()}
+
+
+@pytest.mark.parametrize(
+    ("changes", "spoil", "said"),
+    [
+        ({"columns": COLUMNS | {"time": "clock"}}, dict, "column 'clock' is missing"),
+        ({"columns": COLUMNS | {"a": {"command": "goal1"}}}, dict, r"source\.columns\.a: position missing"),
+        ({"columns": COLUMNS | {"c": COLUMNS["a"]}}, dict, r"source\.columns\.c: no such joint.*a, b"),
+        ({"columns": COLUMNS | {"a": {"command": "goal1", "position": "pos1", "load": "x"}}}, dict, "a.load: unknown"),
+        ({"angle_unit": "grad"}, dict, r"source\.angle_unit=grad: unknown; choose one of rad, deg"),
+        ({"kind": ["one", "two"]}, dict, "2 values for 1 files"),
+        ({"controller": {"kp": None, "kd": None}}, dict, r"needs source\.controller\.kp and source\.controller\.kd"),
+        ({}, change_goal, "'goal1' and 'soll_goal1' could both be the command of 'a'"),
+        ({}, lambda frame: {k.rstrip("12"): v for k, v in frame.items() if "2" not in k}, "of which joint"),
+        ({}, lambda frame: {f"x{k}": v for k, v in enumerate(frame.values())}, "no joint of the URDF has both"),
     ],
 )
-def test_a_wrong_map_is_refused(log: Path, changes: dict[str, object], said: str) -> None:
+def test_what_cannot_be_understood_is_asked_for(
+    changes: dict[str, object], spoil: Callable[[Frame], Frame], said: str, tmp_path: Path
+) -> None:
     with pytest.raises(InputError, match=said):
-        source(log, **changes).recordings(0)
+        imported(tmp_path, {"log.csv": spoil(log(NUMBERED))}, **changes)
+
+
+def test_a_pattern_without_a_match_says_what_there_is(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nothing-\*\.csv matches no file; .* has log\.csv, rig\.urdf"):
+        imported(tmp_path, {"log.csv": log(NUMBERED)}, files=[str(tmp_path / "nothing-*.csv")])

@@ -25,7 +25,11 @@ def aligned_repeats(trials: Sequence[Trial]) -> list[list[Array]]:
     waiting = list(trials)
     while waiting:
         first, rest = waiting[0], waiting[1:]
-        lags = {index: _lag(first, other) for index, other in enumerate(rest) if _comparable(first, other)}
+        lags = {
+            index: lag_between(first.command, other.command, first.step)
+            for index, other in enumerate(rest)
+            if _comparable(first, other)
+        }
         same = {index: lag for index, lag in lags.items() if lag is not None}
         if same:
             groups.append(_cut([(first, 0), *((rest[index], lag) for index, lag in same.items())]))
@@ -38,15 +42,21 @@ def _comparable(first: Trial, other: Trial) -> bool:
     return first.kind == other.kind and same_gains and first.clamped == other.clamped and first.force == other.force
 
 
-def _lag(first: Trial, other: Trial) -> int | None:
-    """Samples by which `other` starts later in the command, or None where it is another command."""
-    if len(first.time) == len(other.time) and _differs(first.command, other.command) < SAME:
+def lag_between(first: Array, other: Array, step: float) -> int | None:
+    """Samples by which `other` starts later in the same command (n, joints), or None where it is another command.
+
+    Args:
+        first: a command.
+        other: a command at the same rate.
+        step: time between samples [s].
+    """
+    if len(first) == len(other) and _differs(first, other) < SAME:
         return 0
-    longest = round(LONGEST_LAG / first.step)
+    longest = round(LONGEST_LAG / step)
     best, difference = 0, np.inf
     for lag in range(-longest, longest + 1):
-        a, b = _overlap(first.command, other.command, lag)
-        if len(a) >= SHORTEST * min(len(first.time), len(other.time)) and (d := _differs(a, b)) < difference:
+        a, b = _overlap(first, other, lag)
+        if len(a) >= SHORTEST * min(len(first), len(other)) and (d := _differs(a, b)) < difference:
             best, difference = lag, d
     return best if difference < SAME else None
 

@@ -13,6 +13,9 @@ from tactile_cube.measurement.recordings.trial import Gains
 
 Array = NDArray[np.float64]
 DEGREE = math.pi / 180.0
+MILLIMETRE = 1e-3
+IN_DEGREES = "this looks like degrees, recordings are in rad: import it by record source=csv source.angle_unit=deg"
+IN_MILLIMETRES = "this looks like mm, recordings are in m: import it by record source=csv source.length_unit=mm"
 SLACK = 0.1  # [rad] beyond a joint's limit that offsets and soft stops explain
 MOVES = 0.02  # [rad] range below which a signal says nothing about its neighbours
 
@@ -34,13 +37,13 @@ def check_units(columns: Columns, joints: list[RigJoint], gains: Gains, path: Pa
 
 
 def _check_reach(name: str, values: Array, joint: RigJoint, path: Path) -> list[str]:
-    lower, upper = max(joint.lower, -2 * math.pi), min(joint.upper, 2 * math.pi)
-    outside = np.maximum(values - upper, lower - values)
-    row = int(np.argmax(outside))
-    limits = f"[{joint.lower:.4g}, {joint.upper:.4g}] rad of joint '{joint.name}' in the URDF"
-    if outside[row] > 0.5 * (upper - lower) + 0.35:
-        fits = np.max(np.maximum(values * DEGREE - upper, lower - values * DEGREE)) < SLACK
-        hint = "this looks like degrees: multiply by pi/180" if fits else "check unit and joint"
+    outside = joint.beyond(values)
+    row, unit = int(np.argmax(outside)), "m" if joint.prismatic else "rad"
+    limits = f"[{joint.lower:.4g}, {joint.upper:.4g}] {unit} of joint '{joint.name}' in the URDF"
+    if not joint.reaches(values):
+        small = MILLIMETRE if joint.prismatic else DEGREE
+        fits = np.max(joint.beyond(values * small)) < SLACK
+        hint = (IN_MILLIMETRES if joint.prismatic else IN_DEGREES) if fits else "check unit and joint"
         raise InputError(
             f"{path}: column '{name}', row {row}: {values[row]:.4g} is far outside the limits {limits}; {hint}"
         )
@@ -58,7 +61,7 @@ def _check_one_in_degrees(joint: str, command: Array, position: Array, path: Pat
             row = int(np.argmax(np.abs(position if signal == "position" else command)))
             raise InputError(
                 f"{path}: column '{joint}.{signal}', row {row}: {signal} moves 180/pi times as far as its "
-                "counterpart: this looks like degrees, multiply by pi/180"
+                f"counterpart: {IN_DEGREES}"
             )
 
 
@@ -76,7 +79,7 @@ def _check_gain(joint: str, columns: Columns, index: int, gains: Gains, path: Pa
         row = int(np.argmax(np.abs(expected)))
         raise InputError(
             f"{path}: column '{joint}.position', row {row}: {position[row]:.4g}, and the torque is pi/180 of "
-            "kp (command - position): the angles look like degrees, multiply by pi/180"
+            f"kp (command - position): {IN_DEGREES}"
         )
     if not 0.2 < slope < 5:
         return [

@@ -5,19 +5,50 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tactile_cube.errors import InputError
 
 MOVABLE = ("revolute", "continuous", "prismatic")
+LONGEST_WAY = 10.0  # [m] of a sliding joint
+WRONG_ZERO = 0.35  # [rad] a servo that was mounted some teeth off
 
 
 @dataclass(frozen=True)
 class RigJoint:
-    """One movable joint of a URDF: limits [rad] (infinite where it has none) and the joint it mimics."""
+    """One movable joint of a URDF.
+
+    Attributes:
+        name: in the URDF.
+        lower: limit [rad] ([m] where it slides), -inf where it has none.
+        upper: likewise.
+        mimics: the joint that it follows.
+        prismatic: it slides.
+    """
 
     name: str
     lower: float
     upper: float
     mimics: str | None
+    prismatic: bool = False
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Where positions are to be expected: the limits, at most a turn or 10 m either way."""
+        most = LONGEST_WAY if self.prismatic else 2 * math.pi
+        return max(self.lower, -most), min(self.upper, most)
+
+    def beyond(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far values [rad or m] lie outside the bounds; negative inside."""
+        lower, upper = self.bounds
+        return np.maximum(values - upper, lower - values)
+
+    def reaches(self, values: NDArray[np.float64]) -> bool:
+        """Whether values can be positions of this joint, or are far outside its bounds."""
+        lower, upper = self.bounds
+        slack = 0.0 if self.prismatic else WRONG_ZERO
+        return bool(np.max(self.beyond(values)) <= 0.5 * (upper - lower) + slack)
 
 
 @dataclass(frozen=True)
@@ -73,4 +104,5 @@ def _joint(element: ElementTree.Element) -> RigJoint | None:
     bounded = limit is not None and kind != "continuous"
     lower = float(limit.get("lower", "-inf")) if bounded and limit is not None else -math.inf
     upper = float(limit.get("upper", "inf")) if bounded and limit is not None else math.inf
-    return RigJoint(element.get("name", ""), lower, upper, mimic.get("joint") if mimic is not None else None)
+    leader = mimic.get("joint") if mimic is not None else None
+    return RigJoint(element.get("name", ""), lower, upper, leader, kind == "prismatic")

@@ -26,6 +26,11 @@ def check_time(columns: Columns, rate: float, path: Path) -> tuple[Columns, list
     columns, warnings = _without_repeats(columns, path)
     gaps = np.diff(columns.time) * rate
     _require_rate(gaps, rate, path)
+    if np.median(gaps) / rate > LONGEST_GAP:
+        raise InputError(
+            f"{path}: column 'time', row 1: steps of {np.median(gaps) / rate:.3g} s show nothing of a drive; is "
+            "the time in another unit (record source=csv source.time_unit=ms)?"
+        )
     worst = int(np.argmax(gaps))
     if gaps[worst] / rate > LONGEST_GAP:
         raise InputError(

@@ -16,22 +16,30 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TrialTable:
-    """One trial to be written: its entry, time (n,) [s] and signals (n, joints); torque may be None."""
+    """One trial to be written: its entry, time (n,) [s] and signals (n, joints); torque may be None.
+
+    `origin` is the file that it was read from.
+    """
 
     entry: TrialEntry
     time: Array
     command: Array
     position: Array
     torque: Array | None = None
+    origin: Path | None = None
 
 
 @dataclass(frozen=True)
 class RecordingTables:
-    """A recording to be written: recording.yaml (its trials come from the tables), the URDF's text, the trials."""
+    """A recording to be written: recording.yaml (its trials come from the tables), the URDF's text, the trials.
+
+    `understood` says how an importer read another program's files: rows of what, how, and what told it.
+    """
 
     description: Description
     urdf: str
     tables: Sequence[TrialTable]
+    understood: Sequence[tuple[str, str, str]] = ()
 
 
 def write_recording(folder: Path, recording: RecordingTables) -> None:

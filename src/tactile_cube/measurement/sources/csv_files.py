@@ -1,7 +1,8 @@
-"""Tables of another program (CSV, Parquet or NPZ) as a recording, by a small map of columns."""
+"""Tables of another program (CSV, Parquet or NPZ) as a recording; what is not said of them is guessed, and told."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from glob import glob
 from pathlib import Path
 from typing import TypeVar
@@ -11,16 +12,16 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
-from tactile_cube.measurement.recordings.rig import read_rig
+from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.tables import Table, read_table
-from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.source import described
+from tactile_cube.measurement.recordings.writing import RecordingTables
+from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
+from tactile_cube.measurement.sources.foreign_log import SaidUnits, cut, understand
+from tactile_cube.measurement.sources.kinds import kinds_of
+from tactile_cube.measurement.sources.source import described, known
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")
-ANGLE_UNITS = {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi}
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
 
 
 @dataclass(frozen=True)
@@ -30,93 +31,127 @@ class CsvFiles:
     Attributes:
         files: paths or patterns; one trial each.
         urdf: path of the rig's URDF.
-        columns: `time` -> its column, and joint -> {command, position, torque} -> column; torque may be left out.
-        controller: kp, kd, torque_limit.
+        columns: `time` -> its column, and joint -> {command, position, torque} -> column; by default by their names.
+        controller: kp, kd, torque_limit, mode.
         nominal: stiffness, static_friction, reflected_inertia, as far as known.
         gravity: (3,) in the base frame [m/s^2].
         rate: samples per second; null: the median of the first file.
-        angle_unit: rad, deg or turn.
-        time_unit: s, ms, us or ns.
-        torque_unit: Nm, mNm or Ncm.
+        angle_unit: rad, deg, turn or mrad; null: by the columns' names or the joints' limits.
+        length_unit: m, mm or um, of sliding joints; null: likewise.
+        time_unit: s, ms, us or ns; null: by the column's name or its steps.
+        torque_unit: Nm, mNm or Ncm (N, mN or kN of sliding joints); null: by the columns' names.
         read: `after` or `before` the control period, see recording.yaml's sensors.
         resolution: of the position [rad].
+        length: cut each file into trials of this length [s]; null: one trial a file.
         initialisation: of each file, by default 0 for all.
-        kind: of each file, by default the file's name.
+        kind: of each file; by default files are of one kind if their names differ in a number or date only and their
+            commands agree.
     """
 
     files: Iterable[str]
     urdf: str
-    columns: Mapping[str, str | Mapping[str, str]]
-    controller: Mapping[str, float]
-    nominal: Mapping[str, float] = field(default_factory=dict)
+    controller: Mapping[str, float | str | None]
+    columns: Mapping[str, str | Mapping[str, str]] | None = None
+    nominal: Mapping[str, float | None] = field(default_factory=dict)
     gravity: Iterable[float] = (0.0, 0.0, -9.81)
     rate: float | None = None
-    angle_unit: str = "rad"
-    time_unit: str = "s"
-    torque_unit: str = "Nm"
+    angle_unit: str | None = None
+    length_unit: str | None = None
+    time_unit: str | None = None
+    torque_unit: str | None = None
     read: str = "after"
     resolution: float = 0.0
+    length: float | None = None
     initialisation: Iterable[int] | None = None
     kind: Iterable[str] | None = None
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
-        paths = self._paths()
-        kinds = _one_each(self.kind, paths, "kind", [path.stem for path in paths])
+        controller = self._controller()
+        torque_mode = controller.get("mode") == "torque"
+        paths, rig = self._paths(), read_rig(Path(self.urdf))
+        tables = {path: read_table(path, only_numbers=False) for path in paths}
+        columns = self._columns(tables[paths[0]], paths[0], rig, torque_mode)
+        said = SaidUnits(self.time_unit, self.angle_unit, self.length_unit, self.torque_unit)
+        reading = understand(tables, columns, rig.joints, said, torque_mode)
         starts = _one_each(self.initialisation, paths, "initialisation", [0] * len(paths))
-        rig = read_rig(Path(self.urdf))
-        tables = []
-        for path, kind, start in zip(paths, kinds, starts, strict=True):
-            entry = TrialEntry(
-                file=f"trials/{path.stem}.parquet", initialisation=start, kind=kind, note=f"from {path.name}"
-            )
-            tables.append(self._trial(read_table(path), path, entry))
-        rate = self.rate if self.rate is not None else float(np.round(1 / np.median(np.diff(tables[0].time)), 3))
+        entries = [
+            TrialEntry(file=f"trials/{name}.parquet", initialisation=start, note=f"from {path.name}")
+            for path, name, start in zip(paths, _distinct(paths), starts, strict=True)
+        ]
+        trials = [reading.trial(tables[p], p, entry, self.rate) for p, entry in zip(paths, entries, strict=True)]
+        rate = self.rate if self.rate is not None else float(np.round(1 / np.median(np.diff(trials[0].time)), 3))
+        guessed = kinds_of([path.stem for path in paths], [trial.command for trial in trials], 1 / rate)
+        kinds = _one_each(self.kind, paths, "kind", guessed)
+        named = [
+            replace(trial, entry=trial.entry.model_copy(update={"kind": kind}))
+            for trial, kind in zip(trials, kinds, strict=True)
+        ]
         description = described(
-            gravity=list(self.gravity), rate_hz=rate, joints=list(self._joints()), controller=dict(self.controller),
-            nominal=dict(self.nominal), sensors={"read": self.read, "position_resolution": self.resolution},
+            gravity=list(self.gravity), rate_hz=rate, joints=list(columns.joints), controller=controller,
+            nominal=known(self.nominal), sensors={"read": self.read, "position_resolution": self.resolution},
         )  # fmt: skip
-        return {"": RecordingTables(description, rig.text, tables)}
+        pieces = [piece for trial in named for piece in cut(trial, self.length)]
+        by = "source.kind" if self.kind is not None else "file names and commands"
+        understood = [*reading.rows(rate), ("kinds", _repeats(kinds), by)]
+        return {"": RecordingTables(description, rig.text, pieces, [row for row in understood if row[1]])}
 
-    def _joints(self) -> dict[str, Mapping[str, str]]:
-        joints = {name: entry for name, entry in self.columns.items() if isinstance(entry, Mapping)}
-        if not joints or not isinstance(self.columns.get("time"), str):
-            raise InputError(f"source.columns: expected time: COLUMN and JOINT: {{command: ..., position: ...}}, "
-                             f"received {dict(self.columns)}")  # fmt: skip
-        return joints
+    def _controller(self) -> dict[str, float | str]:
+        said: dict[str, float | str] = known(self.controller)
+        missing = [f"source.controller.{key}" for key in ("kp", "kd") if key not in said]
+        if missing and said.get("mode", "position") == "position":
+            raise InputError(
+                f"source=csv needs {' and '.join(missing)}: the gains of the position controller that moved the rig "
+                "[N m/rad, N m s/rad]; or source.controller.mode=torque where the commands are torques"
+            )
+        return said
+
+    def _columns(self, table: Table, path: Path, rig: Rig, torque_mode: bool) -> ColumnMap:
+        joints = [name for name, joint in rig.joints.items() if joint.mimics is None]
+        try:
+            columns = map_columns(list(table), joints, self.columns or {}, torque_mode)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        if columns.time is None and self.rate is None:
+            raise InputError(
+                f"{path}: no column of time among {list(table)}; say 'source.columns={{time: COLUMN, ...}}', or "
+                "source.rate=HZ where rows follow one another at a fixed rate"
+            )
+        return columns
 
     def _paths(self) -> list[Path]:
-        found = [Path(name) for pattern in self.files for name in sorted(glob(pattern)) or [pattern]]
+        if isinstance(self.files, str):
+            raise InputError(f"source.files={self.files}: expected a list: 'source.files=[{self.files}]'")
+        found = []
+        for pattern in self.files:
+            matches = [Path(name) for name in sorted(glob(pattern, recursive=True))]
+            if not matches:
+                raise InputError(f"source.files: {pattern} matches no file{_beside(Path(pattern))}")
+            found += matches
         if not found:
             raise InputError("source.files: no file given")
-        return found
-
-    def _trial(self, table: Table, path: Path, entry: TrialEntry) -> TrialTable:
-        angle, joints = _unit(self.angle_unit, ANGLE_UNITS, "angle_unit"), self._joints()
-        time = _column(table, str(self.columns["time"]), path) * _unit(self.time_unit, TIME_UNITS, "time_unit")
-        signals = {}
-        for signal, unit in (
-            ("command", angle),
-            ("position", angle),
-            ("torque", _unit(self.torque_unit, TORQUE_UNITS, "torque_unit")),
-        ):
-            names = [joint.get(signal) for joint in joints.values()]
-            if signal == "torque" and None in names:
-                continue
-            signals[signal] = unit * np.stack([_column(table, str(name), path) for name in names], axis=1)
-        return TrialTable(entry, time, signals["command"], signals["position"], signals.get("torque"))
+        return list(dict.fromkeys(found))
 
 
-def _column(table: Table, name: str, path: Path) -> Array:
-    if name not in table:
-        raise InputError(f"{path}: column '{name}' is missing (source.columns names it); the file has {list(table)}")
-    return table[name]
+def _beside(pattern: Path) -> str:
+    """What there is where a pattern looks."""
+    folder = pattern.parent
+    if not folder.is_dir():
+        return f"; there is no folder {folder}" if "*" not in str(folder) else ""
+    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    return f"; {folder} has {', '.join(names[:8]) or 'nothing'}{', ...' if len(names) > 8 else ''}"
 
 
-def _unit(name: str, units: Mapping[str, float], key: str) -> float:
-    if name not in units:
-        raise InputError(f"source.{key}={name}: unknown; choose one of {', '.join(units)}")
-    return units[name]
+def _distinct(paths: list[Path]) -> list[str]:
+    """A name for each file; files of one name in several folders have the folder's before theirs."""
+    count = Counter(path.stem for path in paths)
+    names = [path.stem if count[path.stem] == 1 else f"{path.parent.name}_{path.stem}" for path in paths]
+    return [name if names.count(name) == 1 else f"{name}_{k}" for k, name in enumerate(names)]
+
+
+def _repeats(kinds: list[str]) -> str:
+    count = Counter(kinds)
+    return ", ".join(f"{kind} x {n}" if n > 1 else kind for kind, n in count.items())
 
 
 def _one_each(values: Iterable[Value] | None, paths: list[Path], key: str, default: list[Value]) -> list[Value]:

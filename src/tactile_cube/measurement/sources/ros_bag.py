@@ -12,7 +12,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.source import described
+from tactile_cube.measurement.sources.source import described, known
 
 Array = NDArray[np.float64]
 SAME_STAMP = 1e-6  # [s]
@@ -42,7 +42,7 @@ class RosBag:
     controller: Mapping[str, float]
     states: str = "/joint_states"
     commands: str = "/joint_commands"
-    nominal: Mapping[str, float] = field(default_factory=dict)
+    nominal: Mapping[str, float | None] = field(default_factory=dict)
     gravity: Iterable[float] = (0.0, 0.0, -9.81)
     rate: float | None = None
     read: str = "before"
@@ -58,7 +58,7 @@ class RosBag:
         rate = self.rate if self.rate is not None else float(np.round(1 / np.median(np.diff(tables[0].time)), 2))
         description = described(
             gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=dict(self.controller),
-            nominal=dict(self.nominal), sensors={"read": self.read},
+            nominal=known(self.nominal), sensors={"read": self.read},
         )  # fmt: skip
         return {"": RecordingTables(description, rig.text, tables)}
 

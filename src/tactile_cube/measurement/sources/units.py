@@ -1,0 +1,88 @@
+"""In which unit a column is: what the user says, or its name, or its values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.rig import RigJoint
+from tactile_cube.measurement.sources.column_names import unit_of
+
+Array = NDArray[np.float64]
+ANGLE_UNITS = {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi, "mrad": 1e-3}
+LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
+FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+SLOWEST = 0.1  # [s] between samples of a log that shows a drive
+NOT_ALIKE = 0.05  # range of a position over that of its command, below which they are in different units
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: its name, its size in SI units, and what told it."""
+
+    name: str
+    size: float
+    told_by: str
+
+
+def chosen_unit(said: str | None, name: str, units: Mapping[str, float], key: str) -> Unit | None:
+    """The unit that the user or else the column's name says.
+
+    Raises:
+        InputError: no such unit.
+    """
+    if said is not None:
+        if said not in units:
+            raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}")
+        return Unit(said, units[said], f"source.{key}")
+    found = unit_of(name, units)
+    return None if found is None else Unit(found, units[found], "its name")
+
+
+def time_unit(said: str | None, name: str, time: Array) -> Unit:
+    """Unit of time stamps; steps of more than 0.1 cannot be seconds, of more than 100 no milliseconds, and so on."""
+    chosen = chosen_unit(said, name, TIME_UNITS, "time_unit")
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if chosen is not None and (said is not None or step * chosen.size <= 10 * SLOWEST):
+        return chosen
+    unit = next((unit for unit, size in TIME_UNITS.items() if step * size <= SLOWEST * 1.001), "ns")
+    return Unit(unit, TIME_UNITS[unit], f"steps of {step:g}")
+
+
+def position_unit(said: str | None, name: str, values: Array, joint: RigJoint) -> Unit:
+    """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits."""
+    units = LENGTH_UNITS if joint.prismatic else ANGLE_UNITS
+    chosen = chosen_unit(said, name, units, "length_unit" if joint.prismatic else "angle_unit")
+    if chosen is not None:
+        return chosen
+    for unit in ("m", "mm") if joint.prismatic else ("rad", "deg"):
+        if joint.reaches(values * units[unit]):
+            return Unit(unit, units[unit], f"values {values.min():.3g} .. {values.max():.3g} and the joint's limits")
+    first = next(iter(units))
+    return Unit(first, 1.0, "assumed: no unit fits the joint's limits")
+
+
+def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
+    """Units of a command and its position, one for both where values alone told them and the motions are alike.
+
+    Args:
+        command: its unit.
+        position: its unit.
+        ratio: range of the position over that of the command, as logged.
+    """
+    guessed = not {"its name"} & {command.told_by, position.told_by}
+    if command.name == position.name or not guessed or not NOT_ALIKE < ratio < 1 / NOT_ALIKE:
+        return command, position
+    smaller = min(command, position, key=lambda unit: unit.size)
+    return smaller, smaller
+
+
+def torque_unit(said: str | None, name: str, prismatic: bool) -> Unit:
+    """Unit of torques, or of a sliding joint's forces; N m or N where nothing is said."""
+    if prismatic:
+        return chosen_unit(said, name, FORCE_UNITS, "torque_unit") or Unit("N", 1.0, "assumed")
+    return chosen_unit(said, name, TORQUE_UNITS, "torque_unit") or Unit("Nm", 1.0, "assumed")
