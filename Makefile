@@ -18,7 +18,7 @@ help: ## print these targets
 	@touch $@
 
 train: .venv/installed ## teach the hand; Ctrl-C saves, the same command goes on
-	$(BIN)/python -m tactile_cube.train $(or $(ARGS),+experiment=curriculum)
+	$(BIN)/python -m tactile_cube.train $(ARGS)
 
 test: .venv/installed ## run the tests
 	$(BIN)/python -m pytest $(ARGS)

@@ -29,6 +29,9 @@ CONFIG = Path(__file__).parent / "conf"
 ADDED = ("experiment", "without")
 """Groups of training that no default chooses from: `+experiment=option`, and `without=option` beside ablations."""
 
+RECIPE = {"train": "curriculum"}
+"""The experiment that a verb takes where the command line names none."""
+
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
 USAGE_ERROR = 2
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -57,11 +60,26 @@ def verb(name: str) -> Callable[[Callable[["DictConfig"], None]], Callable[[], N
                 print(script)
                 return
             prepare_query()
+            sys.argv = with_recipe(name, sys.argv)
             _run(name, function)
 
         return command
 
     return decorate
+
+
+def with_recipe(name: str, words: list[str]) -> list[str]:
+    """The words of a verb's command line, with its recipe in front of the first `key=value` unless they choose one.
+
+    Example:
+        >>> with_recipe("train", ["train", "seed=1", "--cfg", "job"])
+        ['train', '+experiment=curriculum', 'seed=1', '--cfg', 'job']
+    """
+    chosen = any(re.match(r"[+~]*experiment\b", word) for word in words)
+    if name not in RECIPE or chosen or {"-sc", "--shell-completion"} & set(words):
+        return words
+    first = next((at for at, word in enumerate(words) if re.match(r"[+~]*[\w./@]+=", word)), len(words))
+    return [*words[:first], f"+experiment={RECIPE[name]}", *words[first:]]
 
 
 def _run(name: str, function: Callable[["DictConfig"], None]) -> None:
@@ -182,10 +200,12 @@ def _group_lines(path: Path) -> list[str]:
             mark = "*" if file.stem == default else " "
             head = f"{group}=" if index == 0 else ""
             lines.append(f"  {head:<16}{mark}{file.stem:<17} {_summary(file)}")
+    if "without" not in groups:
+        return [*lines, "  (* is the default)"]
     return [
         *lines,
-        "  (* is the default)",
-        *(["  (added to the others: +experiment=option; to ablations: without=option)"] if "without" in groups else []),
+        "  (* is the default, before what the experiment changes)",
+        "  (+experiment=option changes several choices at once; to ablations: without=option)",
     ]
 
 
@@ -209,7 +229,8 @@ def _groups(path: Path) -> dict[str, str | None]:
             name = group.removeprefix("override ").removeprefix("optional ").split("@")[0].strip("/ ")
             if (CONFIG / name).is_dir() and name != "hydra":
                 groups[name] = option
-    return groups | (dict.fromkeys(ADDED) if path.stem == "train" else {})
+    added = dict.fromkeys(ADDED) | {"experiment": RECIPE["train"]}
+    return groups | (added if path.stem == "train" else {})
 
 
 def _key_lines(path: Path) -> list[str]:

@@ -24,6 +24,7 @@ def main(config: "DictConfig") -> None:
     from omegaconf import OmegaConf
 
     from tactile_cube.drivetrain.model_file import read_model
+    from tactile_cube.evaluation.policy_path import networks_path
     from tactile_cube.training.build import build_run
     from tactile_cube.training.collection import CollectionError
     from tactile_cube.training.environment import as_environment
@@ -41,7 +42,7 @@ def main(config: "DictConfig") -> None:
             environment=as_environment(instantiate(config.env)),
             make_agent=instantiate(config.agent, _partial_=True),
             collector=CollectorSettings(**plain["collector"]),
-            training=TrainingSettings(**plain["training"]),
+            training=TrainingSettings(**plain["training"] | {"init_from": networks_path(config.training.init_from)}),
             loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
             config=plain,
         )

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from tactile_cube import cli
+from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.evaluation.policy_path import SHIPPED
 
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
 
@@ -49,8 +51,53 @@ def test_cfg_job_shows_the_configuration_without_importing_torch(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
+    ("words", "taken"),
+    [
+        ([], ["+experiment=curriculum"]),
+        (["seed=1"], ["+experiment=curriculum", "seed=1"]),
+        (["seed=1", "-m"], ["+experiment=curriculum", "seed=1", "-m"]),
+        (["--cfg", "job", "+task.x=1"], ["--cfg", "job", "+experiment=curriculum", "+task.x=1"]),
+        (["-m", "+experiment=table1"], ["-m", "+experiment=table1"]),
+        (["seed=1", "+experiment=paper"], ["seed=1", "+experiment=paper"]),
+        (["-sc", "query=bash"], ["-sc", "query=bash"]),
+    ],
+)
+def test_train_takes_the_recipe_unless_an_experiment_is_named(words: list[str], taken: list[str]) -> None:
+    assert cli.with_recipe("train", words) == taken
+    assert cli.with_recipe("evaluate", words) == words
+
+
+def test_train_without_words_is_the_recipe_and_not_the_published_run(tmp_path: Path) -> None:
+    bare, named, paper = (
+        train(*words, "--cfg", "job", folder=tmp_path).stdout
+        for words in ([], ["+experiment=curriculum"], ["+experiment=paper"])
+    )
+    assert "name: curriculum" in bare
+    assert bare == named != paper
+
+
+def test_make_train_adds_its_words_to_the_recipe() -> None:
+    makefile = Path(__file__).parents[2] / "Makefile"
+    command = next(line for line in makefile.read_text().splitlines() if "-m tactile_cube.train" in line)
+    assert command.split("tactile_cube.train")[1].split() == ["$(ARGS)"]
+
+
+def test_fine_tuning_goes_on_from_the_shipped_policy(tmp_path: Path) -> None:
+    few = ["training.steps=40", "training.learning_starts=10", "training.replay_size=1000", "agent.batch_size=16"]
+    few += ["training.steps_per_iteration=5", "training.barrier_iterations=4", "training.updates_per_iteration=2"]
+    run = train("+experiment=finetune", "collector=single", "collector.worlds=2", "logger=csv", *few, folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert "default.safetensors; critics begin anew, the actor waits for 3000 updates" in run.stdout
+    files = (tmp_path / "outputs/train/finetune-seed0/policy.safetensors", SHIPPED / "default.safetensors")
+    mine, shipped = (load_policy(file)[0].state_dict() for file in files)
+    assert mine.keys() == shipped.keys()
+    assert all((mine[name] - shipped[name]).abs().max() < 0.01 for name in mine)
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["training.init_from=nobody"], "training.init_from=nobody: no such file"),
         (["task=unknown"], "task/unknown"),
         (["agent.gama=0.9"], "agent.gama"),
         (["+experiment=nope"], "experiment/nope"),

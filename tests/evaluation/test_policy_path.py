@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.policy_path import policy_path
+from tactile_cube.evaluation.policy_path import SHIPPED, networks_path, policy_path
 from tactile_cube.evaluation.policy_source import find_policy
 
 
@@ -24,3 +24,20 @@ def test_an_unknown_policy_is_refused_with_the_choices() -> None:
 
 def test_the_shipped_policy_is_named_without_the_place_of_the_package() -> None:
     assert find_policy(None).provenance["file"] == "default.safetensors"
+
+
+def test_training_begins_from_a_shipped_policy_by_its_name() -> None:
+    assert networks_path("default") == str(SHIPPED / "default.safetensors")
+    assert networks_path(None) is None
+
+
+def test_training_begins_from_a_run_with_its_critics_where_it_has_a_checkpoint(tmp_path: Path) -> None:
+    (tmp_path / "policy.safetensors").touch()
+    assert networks_path(str(tmp_path)) == str(tmp_path / "policy.safetensors")
+    (tmp_path / "checkpoint.pt").touch()
+    assert networks_path(str(tmp_path)) == str(tmp_path / "checkpoint.pt")
+
+
+def test_training_from_an_unknown_policy_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^training.init_from=nobody: .* default, robust, table$"):
+        networks_path("nobody")

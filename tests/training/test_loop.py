@@ -10,6 +10,7 @@ import torch
 
 from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.errors import InputError
+from tactile_cube.training.build import FROZEN
 from tactile_cube.training.checkpoint import load_checkpoint, save_checkpoint
 from tactile_cube.training.loop import barrier_seed
 from tactile_cube.training.run import Run
@@ -197,6 +198,27 @@ def test_a_frozen_actor_waits_for_its_critics(tmp_path: Path) -> None:
         finish(run)
         after = run.learner.agent.policy().parameters()
         assert all(torch.equal(a, b) for a, b in zip(after, given, strict=True)) == still
+
+
+def test_an_actor_without_its_critics_waits_unless_told_otherwise(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path / "first", steps=80))
+    frozen = {
+        file: tiny_run(tmp_path / file, init_from=str(tmp_path / "first" / file)).learner.settings.actor_frozen
+        for file in ("policy.safetensors", "checkpoint.pt")
+    }
+    assert frozen == {"policy.safetensors": FROZEN, "checkpoint.pt": None}
+
+
+def test_a_run_says_how_long_it_takes_and_whose_networks_it_begins_with(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    finish(tiny_run(tmp_path / "first", steps=80))
+    policy = str(tmp_path / "first" / "policy.safetensors")
+    capsys.readouterr()
+    tiny_run(tmp_path / "next", init_from=policy).announce()
+    first, second = capsys.readouterr().out.splitlines()[:2]
+    assert first.endswith("starts, 160 steps in all, about 0 min 00 s on two idle cores")
+    assert second == f"networks of {policy}; critics begin anew, the actor waits for {FROZEN} updates"
 
 
 def test_warm_start_from_other_shape_is_refused(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from importlib import resources
 from pathlib import Path
 
 from tactile_cube.errors import InputError
+from tactile_cube.training.checkpoint import FILE
 
 BASELINES = ("hold", "random", "scripted", "replay:EPISODE.npz")
 """Names that are no files; evaluate knows them."""
@@ -13,19 +14,42 @@ SHIPPED = Path(str(resources.files("tactile_cube"))) / "policies"
 """Policies that come with the package; the one called `default` is taken when none is named."""
 
 
-def policy_path(name: str | None) -> Path:
-    """Return the policy file that a name means."""
+def policy_path(name: str | None, key: str = "policy") -> Path:
+    """Return the policy file that a name means.
+
+    Args:
+        name: a policy file, a run's folder, or a policy that ships with the package; None takes `default`.
+        key: that the user wrote the name behind.
+
+    Raises:
+        InputError: there is no such file.
+    """
     if name is None:
         name = "default"
     path, packaged = Path(name), SHIPPED / f"{name}.safetensors"
     if path.is_dir():
         path /= "policy.safetensors"
         if not path.is_file():
-            raise InputError(f"policy={name}: the folder holds no {path.name}; is the run's first checkpoint written?")
+            raise InputError(f"{key}={name}: the folder holds no {path.name}; is the run's first checkpoint written?")
     if not path.is_file() and packaged.is_file():
         return packaged
     if not path.is_file():
         known = sorted(file.stem for file in SHIPPED.glob("*.safetensors"))
-        choices = ", ".join([*known, *BASELINES])
-        raise InputError(f"policy={name}: no such file; give a policy file, a run folder, or one of {choices}")
+        choices = ", ".join([*known, *(BASELINES if key == "policy" else ())])
+        raise InputError(f"{key}={name}: no such file; give a policy file, a run folder, or one of {choices}")
     return path
+
+
+def networks_path(name: str | None) -> str | None:
+    """Return the file whose networks a training run begins with; None begins with fresh ones.
+
+    Args:
+        name: a checkpoint, or what `policy_path` takes; of a run's folder the checkpoint, which has the critics too.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    if name is None:
+        return None
+    checkpoint = Path(name) / FILE if Path(name).is_dir() else Path(name)
+    return str(checkpoint if checkpoint.is_file() else policy_path(name, "training.init_from"))

@@ -16,6 +16,7 @@ from tactile_cube.training.checkpoint import FILE, load_checkpoint, require_same
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
+from tactile_cube.training.expected_time import expected_seconds
 from tactile_cube.training.folder_lock import lock_folder
 from tactile_cube.training.heap import keep_freed_memory
 from tactile_cube.training.ledger import LEDGER, Ledger
@@ -26,6 +27,9 @@ from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 
 MakeLogger = Callable[..., MetricLogger]
+POLICY_SUFFIX = ".safetensors"
+FROZEN = 3000
+"""Updates that leave the actor of a policy file as it is, unless training.actor_frozen says otherwise."""
 
 
 def build_run(
@@ -61,6 +65,7 @@ def build_run(
     torch.manual_seed(seed)
     saved = _saved_state(folder, training, config)
     agent = make_agent(environment.sizes)
+    training = protected(training)
     if saved is None and training.init_from:
         warm_start(agent, Path(training.init_from))
     collection = build_collection(environment, agent.policy(), collector, training)
@@ -80,7 +85,8 @@ def build_run(
         processes = 1 if in_process else collector.workers + 1
         ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
         made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
-        run = Run(learner, folder, config, Loggers(made), ledger, lock)
+        seconds = expected_seconds(training.steps - learner.steps, agent.settings, collector, training)
+        run = Run(learner, folder, config, Loggers(made), ledger, lock, seconds)
     except BaseException:
         collection.close()  # worker processes would keep the program from ending
         raise
@@ -105,9 +111,20 @@ def build_collection(
     )
 
 
+def protected(training: TrainingSettings) -> TrainingSettings:
+    """The schedule, in which an actor without its critics waits until fresh ones know what it is worth.
+
+    A policy file holds the actor alone; gradients of ignorant critics would lead it astray (docs/circle.md).
+    """
+    alone = training.init_from is not None and Path(training.init_from).suffix == POLICY_SUFFIX
+    if not alone or training.actor_frozen is not None:
+        return training
+    return training.model_copy(update={"actor_frozen": FROZEN})
+
+
 def warm_start(agent: Agent, path: Path) -> None:
     """Begin from the networks of a checkpoint, or from a policy file's actor."""
-    if path.suffix == ".safetensors":
+    if path.suffix == POLICY_SUFFIX:
         actor, info = load_policy(path)
         require_sizes(path, info, agent.sizes.observation, agent.sizes.action)
         _fit(path, lambda: agent.load_actor(actor))

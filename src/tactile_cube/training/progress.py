@@ -48,7 +48,7 @@ class ProgressLine:
             f"{step_rate:4.0f} steps/s {update_rate:4.0f} updates/s",
             f"final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps",
             values,
-            f"{_clock(left)} left",
+            f"{clock(left)} left",
         ]
         self.say(" | ".join(parts), in_place=self._stream.isatty())
 
@@ -58,6 +58,7 @@ class ProgressLine:
         print(f"{clear}{text}", end="" if in_place else "\n", file=self._stream, flush=True)
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
+    """A length of time in words."""
     hours, minutes = int(seconds // 3600), int(seconds % 3600 // 60)
     return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {int(seconds % 60):02d} s"

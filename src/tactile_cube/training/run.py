@@ -17,7 +17,7 @@ from tactile_cube.training.checkpoint import save_checkpoint
 from tactile_cube.training.ledger import Ledger
 from tactile_cube.training.loggers import Loggers
 from tactile_cube.training.loop import Learner
-from tactile_cube.training.progress import ProgressLine
+from tactile_cube.training.progress import ProgressLine, clock
 
 INTERRUPTED = "interrupted"
 POLICY, BEST_POLICY = "policy.safetensors", "policy_best.safetensors"
@@ -34,6 +34,7 @@ class Run:
         loggers: where metrics go.
         ledger: what it costs.
         lock: keeps other processes out of the folder.
+        expected_seconds: on the clock until all steps are done, on two idle cores.
     """
 
     learner: Learner
@@ -42,6 +43,7 @@ class Run:
     loggers: Loggers
     ledger: Ledger
     lock: BaseFileLock
+    expected_seconds: float
 
     def __post_init__(self) -> None:
         """A session begins."""
@@ -65,10 +67,14 @@ class Run:
         return reason
 
     def announce(self) -> None:
-        """Say what runs where, and which shortcuts are on."""
-        learner = self.learner
+        """Say what runs where and for how long, where it begins, and which shortcuts are on."""
+        learner, settings = self.learner, self.learner.settings
         start = f"goes on at {learner.steps} steps" if learner.steps else "starts"
-        self.line.say(f"{self.folder}: {start}, {learner.settings.steps} steps in all")
+        expected = clock(self.expected_seconds)
+        self.line.say(f"{self.folder}: {start}, {settings.steps} steps in all, about {expected} on two idle cores")
+        if not learner.steps and settings.init_from:
+            waits = f"; critics begin anew, the actor waits for {settings.actor_frozen} updates"
+            self.line.say(f"networks of {settings.init_from}{waits if settings.actor_frozen else ''}")
         for approximation in learner.agent.approximations():
             self.line.say(f"approximation: {approximation}")
 

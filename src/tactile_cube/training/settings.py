@@ -73,7 +73,8 @@ class TrainingSettings(BaseModel):
         resume: "auto" goes on from the newest checkpoint of this run folder; "never" starts over.
         init_from: checkpoint (.pt) or policy (.safetensors) whose networks the run starts from.
         actor_frozen: updates at the beginning that leave the actor as it is: after `init_from` a policy file, whose
-            critics are fresh, they would lead it astray before they know what it is worth.
+            critics are fresh, they would lead it astray before they know what it is worth. None: as many as they need
+            there, and none after a checkpoint, which brings its critics.
         stop_if_no_regrasp_by: give up when the mean final angle is still below `regrasp_angle` after so many steps.
         regrasp_angle: angle [rad] no single twist reaches, so that beyond it the fingers must have regrasped.
         stop_when_angle_above: finish early at this mean final angle [rad].

@@ -1,0 +1,48 @@
+"""What each experiment composes to, pinned: a change of a default that reaches one of them shows here."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hydra import compose, initialize_config_dir
+from omegaconf import OmegaConf
+
+from tactile_cube.cli import CONFIG
+
+PINNED = Path(__file__).with_name("experiments.yaml")
+EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def hydra_configuration() -> Iterator[None]:
+    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+        yield
+
+
+def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
+    if not isinstance(tree, dict):
+        return {prefix: tree}
+    pairs = ((f"{prefix}.{key}" if prefix else str(key), value) for key, value in tree.items())
+    return {name: leaf for key, value in pairs for name, leaf in flat(value, key).items()}
+
+
+def composed(*overrides: str) -> dict[str, Any]:
+    return flat(OmegaConf.to_container(compose("train", overrides=list(overrides))))
+
+
+def departures(experiment: str) -> dict[str, Any]:
+    """What an experiment changes in the published settings; `absent` where it has no such key."""
+    plain, changed = composed(), composed(f"+experiment={experiment}")
+    keys = sorted(plain.keys() | changed.keys())
+    return {key: changed.get(key, "absent") for key in keys if changed.get(key, "absent") != plain.get(key, "absent")}
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_an_experiment_composes_to_what_is_pinned(experiment: str) -> None:
+    assert departures(experiment) == yaml.safe_load(PINNED.read_text())[experiment]
+
+
+def test_every_experiment_is_pinned_and_nothing_else() -> None:
+    assert sorted(yaml.safe_load(PINNED.read_text())) == EXPERIMENTS
