@@ -47,7 +47,7 @@ def test_help_lists_verbs_and_groups_without_importing_anything_slow(tmp_path: P
 def test_cfg_job_shows_the_configuration_without_importing_torch(tmp_path: Path) -> None:
     modules, text = loaded_modules("--cfg", tmp_path)
     assert not modules & {"torch", "torchrl", "pybullet"}
-    assert "target_entropy: -6" in text
+    assert "name: curriculum" in text
 
 
 @pytest.mark.parametrize(

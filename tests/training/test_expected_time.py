@@ -3,6 +3,7 @@
 import pytest
 
 from tactile_cube.agent.settings import AgentSettings
+from tactile_cube.training import expected_time
 from tactile_cube.training.expected_time import expected_seconds
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 
@@ -10,10 +11,19 @@ BESIDE, IN_TURNS = CollectorSettings(processes=1), CollectorSettings(kind="singl
 
 
 @pytest.mark.parametrize(("precision", "measured"), [("bf16", 327.0), ("fp32", 82.9)])
-def test_steps_a_second_on_two_cores_are_those_of_the_benchmark(precision: str, measured: float) -> None:
+def test_steps_a_second_on_two_cores_are_those_of_the_benchmark(
+    precision: str, measured: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(expected_time, "MULTIPLIES_BF16", True)
     agent = AgentSettings.model_validate({"precision": precision})
     rate = 1e6 / expected_seconds(1_000_000, agent, BESIDE, TrainingSettings())
     assert rate == pytest.approx(measured, rel=0.3)  # SACLoss is a little slower than sac_fast in fp32
+
+
+def test_where_bfloat16_goes_by_float32_it_saves_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(expected_time, "MULTIPLIES_BF16", False)
+    times = {expected_seconds(1000, AgentSettings(precision=p), BESIDE, TrainingSettings()) for p in ("bf16", "fp32")}
+    assert len(times) == 1
 
 
 def test_simulating_and_learning_in_turns_takes_their_sum() -> None:

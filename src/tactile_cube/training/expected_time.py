@@ -2,6 +2,7 @@
 
 import itertools
 
+from tactile_cube.agent.flat_perceptron import MULTIPLIES_BF16
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 
@@ -27,7 +28,8 @@ def expected_seconds(
     block = collector.worlds * training.steps_per_iteration
     layers = [*agent.hidden, agent.hidden[-1]]
     size = max(a * b for a, b in itertools.pairwise(layers)) * agent.batch_size / LARGE
-    learning = LEARNING[agent.precision] * size * training.updates_per_iteration
+    precision = agent.precision if MULTIPLIES_BF16 else "fp32"
+    learning = LEARNING[precision] * size * training.updates_per_iteration
     if collector.kind == "single":
         return steps / block * (block * SIMULATING + learning)
     return steps / block * max(block * SIMULATING / collector.workers, learning)
