@@ -2,9 +2,9 @@ import numpy as np
 
 from tactile_cube.drivetrain.coupled_joints import (
     add_tendons,
-    bullet_torques,
     estimate_contact,
     expand,
+    link_torques,
     reduce_equations,
 )
 
@@ -53,7 +53,7 @@ def test_an_impact_is_believed_up_to_a_limit() -> None:
 def test_bullet_gets_the_wanted_accelerations_with_the_contact_that_it_adds() -> None:
     M, h, rng = equations()
     wanted, contact, torque = rng.normal(size=2), rng.normal(size=2), np.zeros(3)
-    bullet_torques(FOLLOW, LEADER, RATIO, M, h, wanted, contact, torque)
+    link_torques(FOLLOW, LEADER, RATIO, M, h, wanted, contact, torque)
     push = np.array([contact[0], contact[1], 0.0])
     np.testing.assert_allclose(np.linalg.solve(M, torque + push - h), J @ wanted)
 

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from tactile_cube.hand import DLR_HAND2, grasp_angles
-from tactile_cube.simulation import Contact, EpisodeConstants, Start, World
+from tactile_cube.simulation import Contact, EpisodeConstants, SimulationOptions, Start, World
 
 
-@pytest.fixture(scope="module")
-def squeezed() -> list[Contact]:
-    world = World()
+@pytest.fixture(scope="module", params=["bullet", "mujoco"])
+def squeezed(request: pytest.FixtureRequest) -> list[Contact]:
+    world = World(options=SimulationOptions(request.param))
     world.reset(EpisodeConstants(), Start(DLR_HAND2.start_angles))
     for _ in range(40):
         world.step(grasp_angles(DLR_HAND2, [0.08] * 3, [0, 0, 0], [0, 0, 0, 1], -0.01))

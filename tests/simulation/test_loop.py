@@ -13,8 +13,8 @@ from tactile_cube.simulation.native_library import find_compiler
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 
-def episode(kind: str, trace: bool) -> list[np.ndarray]:
-    world = World(options=SimulationOptions(loop=kind, trace=trace))  # type: ignore[arg-type]
+def episode(engine: str, kind: str, trace: bool) -> list[np.ndarray]:
+    world = World(options=SimulationOptions(engine, loop=kind, trace=trace))  # type: ignore[arg-type]
     assert world.loop == kind
     constants = EpisodeConstants(force_mean=0.04, torque_mean=0.002, table_height=-0.04, filter_time=0.12)
     world.reset(constants, Start(DLR_HAND2.start_angles))
@@ -29,9 +29,10 @@ def episode(kind: str, trace: bool) -> list[np.ndarray]:
 
 
 @needs_compiler
+@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
 @pytest.mark.parametrize("trace", [False, True])
-def test_compiled_and_python_loop_agree_to_the_bit(trace: bool) -> None:
-    for compiled, interpreted in zip(episode("c", trace), episode("python", trace), strict=True):
+def test_compiled_and_python_loop_agree_to_the_bit(engine: str, trace: bool) -> None:
+    for compiled, interpreted in zip(episode(engine, "c", trace), episode(engine, "python", trace), strict=True):
         np.testing.assert_array_equal(compiled, interpreted)
 
 
@@ -53,10 +54,10 @@ def test_the_compiled_loop_reads_where_bullet_writes_and_gives_the_same_bits_as_
     ends = []
     for copied in (False, True):
         world = World(options=SimulationOptions(loop="c"))
-        who = world._loop._who  # type: ignore[attr-defined]
+        who = world._engine._loop._who  # type: ignore[attr-defined]
         assert who[1], "PyBullet's layout is not the known one: the loop is 6 % slower"
         if copied:
-            world._loop._who = (who[0], None, *who[2:])  # type: ignore[attr-defined]
+            world._engine._loop._who = (who[0], None, *who[2:])  # type: ignore[attr-defined]
         world.reset(EpisodeConstants(), Start(DLR_HAND2.start_angles))
         for _ in range(5):
             world.step(DLR_HAND2.start_angles + 0.1)

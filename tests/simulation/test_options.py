@@ -15,3 +15,8 @@ def test_a_policy_step_of_the_presets_lasts_a_tenth_of_a_second() -> None:
 def test_impossible_options_are_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match=f"simulation.{next(iter(wrong))} is"):
         SimulationOptions(**wrong)  # type: ignore[arg-type]
+
+
+def test_an_unknown_engine_is_refused() -> None:
+    with pytest.raises(InputError, match=r"simulation\.engine is 'drake'; choose one of bullet, mujoco, mixed"):
+        SimulationOptions("drake")  # type: ignore[arg-type]

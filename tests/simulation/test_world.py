@@ -13,9 +13,9 @@ HAND = DLR_HAND2
 NOWHERE = (0.0, 0.0, 3.0)
 
 
-@pytest.fixture(scope="module")
-def world() -> World:
-    return World()
+@pytest.fixture(scope="module", params=["bullet", "mujoco"])
+def world(request: pytest.FixtureRequest) -> World:
+    return World(options=SimulationOptions(request.param))
 
 
 def squeeze(inner: float = 0.01) -> np.ndarray:
@@ -45,7 +45,7 @@ def test_an_episode_does_not_depend_on_what_the_world_did_before(world: World) -
     episodes = [random_episode(rng) for _ in range(5)]
     fresh = []
     for episode in episodes:
-        other = World()
+        other = World(options=world.options)
         fresh.append(run(other, *episode))
         other.close()
     for k in (0, 3, 0, 4, 2, 1, 1):
@@ -141,8 +141,9 @@ def test_a_table_carries_the_cube(world: World) -> None:
     assert sum(contact.force * contact.normal[2] for contact in on_table) == pytest.approx(0.05 * 9.81, rel=0.02)
 
 
-def test_accelerations_agree_with_the_lagrangian_of_a_finger() -> None:
-    world = World(options=SimulationOptions(substeps=1))
+@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
+def test_accelerations_agree_with_the_lagrangian_of_a_finger(engine: str) -> None:
+    world = World(options=SimulationOptions(engine, substeps=1))
     rng = np.random.default_rng(5)
     rotor = rng.uniform(1e-3, 2e-3, 12)
     tilt = (0.3, -0.2, -1.0)

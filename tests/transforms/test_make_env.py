@@ -9,6 +9,7 @@ from torchrl.envs.utils import check_env_specs, step_mdp
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import Randomization, StartStates, Uniform
+from tactile_cube.simulation import SimulationOptions
 from tactile_cube.transforms import EnvConfig, Exploration, make_env
 from tactile_cube.transforms.make_env import rotation_env
 
@@ -100,3 +101,15 @@ def test_a_model_shapes_the_world_that_is_trained_in() -> None:
 def test_effects_are_named_as_text() -> None:
     config = EnvConfig(Task("full"), effects=["backlash@q3: play=0.05"])
     assert [one.values["play"] for one in config.effects] == [0.05] * 4
+
+
+def test_mixed_engines_alternate_over_worlds_and_processes() -> None:
+    for seed, expected in ((0, ["bullet", "mujoco", "bullet"]), (1, ["mujoco", "bullet", "mujoco"])):
+        env = make_env(config(simulation=SimulationOptions("mixed")), worlds=3, seed=seed)
+        assert [task.world.options.engine for task in env.base_env.tasks] == expected
+        env.close()
+
+
+def test_one_world_cannot_be_in_two_engines() -> None:
+    with pytest.raises(InputError, match=r"simulation\.engine is 'mixed'"):
+        rotation_env(config(simulation=SimulationOptions("mixed")))

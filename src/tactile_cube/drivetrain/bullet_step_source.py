@@ -1,4 +1,4 @@
-"""Torques for PyBullet's links, as text for a kernel: target filter, contact estimate, inverse dynamics.
+"""Torques for a physics engine's links, as text for a kernel: target filter, contact estimate, inverse dynamics.
 
 The names in capitals are offsets into the memory, see `memory_layout`; C chains, N dofs and n joints in each.
 """
@@ -38,19 +38,24 @@ def sense_contact(x, c, v, dt, memory):
 
 
 @inner
-def torques_for_bullet(c, q, v, torque, memory):
-    """Torques (N,) that give Bullet's links the accelerations of the exact model, and what the next step needs."""
+def torques_for_engine(c, q, v, torque, memory):
+    """Torques (N,) that give the engine's links the accelerations of the exact model, and what the next step needs.
+
+    The engine's links have spin inertia (PyBullet, in place of rotors) or armature (MuJoCo, native rotors), or neither.
+    """
     M, h = shaped(memory, MASS_MATRIX, N, N), memory[BIAS : BIAS + N]
     ratio = memory[RATIO + c * N : RATIO + (c + 1) * N]
     add_spin_inertia(
         PARENT, PRISMATIC, memory[SPIN_INERTIA + c * N : SPIN_INERTIA + (c + 1) * N],
         shaped(memory, WORK, N + 1, WORK_COLUMNS), M, h,
     )
+    for k in range(N):
+        M[k, k] += memory[ARMATURE + c * N + k]
     add_weight(
         PARENT, PRISMATIC, memory[MASS + c * N : MASS + (c + 1) * N], memory[GRAVITY + 3 * c : GRAVITY + 3 * c + 3],
         memory[ENGINE_GRAVITY + 3 * c : ENGINE_GRAVITY + 3 * c + 3], shaped(memory, WORK, N + 1, WORK_COLUMNS), h,
     )
-    bullet_torques(
+    link_torques(
         FOLLOW, LEADER, ratio, M, h, memory[JOINT_ACCELERATION : JOINT_ACCELERATION + n],
         memory[CONTACT_TORQUE + c * n : CONTACT_TORQUE + (c + 1) * n], torque,
     )
@@ -68,7 +73,7 @@ def torques_for_bullet(c, q, v, torque, memory):
 
 @inner
 def control(i, q, v, torque, memory):
-    """Torques (C N,) for Bullet from the positions and speeds (C N,) of all its joints; row i of the trace."""
+    """Torques (C N,) for the engine from the positions and speeds (C N,) of all its joints; row i of the trace."""
     dt = memory[DT]
     for c in range(C):
         x = signals_of(c, memory)
@@ -86,7 +91,7 @@ def control(i, q, v, torque, memory):
         effects_command(x, c, dt, memory)
         drive(x, c, dt, memory)
         next_speeds(x, c, dt, memory)
-        torques_for_bullet(c, q_c, v_c, torque[c * N : (c + 1) * N], memory)
+        torques_for_engine(c, q_c, v_c, torque[c * N : (c + 1) * N], memory)
     memory[SEEN] = 1.0
     memory[STEP] += 1.0
     if i < memory[TRACE_ROWS]:

@@ -1,4 +1,4 @@
-"""From the equations of all joints of a finger to those of its actuated ones, and back to torques for PyBullet."""
+"""From the equations of all joints of a finger to those of its actuated ones, and back to torques of all links."""
 
 import numpy as np
 import numpy.typing as npt
@@ -51,7 +51,7 @@ def estimate_contact(
 
 
 @compiled
-def bullet_torques(
+def link_torques(
     follow: Integers,
     leader: Integers,
     ratio: Array,
@@ -61,9 +61,9 @@ def bullet_torques(
     contact: Array,
     torque: Array,
 ) -> None:
-    """Torques (N,) under which Bullet's links, inertia M and bias h, get the wanted joint accelerations (n,).
+    """Torques (N,) under which the engine's links, inertia M and bias h, get the wanted joint accelerations (n,).
 
-    `contact` (n,) is taken off the actuated joints, the dofs `leader` (n,): Bullet's solver adds it itself.
+    `contact` (n,) is taken off the actuated joints, the dofs `leader` (n,): the engine's solver adds it itself.
     """
     for k in range(len(follow)):
         torque[k] = h[k]

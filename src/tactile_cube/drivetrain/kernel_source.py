@@ -25,7 +25,7 @@ from numba import carray, cfunc, njit, types
 
 from tactile_cube.compiled import borrowed, shaped_view
 from tactile_cube.drivetrain.coupled_joints import (
-    add_tendons, bullet_torques, estimate_contact, expand, reduce_equations,
+    add_tendons, estimate_contact, expand, link_torques, reduce_equations,
 )
 from tactile_cube.drivetrain.dry_friction import solve_speeds
 from tactile_cube.drivetrain.impedance import impedance_torque

@@ -121,6 +121,7 @@ def _mechanism(chains: int, dofs: int) -> dict[str, Shape]:
         "com": (chains, dofs, 3),
         "inertia": (chains, dofs, 3, 3),
         "spin_inertia": (chains, dofs),
+        "armature": (chains, dofs),
     }
 
 

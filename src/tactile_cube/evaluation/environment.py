@@ -24,8 +24,8 @@ def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
     """Return the environment of `source` with the overrides of the command line.
 
     `model` and `effects` replace those that the policy was trained with. A group chosen on the command line
-    (`task=full`) replaces the policy's; single values (`+task.filter_time=0.3`,
-    `+env.simulation.solver_iterations=100`) change it.
+    (`task=full`) replaces the policy's; `engine` replaces the one it was trained in; single values
+    (`+task.filter_time=0.3`, `+env.simulation.solver_iterations=100`) change it.
 
     Raises:
         InputError: the policy file's configuration cannot be used.
@@ -54,6 +54,7 @@ def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
     settings = OmegaConf.merge(
         settings, config.get("env") or {}, {} if source.stack is None else {"stack": source.stack}
     )
+    _set_engine(settings, config.get("engine"))
     try:
         made = hydra.utils.instantiate(settings)
     except hydra.errors.InstantiationException as error:
@@ -63,6 +64,14 @@ def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
     if not isinstance(made, EnvConfig):
         raise InputError(f"policy={source.label}: its configuration has no environment of this package")
     return made
+
+
+def _set_engine(settings: Any, wanted: str | None) -> None:
+    """One engine for the one world of an evaluation: the wanted one, else that of the training."""
+    trained = OmegaConf.select(settings, "simulation.engine")
+    engine = wanted or ("bullet" if trained == "mixed" else trained)
+    if engine is not None:
+        OmegaConf.update(settings, "simulation.engine", engine, force_add=True)
 
 
 def _checked(config: Mapping[str, Any], label: str) -> dict[str, Any]:

@@ -46,14 +46,43 @@ def read_contact(row: Sequence[Any], names: Mapping[int, str]) -> Contact:
         row: One row of `getContactPoints`.
         names: Name of each body: of a finger, `cube` or `table`.
     """
-    first, second = names[row[1]], names[row[2]]
     friction_on_first = row[10] * np.array(row[11]) + row[12] * np.array(row[13])
-    normal_on_second = np.array(row[7])
+    return named_contact(
+        bodies=(names[row[1]], names[row[2]]),
+        links=(_link(row[3]), _link(row[4])),
+        middle=0.5 * (np.array(row[5]) + np.array(row[6])),
+        normal=-np.array(row[7]),
+        distance=row[8],
+        force=row[9],
+        friction=-friction_on_first,
+    )
+
+
+def named_contact(
+    bodies: tuple[str, str],
+    links: tuple[str, str],
+    middle: Array,
+    normal: Array,
+    distance: float,
+    force: float,
+    friction: Array,
+) -> Contact:
+    """A contact told from the side of the finger; of the table where no finger takes part.
+
+    Args:
+        bodies: Names of the first and the second body: of a finger, `cube` or `table`.
+        links: Names of their links, "" where there is none.
+        middle: Point between the two surfaces, in the world (3,) [m].
+        normal: Unit vector from the first into the second (3,).
+        distance: Gap [m].
+        force: Normal force [N].
+        friction: Friction force on the second (3,) [N].
+    """
+    (first, second), (link, other_link) = bodies, links
     if first == "cube" or (first == "table" and second != "cube"):
-        pose = np.array(row[5])
-        return Contact(second, _link(row[4]), first, pose, normal_on_second, row[8], row[9], friction_on_first)
-    pose = np.array(row[6])
-    return Contact(first, _link(row[3]), second, pose, -normal_on_second, row[8], row[9], -friction_on_first)
+        first, second, link, normal, friction = second, first, other_link, -normal, -friction
+    link = "" if first == "table" else link
+    return Contact(first, link, second, middle + 0.5 * distance * normal, normal, distance, force, friction)
 
 
 def _link(index: int) -> str:

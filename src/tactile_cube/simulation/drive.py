@@ -31,7 +31,7 @@ class HandDrive:
 
     def __init__(self, hand: HandModel, options: SimulationOptions, effects: Sequence[Effect]) -> None:
         """Compiles the control step, or finds it in the cache."""
-        self._hand = hand
+        self._hand, self._engine = hand, options.single_engine
         self._effects = list(effects)
         self._tree = RigidBodyTree.from_urdf(finger_urdf(hand))
         self.plant = Plant(
@@ -75,12 +75,20 @@ class HandDrive:
         self.memory[:] = self.plant.memory(constants, gravity=gravity, effects=[*self._effects, *c.effects])
         self.view("friction_creep")[:] = c.friction_creep
         self.view("time_constant")[:] = c.filter_time
-        self.view("spin_inertia")[:] = spin_inertia(np.asarray(c.reflected_inertia))
-        self.view("tendon_stiffness")[:] = TENDON_STIFFNESS
-        self.view("tendon_damping")[:] = TENDON_DAMPING
+        self._set_rotors(np.asarray(c.reflected_inertia))
         self.plant.reset(self.memory, start.angles, v=start.velocities)
         for key in ("filtered", "limited", "goal"):
             self.view(key)[:] = start.angles if start.target is None else start.target - c.joint_offset
+
+    def _set_rotors(self, inertia: Array) -> None:
+        """Rotors and tendons as the engine has them: its own, or numerical aids that the torques know of."""
+        if self._engine == "mujoco":
+            rotors = self.view("reflected_inertia").reshape(-1, JOINTS_PER_FINGER)
+            self.view("armature")[:, list(self.plant.topology.leader)] = rotors
+            return
+        self.view("spin_inertia")[:] = spin_inertia(inertia)
+        self.view("tendon_stiffness")[:] = TENDON_STIFFNESS
+        self.view("tendon_damping")[:] = TENDON_DAMPING
 
     def view(self, key: str) -> Array:
         """Writable numbers of the memory."""
@@ -91,7 +99,7 @@ class HandDrive:
         return self.plant.signal(self.memory, row)
 
     def set_engine_gravity(self, acceleration: Array) -> None:
-        """Tells the control step what gravity Bullet applies (3,) [m/s^2]; the fingers keep feeling their own."""
+        """Tells the control step what gravity the engine applies (3,) [m/s^2]; the fingers keep feeling their own."""
         self.view("engine_gravity")[:] = self._in_bases(acceleration)
 
     def sense(self, q: Array, v: Array) -> None:

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import Plant
 from tactile_cube.errors import InputError
+from tactile_cube.simulation.engine import OBJECT_STATE
 from tactile_cube.simulation.native_library import find_compiler, load_native, native_library
 from tactile_cube.simulation.options import Loop
 
 Array = NDArray[np.float64]
-
-OBJECT_STATE = 13
-"""Position (3), quaternion xyzw (4), linear and angular velocity (3 + 3) of the object."""
 
 
 class PhysicsLoop(Protocol):

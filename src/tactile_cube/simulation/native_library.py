@@ -1,4 +1,4 @@
-"""The compiled loop over physics steps: built once with the system's C compiler, kept in the user's cache."""
+"""The compiled loops over physics steps: built once with the system's C compiler, kept in the user's cache."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ import pybullet
 from tactile_cube.drivetrain.kernel import cache_directory
 from tactile_cube.errors import InputError
 
-_SOURCE = Path(__file__).parent / "native" / "physics_steps.c"
+_FOLDER = Path(__file__).parent / "native"
+BULLET_STEPS, MUJOCO_STEPS = "physics_steps", "mujoco_steps"
 _FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
 
 
@@ -29,28 +30,28 @@ def find_compiler() -> str | None:
 
 
 @functools.cache
-def native_library() -> Path:
-    """The shared library, compiled now if this source never was; several processes may ask at once.
+def native_library(name: str = BULLET_STEPS) -> Path:
+    """The shared library of a source, compiled now if it never was; several processes may ask at once.
 
     Raises:
         InputError: No compiler was found, or it failed.
     """
-    source = _SOURCE.read_bytes()
-    digest = hashlib.sha256(source + " ".join(_FLAGS).encode()).hexdigest()[:16]
-    library = cache_directory() / f"physics_steps-{digest}.so"
+    source = _FOLDER / f"{name}.c"
+    digest = hashlib.sha256(source.read_bytes() + " ".join(_FLAGS).encode()).hexdigest()[:16]
+    library = cache_directory() / f"{name}-{digest}.so"
     if not library.exists():
-        _compile(library)
+        _compile(source, library)
     return library
 
 
-def _compile(library: Path) -> None:
+def _compile(source: Path, library: Path) -> None:
     """Compiles beside the target and renames, so that no process ever sees half a library."""
     compiler = find_compiler()
     if compiler is None:
         raise InputError("simulation.loop=c needs a C compiler (cc); install one or choose simulation.loop=python")
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         fresh = Path(folder) / library.name
-        command = [compiler, *_FLAGS, "-o", str(fresh), str(_SOURCE)]
+        command = [compiler, *_FLAGS, "-o", str(fresh), str(source)]
         result = subprocess.run(command, capture_output=True, text=True, check=False)
         if result.returncode != 0:
             raise InputError(f"{' '.join(command)} failed: {result.stderr.strip()}; choose simulation.loop=python")
@@ -59,7 +60,7 @@ def _compile(library: Path) -> None:
 
 @functools.cache
 def load_native() -> ctypes.CDLL:
-    """The library, with PyBullet's exported functions made visible to it first."""
+    """The library for PyBullet, with PyBullet's exported functions made visible to it first."""
     ctypes.CDLL(pybullet.__file__, mode=ctypes.RTLD_GLOBAL)
     library = ctypes.CDLL(str(native_library()))
     pointer, number = ctypes.c_void_p, ctypes.c_int

@@ -19,6 +19,7 @@ from tactile_cube.hand.model import LINKS_PER_FINGER, HandModel
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact, read_contact
 from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.surface import SKIN_RELAXATION
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,6 @@ _ALL_GROUPS = 0xFF
 _FIRST_FINGER_GROUP = 0x10
 """Collision group of the first finger, one bit for each; Bullet gives bits below to bodies of its own accord."""
 _URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
-_SKIN_RELAXATION = 5e-3
-"""Damping over stiffness of a fingertip's skin [s]: rubber settles within a few ms."""
 _NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
 
 
@@ -203,7 +202,7 @@ class Scene:
         if constants.tip_compliance > 0.0:
             skin = {
                 "contactStiffness": 1.0 / constants.tip_compliance,
-                "contactDamping": _SKIN_RELAXATION / constants.tip_compliance,
+                "contactDamping": SKIN_RELAXATION / constants.tip_compliance,
             }
             pybullet.changeDynamics(self.cube, -1, **skin, physicsClientId=self.client)
         turning = np.asarray(start.cube_angular_velocity)

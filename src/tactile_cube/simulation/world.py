@@ -6,28 +6,26 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, TORQUE
 from tactile_cube.hand import DLR_HAND2, HandModel, tip_positions
-from tactile_cube.hand.model import JOINTS_PER_FINGER, LINKS_PER_FINGER
+from tactile_cube.hand.model import JOINTS_PER_FINGER
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.disturbance import Disturbance
 from tactile_cube.simulation.drive import HandDrive
+from tactile_cube.simulation.engine import OBJECT_STATE, make_engine
 from tactile_cube.simulation.health import find_fault
-from tactile_cube.simulation.loop import OBJECT_STATE, make_loop
 from tactile_cube.simulation.options import SimulationOptions
-from tactile_cube.simulation.scene import Scene, com_arm
 from tactile_cube.simulation.trace import read_trace
 
 Array = NDArray[np.float64]
 
 
 class World:
-    """Hand and cube in PyBullet. Joint vectors are ordered ring, middle, fore, thumb x (q1, q2, q3).
+    """Hand and cube in the engine of the options. Joint vectors are ordered ring, middle, fore, thumb x (q1, q2, q3).
 
     An episode is a function of constants, start and actions alone: equal to the bit, whatever the world did before.
 
@@ -54,6 +52,9 @@ class World:
             hand: The hand.
             options: Numerical choices; the fast ones by default.
             effects: Further physical effects of the drivetrain, each at a joint.
+
+        Raises:
+            InputError: The engine is not installed, or the options name no single one.
         """
         self.hand = hand
         self.options = options or SimulationOptions()
@@ -61,11 +62,7 @@ class World:
         self.fault = ""
         self.trace: dict[str, Array] = {}
         self._drive = HandDrive(hand, self.options, effects)
-        self._scene = Scene(hand, self.options, self._drive.finger_urdfs())
-        self._joints = np.zeros((2, len(hand.fingers), LINKS_PER_FINGER))
-        self._loop = make_loop(self.options.loop, self._scene.client, self._drive.plant)
-        q, v = self._joints.reshape(2, -1)
-        self._loop.bind(self._scene.fingers, q, v, self._drive.memory)
+        self._engine = make_engine(hand, self.options, self._drive)
         self._cube = np.zeros(OBJECT_STATE)
         self._push = np.zeros(6)
 
@@ -86,12 +83,10 @@ class World:
         self._push[:] = 0.0
         self._disturbance = Disturbance(constants)
         self._drive.reset(constants, start)
-        self._set_joints(start)
-        self._scene.place(constants, start, *self._joints)
-        self._scene.set_spin_inertia(self._drive.view("spin_inertia"))
+        self._engine.place(constants, start, _all_joints(start.angles), _all_joints(start.velocities))
         self._set_weight(constants.gravity_scale if constants.gravity_onset == 0 else 0.0)
-        self._drive.sense(*self._joints.reshape(2, -1))
-        self._read_cube()
+        self._drive.sense(self._engine.q.ravel(), self._engine.v.ravel())
+        self._cube = self._engine.cube_state()
 
     def step(self, q_n: Array) -> None:
         """One policy step: `options.substeps` physics steps with the desired joint angles q_n (12,) [rad]."""
@@ -100,9 +95,8 @@ class World:
         self._drive.view("goal")[:] = q_n - self.constants.joint_offset
         self._run()
         self.steps += 1
-        self._read_cube()
-        distances = [row[8] for row in pybullet.getContactPoints(physicsClientId=self._scene.client)]
-        self.fault = self.fault or find_fault(self._joints[0], self._joints[1], self._cube, distances)
+        self._cube = self._engine.cube_state()
+        self.fault = self.fault or find_fault(self._engine.q, self._engine.v, self._cube, self._engine.gaps())
 
     def push_cube(self, force: Array, torque: Array) -> None:
         """Pushes the cube's centre of mass with force [N] and torque [N m] in the world until changed or reset."""
@@ -114,25 +108,25 @@ class World:
         self._drive.view("external_torque")[joints] = self._tip_jacobian(finger).T @ force
 
     def close(self) -> None:
-        """Ends the physics server."""
-        self._scene.close()
+        """Ends the simulation."""
+        self._engine.close()
 
     # --- read-outs -----------------------------------------------------------------------------------------------
 
     @property
     def q(self) -> Array:
         """True joint angles (12,) [rad]."""
-        return np.asarray(self._joints[0, :, :JOINTS_PER_FINGER].ravel())
+        return np.asarray(self._engine.q[:, :JOINTS_PER_FINGER].ravel())
 
     @property
     def dq(self) -> Array:
         """True joint velocities (12,) [rad/s]."""
-        return np.asarray(self._joints[1, :, :JOINTS_PER_FINGER].ravel())
+        return np.asarray(self._engine.v[:, :JOINTS_PER_FINGER].ravel())
 
     @property
     def all_joint_angles(self) -> Array:
         """Angles of all joints (16,) [rad], q1..q4 of each finger: the joints of `hand_urdf`."""
-        return np.array(self._joints[0].ravel())
+        return np.array(self._engine.q.ravel())
 
     @property
     def q_m(self) -> Array:
@@ -192,35 +186,26 @@ class World:
     @property
     def loop(self) -> Literal["c", "python"]:
         """Which loop runs the physics steps."""
-        return self._loop.kind
+        return self._engine.loop
 
     def contacts(self) -> list[Contact]:
         """Contacts of the last physics step."""
-        return self._scene.contacts()
+        return self._engine.contacts()
 
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
-    def _set_joints(self, start: Start) -> None:
-        for row, values in zip(self._joints, (start.angles, start.velocities), strict=True):
-            row[:, :JOINTS_PER_FINGER] = np.asarray(values).reshape(-1, JOINTS_PER_FINGER)
-            row[:, JOINTS_PER_FINGER] = row[:, JOINTS_PER_FINGER - 1]
-
     def _set_weight(self, scale: float) -> None:
-        """Gives the cube a share of its weight through Bullet's gravity; the control step keeps the fingers' whole."""
+        """Gives the cube a share of its weight: the engine's gravity; the control step keeps the fingers' whole."""
         acceleration = scale * self.constants.gravity * self.constants.down
-        self._scene.set_gravity(acceleration)
+        self._engine.set_gravity(acceleration)
         self._drive.set_engine_gravity(acceleration)
 
     def _run(self) -> None:
         """The physics steps of one policy step, with a trace where wanted."""
-        substeps = self.options.substeps
-        states = np.empty((substeps + 1, OBJECT_STATE)) if self.options.trace else None
         filtered = self._drive.view("filtered").copy()
-        self._loop.run(substeps, self._scene.cube, self._wrench(), states)
+        states = self._engine.run(self.options.substeps, self._wrench(), self.options.trace)
         if states is not None:
             offset = np.asarray(self.constants.joint_offset)
-            if np.asarray(self.constants.cube_com).any():
-                states[:, :3] -= [com_arm(self.constants, state[3:7]) for state in states]
             self.trace = read_trace(self._drive.plant, self._drive.memory, filtered, offset, states, self.time)
 
     def _wrench(self) -> Array | None:
@@ -230,16 +215,6 @@ class World:
             return self._push if self._push.any() else None
         return random + self._push
 
-    def _read_cube(self) -> None:
-        client, cube = self._scene.client, self._scene.cube
-        position, quaternion = pybullet.getBasePositionAndOrientation(cube, physicsClientId=client)
-        linear, angular = pybullet.getBaseVelocity(cube, physicsClientId=client)
-        self._cube = np.array([*position, *quaternion, *linear, *angular])
-        if np.asarray(self.constants.cube_com).any():  # Bullet speaks of the centre of mass
-            arm = com_arm(self.constants, self._cube[3:7])
-            self._cube[:3] -= arm
-            self._cube[7:10] -= np.cross(self._cube[10:13], arm)
-
     def _tip_jacobian(self, finger: int) -> Array:
         """Velocity of a fingertip's centre per joint velocity (3, 3), by central differences."""
         columns, q, width = [], self.q, 1e-6
@@ -248,3 +223,9 @@ class World:
             ahead, behind = tip_positions(self.hand, q + delta), tip_positions(self.hand, q - delta)
             columns.append((ahead - behind)[finger] / (2.0 * width))
         return np.stack(columns, axis=1)
+
+
+def _all_joints(values: Array | float) -> Array:
+    """Values of all joints (fingers, 4) from those of the actuated ones (12,): q4 follows q3."""
+    actuated = np.asarray(values).reshape(-1, JOINTS_PER_FINGER)
+    return np.concatenate([actuated, actuated[:, -1:]], axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import torch
@@ -84,7 +84,7 @@ def make_env(
 
     Args:
         config: what the environment is.
-        worlds: number of worlds that this process hosts.
+        worlds: number of worlds that this process hosts; with `simulation.engine` mixed, engines alternate among them.
         seed: seed of the worlds and, through torch's global generator, of the transforms.
         evaluation: leaves out the extra exploration and the curriculum; everything else stays as configured.
         hand: the hand.
@@ -95,11 +95,16 @@ def make_env(
     if worlds < 1:
         raise InputError(f"number of worlds is {worlds}; give at least 1")
     poses = config.start.of(hand)
-    tasks = [rotation_env(config, hand, poses) for _ in range(worlds)]
+    tasks = [rotation_env(_of_world(config, seed + index), hand, poses) for index in range(worlds)]
     base = WorldsEnv(tasks, None if evaluation else config.curriculum)
     env = TransformedEnv(base, Compose(*transforms(config, hand, explore=not evaluation)))
     env.set_seed(seed)
     return env
+
+
+def _of_world(config: EnvConfig, index: int) -> EnvConfig:
+    """One of several worlds side by side, in the engine that is its turn; processes are told apart by their seed."""
+    return replace(config, simulation=config.simulation.of_world(index))
 
 
 def rotation_env(config: EnvConfig, hand: HandModel = DLR_HAND2, poses: StartPoses | None = None) -> RotationEnv:

@@ -1,0 +1,109 @@
+"""Hand and cube in MuJoCo."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tactile_cube.hand import HandModel
+from tactile_cube.hand.model import LINKS_PER_FINGER
+from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.contact import Contact, named_contact
+from tactile_cube.simulation.drive import HandDrive
+from tactile_cube.simulation.engine import OBJECT_STATE
+from tactile_cube.simulation.mujoco_loop import make_mujoco_loop
+from tactile_cube.simulation.mujoco_model import HandSpec, load_mujoco
+from tactile_cube.simulation.options import SimulationOptions
+
+Array = NDArray[np.float64]
+
+
+class MujocoEngine:
+    """See `Engine`. Newton's method on soft contacts; rotors are native, tendons are equality constraints."""
+
+    def __init__(self, hand: HandModel, options: SimulationOptions, drive: HandDrive) -> None:
+        """Describes the bodies; the model comes with each episode."""
+        self._mujoco = load_mujoco()
+        self._spec = HandSpec(self._mujoco, hand, options, drive)
+        self._dofs = LINKS_PER_FINGER * len(hand.fingers)
+        self._loop = make_mujoco_loop(options.loop, self._mujoco, drive)
+
+    @property
+    def loop(self) -> Literal["c", "python"]:
+        """See `Engine`."""
+        return self._loop.kind
+
+    @property
+    def q(self) -> Array:
+        """See `Engine.q`."""
+        return np.asarray(self._data.qpos[: self._dofs].reshape(-1, LINKS_PER_FINGER))
+
+    @property
+    def v(self) -> Array:
+        """See `Engine.v`."""
+        return np.asarray(self._data.qvel[: self._dofs].reshape(-1, LINKS_PER_FINGER))
+
+    def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
+        """See `Engine.place`."""
+        self._model = self._spec.compile(constants)
+        self._data = self._mujoco.MjData(self._model)
+        x, y, z, w = np.asarray(start.cube_quaternion)
+        turn = Rotation.from_quat(np.array(start.cube_quaternion)).inv()
+        self._data.qpos[:] = [*q.ravel(), *np.asarray(start.cube_position), w, x, y, z]
+        angular = turn.apply(np.array(start.cube_angular_velocity))
+        self._data.qvel[:] = [*v.ravel(), *np.asarray(start.cube_linear_velocity), *angular]
+        self._loop.bind(self._model, self._data, self._dofs)
+
+    def set_gravity(self, acceleration: Array) -> None:
+        """See `Engine.set_gravity`."""
+        self._model.opt.gravity[:] = acceleration
+
+    def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
+        """See `Engine.run`."""
+        self._data.body("cube").xfrc_applied[:] = 0.0 if wrench is None else wrench
+        states = np.empty((steps + 1, OBJECT_STATE)) if record else None
+        self._loop.run(steps, states)
+        return None if states is None else _in_world(states)
+
+    def cube_state(self) -> Array:
+        """See `Engine.cube_state`."""
+        state = np.concatenate([self._data.qpos[self._dofs :], self._data.qvel[self._dofs :]])
+        return _in_world(state[None]).ravel()
+
+    def gaps(self) -> list[float]:
+        """See `Engine.gaps`."""
+        gaps: list[float] = self._data.contact.dist.tolist()
+        return gaps
+
+    def contacts(self) -> list[Contact]:
+        """See `Engine.contacts`."""
+        return [self._contact(index) for index in range(self._data.ncon)]
+
+    def close(self) -> None:
+        """Nothing to end: MuJoCo has no server."""
+
+    def _contact(self, index: int) -> Contact:
+        """One contact with names; MuJoCo's force is that on the second shape."""
+        contact, wrench = self._data.contact[index], np.zeros(6)
+        self._mujoco.mj_contactForce(self._model, self._data, index, wrench)
+        frame = np.reshape(contact.frame, (3, 3))
+        names = [self._model.geom(shape).name.partition(" ") for shape in contact.geom]
+        return named_contact(
+            bodies=(names[0][0], names[1][0]),
+            links=(names[0][2], names[1][2]),
+            middle=np.array(contact.pos),
+            normal=np.array(frame[0]),
+            distance=float(contact.dist),
+            force=float(wrench[0]),
+            friction=wrench[1:3] @ frame[1:],
+        )
+
+
+def _in_world(states: Array) -> Array:
+    """Rows of MuJoCo's free joint (n, 13) as `OBJECT_STATE`: quaternion xyzw, angular velocity in the world."""
+    quaternion: Any = states[:, [4, 5, 6, 3]]
+    angular = Rotation.from_quat(quaternion).apply(states[:, 10:])
+    return np.concatenate([states[:, :3], quaternion, states[:, 7:10], angular], axis=1)

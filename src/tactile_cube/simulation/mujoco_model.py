@@ -1,0 +1,185 @@
+"""The bodies in MuJoCo: four fingers on their bases, a cube and perhaps a table, compiled anew for each episode."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tactile_cube.errors import InputError
+from tactile_cube.hand.model import LINKS_PER_FINGER, HandModel
+from tactile_cube.simulation.constants import EpisodeConstants
+from tactile_cube.simulation.drive import HandDrive
+from tactile_cube.simulation.mujoco_contact import CONDIM, IMPRATIO, friction, set_contact
+from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.surface import surfaces
+
+Array = NDArray[np.float64]
+
+TABLE_HALF_SIZE = (0.25, 0.25, 0.02)
+"""[m]."""
+SOLVER_TOLERANCE = 1e-10
+RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]
+"""Impedance of tendons and joint stops, as hard as MuJoCo has it."""
+
+
+def load_mujoco() -> ModuleType:
+    """The package.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise InputError("engine=mujoco needs the package mujoco: pip install 'tactile-cube[mujoco]'") from error
+    module: ModuleType = mujoco
+    return module
+
+
+class HandSpec:
+    """Description of one world, from which a model is compiled for each episode.
+
+    The joints come first in the state, finger by finger, q1..q4 each; the cube's free joint is last.
+    """
+
+    def __init__(self, mujoco: ModuleType, hand: HandModel, options: SimulationOptions, drive: HandDrive) -> None:
+        """Describes the fingers; their masses are the drive's."""
+        self._mujoco, self._hand, self._drive = mujoco, hand, drive
+        self.spec = mujoco.MjSpec()
+        self.spec.compiler.degree = False
+        self._set_options(options)
+        self._shapes: dict[str, str] = {}
+        self._links = [self._add_finger(k) for k in range(len(hand.fingers))]
+        self._cube = self._add_cube()
+        self._table = self._add_box("table", self.spec.worldbody, TABLE_HALF_SIZE)
+        self._pairs = self._add_pairs()
+
+    def compile(self, constants: EpisodeConstants) -> Any:
+        """The model of an episode."""
+        self._set_links()
+        self._set_objects(constants)
+        known = surfaces(constants)
+        touching = [known[self._shapes[a]].on(known[self._shapes[b]]) for a, b in self._pairs]
+        for pair, surface in zip(self.spec.pairs, touching, strict=True):
+            pair.friction = friction(surface)
+        model = self.spec.compile()
+        for (a, b), surface in zip(self._pairs, touching, strict=True):
+            set_contact(model, model.pair(f"{a} {b}").id, surface)
+        return model
+
+    def _set_options(self, options: SimulationOptions) -> None:
+        mujoco, option = self._mujoco, self.spec.option
+        option.timestep = options.dt
+        option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
+        option.solver, option.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVER_TOLERANCE
+        option.iterations = options.solver_iterations
+        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+
+    def _add_finger(self, k: int) -> list[tuple[Any, Any]]:
+        """Links and joints of a finger, as bodies below its base."""
+        view, finger = self._drive.view, self._hand.fingers[k]
+        position, rotation = self._hand.base_in_world(k)
+        parent = self.spec.worldbody.add_body(name=f"{finger.name} base", pos=position, quat=_wxyz(rotation))
+        rigid = [2.0 * self.spec.option.timestep, 1.0]
+        parts = []
+        for i, link in enumerate(self._hand.links):
+            place = {
+                "pos": view("placement_translation")[k, i],
+                "quat": _wxyz(view("placement_rotation")[k, i]),
+            }
+            body = parent.add_body(name=f"{finger.name} {link.name}", explicitinertial=True, **place)
+            joint = body.add_joint(
+                name=f"{finger.name}_q{i + 1}",
+                type=self._mujoco.mjtJoint.mjJNT_HINGE,
+                axis=view("axis")[k, i],
+                limited=self._mujoco.mjtLimited.mjLIMITED_TRUE,
+                range=self._range(k, i),
+                solref_limit=rigid,
+                solimp_limit=RIGID,
+            )
+            if link.capsule is not None:
+                capsule = link.capsule
+                name = f"{finger.name} {link.name}"
+                body.add_geom(
+                    name=name,
+                    type=self._mujoco.mjtGeom.mjGEOM_CAPSULE,
+                    size=[capsule.radius, 0.5 * (capsule.end - capsule.start), 0.0],
+                    pos=[0.0, 0.0, 0.5 * (capsule.start + capsule.end)],
+                    contype=0,
+                    conaffinity=0,
+                )
+                self._shapes[name] = "tip" if i == LINKS_PER_FINGER - 1 else "link"
+            parts.append((body, joint))
+            parent = body
+        self._add_tendon(finger.name, rigid)
+        return parts
+
+    def _range(self, finger: int, joint: int) -> list[float]:
+        """Hardware limits [rad]."""
+        actuated = 3 * finger + min(joint, 2)
+        upper = self._hand.coupled_upper if joint == LINKS_PER_FINGER - 1 else self._hand.upper[actuated]
+        return [float(self._hand.lower[actuated]), float(upper)]
+
+    def _add_tendon(self, finger: str, rigid: list[float]) -> None:
+        """Holds q4 at q3."""
+        tendon = self.spec.add_equality(
+            type=self._mujoco.mjtEq.mjEQ_JOINT,
+            objtype=self._mujoco.mjtObj.mjOBJ_JOINT,
+            name1=f"{finger}_q4",
+            name2=f"{finger}_q3",
+            solref=rigid,
+            solimp=RIGID,
+        )
+        tendon.data[:5] = [0.0, 1.0, 0.0, 0.0, 0.0]
+
+    def _add_cube(self) -> tuple[Any, Any]:
+        body = self.spec.worldbody.add_body(name="cube", explicitinertial=True)
+        body.add_freejoint()
+        return body, self._add_box("cube", body, (0.04, 0.04, 0.04))
+
+    def _add_box(self, name: str, body: Any, half: tuple[float, ...]) -> Any:
+        self._shapes[name] = name
+        box = self._mujoco.mjtGeom.mjGEOM_BOX
+        return body.add_geom(name=name, type=box, size=half, contype=0, conaffinity=0)
+
+    def _add_pairs(self) -> list[tuple[str, str]]:
+        """Everything meets everything but its own finger; the order is fixed."""
+        pairs = [(a, b) for a, b in combinations(self._shapes, 2) if a.split()[0] != b.split()[0]]
+        for a, b in pairs:
+            self.spec.add_pair(name=f"{a} {b}", geomname1=a, geomname2=b, condim=CONDIM)
+        return pairs
+
+    def _set_links(self) -> None:
+        """Masses and rotors of the links; effects may have changed them for this episode."""
+        view = self._drive.view
+        for k, finger in enumerate(self._links):
+            for i, (body, joint) in enumerate(finger):
+                body.mass, body.ipos = view("mass")[k, i], view("com")[k, i]
+                body.fullinertia = _six(view("inertia")[k, i])
+                joint.armature = view("armature")[k, i]
+
+    def _set_objects(self, constants: EpisodeConstants) -> None:
+        """Size and mass of the cube; without a table it lies too far away to be met."""
+        body, shape = self._cube
+        size, mass = np.asarray(constants.cube_size), constants.cube_mass
+        shape.size = 0.5 * size
+        body.mass, body.ipos = mass, np.asarray(constants.cube_com)
+        body.inertia = mass / 12.0 * (np.sum(size**2) - size**2)
+        height = -1e3 if constants.table_height is None else constants.table_height
+        self._table.pos = [0.0, 0.0, height - TABLE_HALF_SIZE[2]]
+
+
+def _wxyz(rotation: Array) -> Array:
+    """MuJoCo's quaternion of a rotation matrix."""
+    return np.asarray(Rotation.from_matrix(rotation).as_quat())[[3, 0, 1, 2]]
+
+
+def _six(inertia: Array) -> list[float]:
+    """Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+    return [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
