@@ -1,7 +1,11 @@
 import numpy as np
+import pytest
 
+from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Gait, tip_positions
-from tactile_cube.hand.gait import joint_angles, similar_gaits
+from tactile_cube.hand.gait import GaitRanges, joint_angles, similar_gaits
+
+RANGES = GaitRanges(low={"swing": 0.74, "period": 40}, high={"swing": 0.87, "period": 49})
 
 
 def test_opposing_fingers_hold_while_the_others_are_in_the_air() -> None:
@@ -26,8 +30,21 @@ def test_joint_angles_reach_the_targets() -> None:
 
 
 def test_similar_gaits_differ_and_stay_in_the_action_range() -> None:
-    actions = similar_gaits(DLR_HAND2, number=3, steps=40, direction=-1)
+    actions = similar_gaits(DLR_HAND2, RANGES, number=3, steps=40, direction=-1)
     assert actions.shape == (3, 40, 12)
     assert np.abs(actions).max() <= 1.0
     assert np.abs(np.diff(actions, axis=0)).max(axis=(1, 2)).min() > 0.1
-    np.testing.assert_array_equal(actions, similar_gaits(DLR_HAND2, number=3, steps=40, direction=-1))
+    np.testing.assert_array_equal(actions, similar_gaits(DLR_HAND2, RANGES, number=3, steps=40, direction=-1))
+
+
+def test_an_episodes_actions_are_those_of_its_steps() -> None:
+    gait = Gait(period=20)
+    expected = [gait.action(DLR_HAND2, step) for step in range(60)]
+    np.testing.assert_allclose(gait.actions(DLR_HAND2, 60), expected, atol=1e-12)
+
+
+def test_ranges_that_no_gait_can_have_are_refused() -> None:
+    with pytest.raises(InputError, match="stride"):
+        GaitRanges(low={"stride": 0.1}, high={"stride": 0.2})
+    with pytest.raises(InputError, match=r"low 0\.9 is above high 0\.8"):
+        GaitRanges(low={"swing": 0.9}, high={"swing": 0.8})

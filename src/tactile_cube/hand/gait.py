@@ -1,4 +1,4 @@
-"""A hand-crafted gait: fingertips walk on a circle around the cube, one pair holds while the other goes back.
+"""A scripted gait: fingertips walk on a circle around the cube, some hold while the others go back.
 
 The paper compares with a hand-crafted trajectory (11 rad, then the cube drops). This one follows a clock and feels
 nothing.
@@ -6,11 +6,13 @@ nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.errors import InputError
 from tactile_cube.hand.kinematics import finger_angles
 from tactile_cube.hand.model import HandModel
 
@@ -18,15 +20,14 @@ Array = NDArray[np.float64]
 
 PLACES = np.radians([-90.0, 0.0, 90.0, 180.0])
 """Where ring, middle, fore and thumb stand around the cube."""
-PHASES = np.array([0.0, 0.5, 0.0, 0.5])
-"""Part of the cycle by which each finger is ahead: opposing fingers move together."""
 
 
 @dataclass(frozen=True)
 class Gait:
     """Shape of the walk.
 
-    Found by cross-entropy searches at full weight, T_s 0.25 and 0.5 s; about -z is what this hand pose turns best.
+    The defaults were found by cross-entropy searches at full weight, T_s 0.25 and 0.5 s, and the published 0.1 m of
+    spinning friction; `python -m tactile_cube.search_gait` searches again. About -z is what this hand pose turns best.
 
     Attributes:
         swing: a finger walks from +swing to -swing about its place, and back in the air, to turn the cube in -z [rad].
@@ -37,6 +38,7 @@ class Gait:
         lifted: the same in the air [m].
         height: of the tips' targets over the middle of the cube [m].
         closing: policy steps in which all fingers close around the cube before they begin to walk.
+        phases: part of the cycle by which ring, middle, fore and thumb are ahead; here opposing fingers move together.
     """
 
     swing: float = 0.82
@@ -47,11 +49,13 @@ class Gait:
     lifted: float = 0.0954
     height: float = 0.009
     closing: int = 6
+    phases: tuple[float, ...] = (0.0, 0.5, 0.0, 0.5)
 
     def tips(self, step: int, direction: int = -1) -> Array:
         """Return the targets of the fingertips `(4, 3)` [m] at a policy step; direction +1 turns about +z."""
         holding = 1.0 - self.air_share
-        phase = ((step - self.closing) / self.period + PHASES) % 1.0 if step >= self.closing else np.zeros(4)
+        cycle = ((step - self.closing) / self.period + np.array(self.phases)) % 1.0
+        phase = cycle if step >= self.closing else np.zeros(4)
         on_cube = phase < holding
         forth = 1.0 - 2.0 * phase / holding
         back = -1.0 + 2.0 * (phase - holding) / self.air_share
@@ -63,29 +67,49 @@ class Gait:
         """Return the action `(12,)` in [-1, 1] of a policy step."""
         return hand.action_of(joint_angles(hand, self.tips(step, direction)))
 
+    def actions(self, hand: HandModel, steps: int, direction: int = -1) -> Array:
+        """Return the actions `(steps, 12)` of an episode; a cycle's inverse kinematics is solved once."""
+        first = np.array([self.action(hand, step, direction) for step in range(min(steps, self.closing + self.period))])
+        cycle = self.closing + (np.arange(steps) - self.closing) % self.period
+        return first[np.where(np.arange(steps) < self.closing, np.arange(steps), cycle)]
+
 
 def joint_angles(hand: HandModel, tips: Array) -> Array:
     """Return the joint angles `(12,)` [rad] that bring the tips to their targets `(4, 3)` [m]."""
     return np.concatenate([finger_angles(hand, finger, tip[None])[0] for finger, tip in enumerate(tips)])
 
 
-def similar_gaits(hand: HandModel, number: int, steps: int, direction: int, seed: int = 0) -> Array:
-    """Return actions `(number, steps, 12)` of gaits that turn the cube.
+@dataclass(frozen=True)
+class GaitRanges:
+    """Gaits that do alike: each number lies between two bounds.
 
-    They lie around the best of 216 gaits that a cross-entropy search tried at full weight and T_s 0.25 s.
+    Attributes:
+        low: the smallest of each number, by the names of `Gait`.
+        high: the largest.
+        phases: of every one of them.
     """
+
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    phases: tuple[float, ...] = Gait.phases
+
+    def __post_init__(self) -> None:
+        """Refuse names that no gait has, and bounds that do not fit."""
+        known = {field.name for field in fields(Gait)} - {"phases"}
+        for name in {*self.low, *self.high}:
+            if name not in known or name not in self.low or name not in self.high:
+                raise InputError(f"exploration.gaits.{name}: give low and high for one of {', '.join(sorted(known))}")
+            if self.low[name] > self.high[name]:
+                raise InputError(f"exploration.gaits.{name}: low {self.low[name]} is above high {self.high[name]}")
+
+    def draw(self, rng: np.random.Generator) -> Gait:
+        """Return one of them, all equally likely."""
+        values = {name: rng.uniform(low, self.high[name]) for name, low in self.low.items()}
+        whole = {name: round(values[name]) for name in ("period", "closing") if name in values}
+        return Gait(**values | whole, phases=tuple(self.phases))  # type: ignore[arg-type]
+
+
+def similar_gaits(hand: HandModel, ranges: GaitRanges, number: int, steps: int, direction: int, seed: int = 0) -> Array:
+    """Return actions `(number, steps, 12)` of gaits drawn from ranges."""
     rng = np.random.default_rng(seed)
-    actions = np.empty((number, steps, len(hand.joint_names)))
-    for episode in actions:
-        gait = Gait(
-            swing=rng.uniform(0.74, 0.87),
-            shift=rng.uniform(-0.18, -0.1),
-            period=int(rng.integers(40, 49)),
-            air_share=rng.uniform(0.28, 0.36),
-            pressed=rng.uniform(0.0455, 0.0486),
-            lifted=rng.uniform(0.089, 0.098),
-            height=rng.uniform(0.005, 0.0085),
-            closing=int(rng.integers(5, 7)),
-        )
-        episode[:] = [gait.action(hand, step, direction) for step in range(steps)]
-    return actions
+    return np.stack([ranges.draw(rng).actions(hand, steps, direction) for _ in range(number)])

@@ -11,6 +11,7 @@ from torchrl.data import Categorical, Composite, Unbounded
 from torchrl.envs.transforms import Transform
 
 from tactile_cube.errors import InputError
+from tactile_cube.hand.gait import GaitRanges
 from tactile_cube.transforms.partial_reset import reset_mask
 
 GROUPS = torch.tensor(
@@ -33,9 +34,10 @@ class Exploration:
         probability: with which a step of such an episode begins to hold a random target.
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
-        demonstrations: part of the episodes in which a hand-crafted gait acts. There the policy takes over where an
+        demonstrations: part of the episodes in which a scripted gait acts. There the policy takes over where an
             exploring one would hold a target, and for as long.
         noise: standard deviation of the noise on the gait's actions.
+        gaits: what acts there; None: nothing does.
     """
 
     episodes: float = 0.3
@@ -44,6 +46,7 @@ class Exploration:
     longest: int = 7
     demonstrations: float = 0.0
     noise: float = 0.1
+    gaits: GaitRanges | None = None
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""

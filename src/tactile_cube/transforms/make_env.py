@@ -142,5 +142,7 @@ def demonstrated_gaits(config: EnvConfig, hand: HandModel) -> torch.Tensor | Non
     """Actions (gaits, steps, 12) of whole episodes; None without demonstrations."""
     if config.exploration.demonstrations == 0.0:
         return None
-    gaits = similar_gaits(hand, GAITS, config.task.episode_steps, config.task.direction)
+    if config.exploration.gaits is None:
+        raise InputError("exploration.gaits is null, but gaits act in some episodes; choose exploration=demonstrations")
+    gaits = similar_gaits(hand, config.exploration.gaits, GAITS, config.task.episode_steps, config.task.direction)
     return torch.tensor(gaits, dtype=torch.float32)
