@@ -128,7 +128,8 @@ def _gait(numbers: Array) -> Gait:
         name: float(low + (high - low) * x) for (name, (low, high)), x in zip(BOUNDS.items(), folded, strict=True)
     }
     phases = (0.0, *(float(x % 1.0) for x in numbers[len(BOUNDS) :]))
-    return dataclasses.replace(Gait(), **values | {"period": round(values["period"])}, phases=phases)
+    period = round(values.pop("period"))
+    return Gait(**values, period=period, phases=phases)  # type: ignore[arg-type]
 
 
 def write_gait(path: Path, found: Found, seed: int) -> None:
