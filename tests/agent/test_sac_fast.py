@@ -4,10 +4,11 @@ from typing import Any
 
 import pytest
 import torch
+from torchrl.objectives import SACLoss
 
 from tactile_cube.agent.batch import Batch, Sizes
 from tactile_cube.agent.flat_perceptron import FlatPerceptron, parameter_count, rectify_gradient_
-from tactile_cube.agent.sac import Sac
+from tactile_cube.agent.sac import ImitatingLoss, Sac
 from tactile_cube.agent.sac_fast import FastSac
 
 SIZES = Sizes(observation=30, privileged=7, action=4)
@@ -56,9 +57,10 @@ def gradients_of_sac(plain: Sac, batch: Batch) -> list[torch.Tensor]:
     return [*actor, *(grad[0] for grad in critics), *(grad[1] for grad in critics)]
 
 
+@pytest.mark.parametrize("demonstration_weight", [0.0, 2.0])
 @pytest.mark.parametrize("layer_norm", [False, True])
-def test_losses_and_gradients_equal_those_of_sacloss(layer_norm: bool) -> None:
-    plain, fast = pair(layer_norm=layer_norm)
+def test_both_compositions_give_the_same_losses_and_gradients(layer_norm: bool, demonstration_weight: float) -> None:
+    plain, fast = pair(layer_norm=layer_norm, demonstration_weight=demonstration_weight)
     batch = random_batch()
     torch.manual_seed(7)
     expected = gradients_of_sac(plain, batch)
@@ -67,24 +69,44 @@ def test_losses_and_gradients_equal_those_of_sacloss(layer_norm: bool) -> None:
     torch.manual_seed(7)
     metrics = fast.compute_gradients(batch)
     torch.testing.assert_close(metrics["critic_loss"], losses["loss_qvalue"], rtol=1e-5, atol=1e-6)
-    torch.testing.assert_close(metrics["actor_loss"], losses["loss_actor"], rtol=1e-5, atol=1e-6)
+    torch.testing.assert_close(metrics["value"], losses["value"], rtol=1e-5, atol=1e-6)
     torch.testing.assert_close(fast.log_alpha.grad, plain.loss.log_alpha.grad, rtol=1e-5, atol=1e-6)
     for mine, theirs in zip(gradients_of_fast(fast), expected, strict=True):
         torch.testing.assert_close(mine, theirs, rtol=1e-4, atol=1e-6)
 
 
-def test_both_compositions_stay_together_over_updates() -> None:
-    plain, fast = pair()
+@pytest.mark.parametrize("demonstration_weight", [0.0, 2.0])
+def test_both_compositions_stay_together_over_updates(demonstration_weight: float) -> None:
+    plain, fast = pair(demonstration_weight=demonstration_weight)
     for index in range(20):
         batch = random_batch(seed=index)
         torch.manual_seed(index)
-        plain.update(batch)
+        expected = plain.update(batch)
         torch.manual_seed(index)
-        fast.update(batch)
+        metrics = fast.update(batch)
+        for key, value in expected.items():
+            torch.testing.assert_close(metrics[key], value, rtol=1e-3, atol=1e-4)
     for mine, theirs in zip(fast.policy().parameters(), plain.policy().parameters(), strict=True):
         torch.testing.assert_close(mine, theirs, rtol=1e-3, atol=2e-5)
     targets = torch.cat([p.reshape(2, -1) for n, p in plain.loss.state_dict().items() if n.startswith("target")], 1)
     assert fast.networks.target_master.double().norm().item() == pytest.approx(targets.double().norm().item(), rel=1e-4)
+
+
+def test_without_demonstrations_the_loss_is_torchrls_own() -> None:
+    plain, _ = pair()
+    torch.manual_seed(7)
+    losses = plain.losses(random_batch())
+    own = SACLoss.actor_loss
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            ImitatingLoss, "actor_loss", lambda self, data: own(self, data.set("value", data["demonstrated"]))
+        )
+        torch.manual_seed(7)
+        expected = plain.losses(random_batch())
+    for key in ("loss_qvalue", "loss_actor", "loss_alpha", "alpha", "entropy"):
+        torch.testing.assert_close(losses[key], expected[key], rtol=1e-6, atol=1e-7)
+    mean = -losses["alpha"] * losses["entropy"] - losses["value"]
+    torch.testing.assert_close(mean, expected["loss_actor"], rtol=1e-6, atol=1e-6)
 
 
 def test_imitation_adds_the_gradient_of_better_demonstrated_actions_alone() -> None:

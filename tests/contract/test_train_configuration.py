@@ -43,6 +43,13 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
     RunSettings(name=config.name, seed=config.seed)
 
 
+def test_the_readable_agent_runs_the_recipe() -> None:
+    recipe, readable = composed("+experiment=curriculum"), composed("+experiment=curriculum", "agent=sac")
+    differing = {key for key in recipe.agent if recipe.agent[key] != readable.agent[key]}
+    assert differing == {"_target_", "precision"}
+    assert instantiate(readable.agent, _partial_=True)(Sizes(120, 25, 12)).loss.demonstration_weight == 2
+
+
 def test_loggers_write_into_the_run_folder(tmp_path: Path) -> None:
     for option in ("default", "csv"):
         (tmp_path / option).mkdir()

@@ -1,4 +1,4 @@
-"""The readable composition: TorchRL's SACLoss, one fused AdamW, soft target updates."""
+"""The readable composition: TorchRL's SACLoss with imitation, one fused AdamW, soft target updates."""
 
 import copy
 from typing import Any
@@ -7,6 +7,7 @@ from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
 from torch import Tensor
 from torchrl.data import Bounded
+from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.modules import ProbabilisticActor, TanhNormal, ValueOperator
 from torchrl.objectives import SACLoss, SoftUpdate
 
@@ -30,6 +31,37 @@ def stochastic_actor(actor: Actor, action_size: int) -> ProbabilisticActor:
     )
 
 
+class ImitatingLoss(SACLoss):  # type: ignore[misc]
+    """SACLoss whose actor also imitates demonstrated actions that the critics hold for better than its own.
+
+    With weight w the actor minimises alpha log pi(a'|s) - Q(s, a') + w demonstrated [Q(s, a) > Q(s, a')] |m - a|^2:
+    a' is drawn from the policy, m = tanh(mean) is its likeliest action, a the replayed one, Q the lower critic.
+
+    Source: Nair et al. 2018, behaviour cloning with a Q filter.
+    """
+
+    demonstration_weight: float = 0.0
+
+    def actor_loss(self, tensordict: TensorDict) -> tuple[Tensor, dict[str, Tensor]]:
+        """The loss above, averaged over the batch; writes Q(s, a') to the key "value"."""
+        with set_exploration_type(ExplorationType.RANDOM), self.actor_network_params.to_module(self.actor_network):
+            policy = self.actor_network.get_dist(tensordict)
+        own, replayed = policy.rsample(), tensordict["action"]
+        log_prob, value = policy.log_prob(own), self.lower_value(tensordict, own)
+        better = self.lower_value(tensordict, replayed) > value
+        distance = (policy.deterministic_sample - replayed).square().sum(-1)
+        imitation = self.demonstration_weight * tensordict["demonstrated"].squeeze(-1) * better * distance
+        tensordict.set("value", value.detach())
+        return (self._alpha * log_prob - value + imitation).mean(), {"log_prob": log_prob.detach()}
+
+    def lower_value(self, tensordict: TensorDict, action: Tensor) -> Tensor:
+        """The lower of both critics' values of an action (batch,), whose gradient is by the action alone."""
+        judged = tensordict.select(*CRITIC_KEYS).set("action", action)
+        values = self._vmap_qnetworkN0(judged, self._cached_detached_qvalue_params)["state_action_value"]
+        lower: Tensor = values.min(0)[0].squeeze(-1)
+        return lower
+
+
 class Sac:
     """Soft actor-critic from TorchRL's parts."""
 
@@ -40,11 +72,6 @@ class Sac:
             raise InputError(
                 f"agent.precision={self.settings.precision}: agent=sac knows fp32 only; use agent=sac_fast"
             )
-        if self.settings.demonstration_weight:
-            raise InputError(
-                f"agent.demonstration_weight={self.settings.demonstration_weight}: agent=sac imitates nobody; "
-                "use agent=sac_fast, or 0"
-            )
         self.device = self.settings.torch_device()
         self.actor, *critics = build_networks(sizes, self.settings)
         self.loss = self._build_loss(critics).to(self.device)
@@ -52,8 +79,8 @@ class Sac:
         networks = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
         self.optimizer = build_optimizer(networks, self.loss.log_alpha, self.settings)
 
-    def _build_loss(self, critics: list[Any]) -> SACLoss:
-        loss = SACLoss(
+    def _build_loss(self, critics: list[Any]) -> ImitatingLoss:
+        loss = ImitatingLoss(
             actor_network=stochastic_actor(self.actor, self.sizes.action),
             qvalue_network=[ValueOperator(critic, in_keys=CRITIC_KEYS) for critic in critics],
             loss_function="l2",
@@ -61,12 +88,14 @@ class Sac:
             target_entropy=self.settings.target_entropy,
             deactivate_vmap=True,  # a plain loop over two critics is faster than vmap on a CPU
         )
+        loss.demonstration_weight = self.settings.demonstration_weight
         loss.make_value_estimator(gamma=self.settings.gamma)
         return loss
 
     def losses(self, batch: Batch) -> TensorDict:
-        """SACLoss on a batch: loss_qvalue, loss_actor, loss_alpha, alpha, entropy."""
-        return self.loss(self._tensordict(batch.to(self.device)))
+        """The loss of a batch: loss_qvalue, loss_actor, loss_alpha, alpha, entropy, value of the actor's actions."""
+        data = self._tensordict(batch.to(self.device))
+        return self.loss(data).set("value", data["value"].mean())
 
     def update(self, batch: Batch) -> dict[str, Tensor]:
         """One step of critics, actor and temperature, then of the target critics."""
@@ -77,11 +106,10 @@ class Sac:
         self.targets.step()
         return {
             "critic_loss": losses["loss_qvalue"].detach(),
-            "actor_loss": losses["loss_actor"].detach(),
+            "actor_loss": -losses["alpha"] * losses["entropy"] - losses["value"],  # without imitation
             "alpha": losses["alpha"],
             "entropy": losses["entropy"],
-            # E[alpha log pi - Q] is the actor's loss, so the value of its actions follows from it.
-            "value": -losses["loss_actor"].detach() - losses["alpha"] * losses["entropy"],
+            "value": losses["value"],
         }
 
     def _tensordict(self, batch: Batch) -> TensorDict:
@@ -93,7 +121,7 @@ class Sac:
             "done": terminated,
             "terminated": terminated,
         }
-        current = {key: getattr(batch, key) for key in CRITIC_KEYS}
+        current = {key: getattr(batch, key) for key in (*CRITIC_KEYS, "demonstrated")}
         return TensorDict(
             {**current, "steps_to_next_obs": batch.steps, "next": following}, batch_size=batch.reward.shape[:1]
         )

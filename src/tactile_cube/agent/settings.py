@@ -28,7 +28,7 @@ class AgentSettings(BaseModel):
         target_entropy: entropy [nat] the temperature is tuned towards.
         n_step: rewards summed before bootstrapping.
         demonstration_weight: of imitating a demonstrated action where the critics hold it for better than the actor's
-            own (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone, more is for `sac_fast`.
+            own (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone.
         batch_size: replayed transitions an update.
         precision: arithmetic of the matrix products: fp32, bf16, or auto: bf16 where the processor multiplies it
             (AVX-512 and newer), else fp32. More than fp32 is for `sac_fast` only.
