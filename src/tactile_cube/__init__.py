@@ -1,6 +1,85 @@
-"""Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand."""
+"""Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
+Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`
+and `export`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give what they work on. Nothing
+slow is imported before it is used.
+"""
+
+from __future__ import annotations
+
+import importlib
 import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from tactile_cube.errors import InputError
+
+if TYPE_CHECKING:
+    from tactile_cube.api.comparison import compare
+    from tactile_cube.api.diagnosis import diagnose
+    from tactile_cube.api.environment import env_config, make_env
+    from tactile_cube.api.evaluation import evaluate
+    from tactile_cube.api.export import export, load_policy
+    from tactile_cube.api.identification import identify
+    from tactile_cube.api.recording import record
+    from tactile_cube.api.training import train
+    from tactile_cube.drivetrain.model_file import read_model
+    from tactile_cube.measurement.recordings.arrays import TrialArrays, recording_from_arrays
+    from tactile_cube.measurement.recordings.reading import read_recording
+
+_PLACES = {
+    "compare": "api.comparison",
+    "diagnose": "api.diagnosis",
+    "env_config": "api.environment",
+    "make_env": "api.environment",
+    "evaluate": "api.evaluation",
+    "export": "api.export",
+    "load_policy": "api.export",
+    "identify": "api.identification",
+    "record": "api.recording",
+    "train": "api.training",
+    "read_model": "drivetrain.model_file",
+    "TrialArrays": "measurement.recordings.arrays",
+    "recording_from_arrays": "measurement.recordings.arrays",
+    "read_recording": "measurement.recordings.reading",
+}
+
+__all__ = [
+    "InputError",
+    "TrialArrays",
+    "compare",
+    "diagnose",
+    "env_config",
+    "evaluate",
+    "export",
+    "identify",
+    "load_policy",
+    "make_env",
+    "read_model",
+    "read_recording",
+    "record",
+    "recording_from_arrays",
+    "train",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+class _Package(ModuleType):
+    """`tactile_cube.train` stays the function when the command line of that name, a module, is imported."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _PLACES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 if "gymnasium" in sys.modules:  # only then can anybody ask Gymnasium for the environment; importing it here costs 0.2 s
     from tactile_cube.registration import register

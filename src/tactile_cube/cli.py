@@ -167,8 +167,8 @@ def _describe(title: str, entry: dict[str, Any]) -> str:
 
 def help_text(name: str) -> str:
     """What `--help` prints: the verbs, and the groups and keys of this one."""
-    lines = [f"python -m tactile_cube.{name}: {_verbs().get(name, '')}", "", "Verbs:"]
-    lines += [f"  python -m tactile_cube.{other:<10} {summary}" for other, summary in _verbs().items()]
+    lines = [f"python -m tactile_cube.{name}: {commands().get(name, '')}", "", "Verbs:"]
+    lines += [f"  python -m tactile_cube.{other:<10} {summary}" for other, summary in commands().items()]
     path = CONFIG / f"{name}.yaml"
     if path.is_file():
         lines += ["", "Groups (choose with group=option):", *_group_lines(path)]
@@ -181,7 +181,7 @@ def help_text(name: str) -> str:
     return "\n".join(lines)
 
 
-def _verbs() -> dict[str, str]:
+def commands() -> dict[str, str]:
     """Verbs of the package and the first line of what they say about themselves, without importing them."""
     result = {}
     for path in sorted(Path(__file__).parent.glob("*.py")):

@@ -10,21 +10,11 @@ from tactile_cube.cli import verb
 @verb("record")
 def main(config: DictConfig) -> None:
     """Write the recording into `out`, read back as every verb would, and say what it holds."""
-    from pathlib import Path
+    from tactile_cube.api.job import typed_job
+    from tactile_cube.api.recording import run_recording
 
-    import hydra.utils
-    from hydra.core.hydra_config import HydraConfig
-    from omegaconf import OmegaConf
-
-    from tactile_cube.measurement.recordings.whole import require_free, write_whole
-    from tactile_cube.measurement.sources.missing import require_settings
-
-    out = Path(config.out)
-    require_free(out)
-    require_settings(config.source, HydraConfig.get().runtime.choices["source"])
-    source = hydra.utils.instantiate(OmegaConf.to_container(config.source, resolve=True))
-    write_whole(out, source.recordings(config.seed))
-    print(f"next: python -m tactile_cube.compare recording={out}")
+    run_recording(typed_job(config))
+    print(f"next: python -m tactile_cube.compare recording={config.out}")
 
 
 if __name__ == "__main__":

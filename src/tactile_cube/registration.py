@@ -36,22 +36,13 @@ def make_rotation(
         overrides: further settings as on the command line, e.g. "task.filter_time=0.25".
         render_mode: None; pictures come from `evaluate`.
     """
-    from hydra import compose, initialize_config_dir
-    from hydra.core.global_hydra import GlobalHydra
     from hydra.utils import instantiate
 
-    from tactile_cube.cli import CONFIG
+    from tactile_cube.composition import composed
     from tactile_cube.transforms.gymnasium_env import GymnasiumRotation
 
     groups = {"task": task, "reward": reward, "randomization": randomization, "start": start}
     groups |= {"exploration": "none", "curriculum": "none", "env": "rotation"}
-    # a Hydra application that makes the environment has a configuration of its own, which comes back afterwards
-    application = GlobalHydra.instance().hydra
-    GlobalHydra.instance().hydra = None
-    try:
-        with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
-            chosen = [f"+{group}={option}" for group, option in groups.items()]
-            config = compose(overrides=[*chosen, "+model=null", *overrides])
-    finally:
-        GlobalHydra.instance().hydra = application
+    chosen = [f"+{group}={option}" for group, option in groups.items()]
+    config = composed(None, [*chosen, "+model=null", *overrides])
     return GymnasiumRotation(instantiate(config.env), render_mode)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import hydra.utils
-from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
 
 from tactile_cube.errors import InputError
@@ -20,12 +19,17 @@ TRUSTED = "tactile_cube."
 """A policy file is data from somewhere: of the classes it names, only the package's own are made."""
 
 
-def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
+def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None]) -> EnvConfig:
     """Return the environment of `source` with the overrides of the command line.
 
     `model` and `effects` replace those that the policy was trained with. A group chosen on the command line
     (`task=full`) replaces the policy's; `engine` replaces the one it was trained in; single values
     (`+task.filter_time=0.3`, `+env.simulation.solver_iterations=100`) change it.
+
+    Args:
+        config: of evaluate.
+        source: the policy.
+        choices: group -> option that was chosen for it.
 
     Raises:
         InputError: the policy file's configuration cannot be used.
@@ -46,7 +50,6 @@ def environment(config: DictConfig, source: PolicySource) -> EnvConfig:
             _refuse_foreign_effects(trained, source.label)
     if named:
         settings.model, settings.effects = config.model, config.effects or []
-    choices = HydraConfig.get().runtime.choices
     for group in GROUPS:
         if group in config:
             chosen = choices.get(group) not in (None, "null")

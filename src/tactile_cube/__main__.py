@@ -1,0 +1,34 @@
+"""`tactile-cube COMMAND ...` and `python -m tactile_cube COMMAND ...`: as `python -m tactile_cube.COMMAND ...`."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+
+from tactile_cube.cli import commands, fail
+
+USAGE_ERROR = 2
+
+
+def main() -> None:
+    """Run the command that the first word names; without one, say which there are."""
+    known = commands()
+    words = sys.argv[1:]
+    if not words or words[0] in ("-h", "--help"):
+        print(usage(known))
+        sys.exit(0 if words else USAGE_ERROR)
+    if words[0] not in known:
+        fail(f"{words[0]}: no such command; choose one of {', '.join(known)}")
+    sys.argv = [f"tactile_cube.{words[0]}", *words[1:]]
+    runpy.run_module(f"tactile_cube.{words[0]}", run_name="__main__")
+
+
+def usage(known: dict[str, str]) -> str:
+    """The commands, a line each."""
+    lines = ["tactile-cube COMMAND [group=option] [key=value] ...", "", "Commands:"]
+    lines += [f"  {name:<10} {summary}" for name, summary in known.items()]
+    return "\n".join([*lines, "", "tactile-cube COMMAND --help lists its groups and keys."])
+
+
+if __name__ == "__main__":
+    main()

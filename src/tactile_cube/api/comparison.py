@@ -1,0 +1,145 @@
+"""Compare a recording with a model from a program."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactile_cube.api.job import Job, PathLike, Say, called_job
+
+if TYPE_CHECKING:
+    from tactile_cube.drivetrain.model_file import ModelFile
+    from tactile_cube.measurement.comparing.comparison import Comparison
+    from tactile_cube.measurement.recordings.recording import Recording
+
+
+@dataclass(frozen=True)
+class ComparisonResult:
+    """How far a model and a measurement are apart, and where.
+
+    Attributes:
+        comparison: errors by joint, trial and regime [rad], noise floor, residuals, simulated signals.
+        job: the call.
+        seconds: how long it took [s].
+    """
+
+    comparison: Comparison
+    job: Job
+    seconds: float
+
+    @property
+    def error(self) -> float:
+        """RMS position error over all joints [rad]."""
+        return self.comparison.errors.overall
+
+    @property
+    def noise_floor(self) -> float:
+        """What a perfect model would leave of it [rad]."""
+        return self.comparison.floor.overall
+
+    @property
+    def text(self) -> str:
+        """The answer, a line a joint, and where it fails, in words."""
+        from tactile_cube.visualization.comparison_summary import summary
+
+        return summary(self.comparison)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The content of comparison.json: plain numbers, errors in rad."""
+        from tactile_cube.measurement.comparing.comparison import as_json
+
+        config = self.job.config
+        origin = {"model": config.model, "engine": config.engine, "command": self.job.command}
+        return as_json(self.comparison) | origin | {"seconds": self.seconds}
+
+    def write(self, folder: PathLike, rerun: bool = True) -> None:
+        """Write comparison.json, report.html and, with `rerun`, comparison.rrd."""
+        from tactile_cube.visualization.comparison_report import comparison_report
+        from tactile_cube.visualization.comparison_summary import markdown
+        from tactile_cube.visualization.report import write_report
+
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "comparison.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
+        page = comparison_report(self.comparison, self.job.command, self.job.config.model)
+        write_report(page, folder / "report.html")
+        if rerun:
+            from tactile_cube.visualization.comparison_episode import write_comparison
+
+            write_comparison(self.comparison, folder / "comparison.rrd", markdown(self.comparison))
+
+
+def compare(
+    recording: Recording | PathLike, *settings: str, model: ModelFile | PathLike | None = None, say: Say | None = None
+) -> ComparisonResult:
+    """Simulate a recording's commands and say how far model and measurement are apart, and where.
+
+    Args:
+        recording: what was measured, or its folder.
+        settings: values as on the command line, e.g. "engine=pybullet", "band.simulations=0".
+        model: of `identify` or `diagnose`, or its file; None: the values that the recording states.
+        say: takes lines of progress; None: stderr.
+
+    Raises:
+        InputError: a recording or a model that cannot be used.
+
+    Example:
+        >>> result = tactile_cube.compare("my_recording", model="model.yaml")
+        >>> print(f"{1e3 * result.error:.2f} mrad, noise floor {1e3 * result.noise_floor:.2f} mrad")
+    """
+    job = called_job("compare", settings, recording=recording_name(recording), model=model_name(model))
+    return run_comparison(job, opened(recording), modelled(model), say or job.say)
+
+
+def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say: Say) -> ComparisonResult:
+    """Compare as a job says: free motion, or grasps where there is nothing else."""
+    from tactile_cube.identification.contact.comparison import compare_contact
+    from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
+    from tactile_cube.measurement.comparing import comparison
+
+    config = job.config
+    held = len(with_object(recording).trials)
+    if held and not has_free_motion(recording):
+        compared = compare_contact(recording, model, config.step, say)
+        return ComparisonResult(compared, job, job.seconds)
+    if held:
+        say(f"{held} trials with an object are left out here; diagnose and identify use them")
+    spread = {str(key): float(value) for key, value in config.band.spread.items()}
+    band = (config.band.simulations, spread, config.seed)
+    compared = comparison.compare(without_touches(recording), model, config.engine, config.step, *band)
+    return ComparisonResult(compared, job, job.seconds)
+
+
+def opened(recording: Recording | PathLike) -> Recording:
+    """The recording, read if it is a folder's name; what is odd about it goes to stderr."""
+    from tactile_cube.measurement.recordings.reading import read_recording
+
+    if not isinstance(recording, str | Path):
+        return recording
+    read = read_recording(recording)
+    for line in read.warnings:
+        print(f"warning: {line}", file=sys.stderr)
+    return read
+
+
+def recording_name(recording: Recording | PathLike) -> str:
+    """The folder of a recording."""
+    return str(recording if isinstance(recording, str | Path) else recording.folder)
+
+
+def modelled(model: ModelFile | PathLike | None) -> ModelFile | None:
+    """The model, read if it is a file's name."""
+    from tactile_cube.drivetrain.model_file import as_model
+
+    return None if model is None else as_model(model)
+
+
+def model_name(model: ModelFile | PathLike | None) -> str | None:
+    """The file of a model; a model that is no file goes by its rig."""
+    if model is None or isinstance(model, str | Path):
+        return None if model is None else str(model)
+    return f"model of {model.rig}"

@@ -1,0 +1,190 @@
+"""Diagnose a recording from a program: which physical effect does the model lack?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
+from tactile_cube.api.job import Job, PathLike, Say, called_job
+
+if TYPE_CHECKING:
+    from tactile_cube.drivetrain.model_file import ModelFile
+    from tactile_cube.identification.contact.diagnosis import ContactDiagnosis
+    from tactile_cube.identification.diagnosis import Diagnosis
+    from tactile_cube.measurement.recordings.recording import Recording
+
+SHAPES = 3  # of the missing torque of one joint, most telling first
+
+
+@dataclass(frozen=True)
+class DiagnosisResult:
+    """The answer, what supports it, and the model with the effects that were found.
+
+    Attributes:
+        recording: what was measured.
+        known: the model that it began with; None: what the recording states.
+        free: the diagnosis of trials in free motion; None without such trials.
+        contact: the diagnosis of trials in which the hand holds an object; None without such trials.
+        model: values, effects and intervals.
+        data: the content of diagnosis.json: plain numbers, errors in rad.
+        job: the call.
+    """
+
+    recording: Recording
+    known: ModelFile | None
+    free: Diagnosis | None
+    contact: ContactDiagnosis | None
+    model: ModelFile
+    data: dict[str, Any]
+    job: Job
+
+    @property
+    def verdict(self) -> str:
+        """`adequate`, `missing_effect`, `ambiguous` or `unknown_effect`."""
+        return str(self.data["verdict"])
+
+    @property
+    def effects(self) -> list[str]:
+        """What is missing, as `identify` takes it: NAME@JOINT, or NAME for effects of fingertips and object."""
+        entries = [(entry["name"], joint) for entry in self.data["effects"] for joint in entry["joints"]]
+        return [name if joint == "object" else f"{name}@{joint}" for name, joint in entries]
+
+    @property
+    def text(self) -> str:
+        """The answer in plain words."""
+        from tactile_cube.identification.in_words import answer
+
+        return answer(self.data, self.free.experiment if self.free else None)
+
+    def write(self, folder: PathLike) -> None:
+        """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""
+        from tactile_cube.drivetrain.model_file import write_model
+        from tactile_cube.identification.diagnosis import write_experiment
+
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_model(self.model, folder / "model.yaml")
+        experiment = write_experiment(self.free, folder) if self.free else None
+        data = self.data | {"next_experiment": str(experiment) if experiment else None}
+        (folder / "diagnosis.json").write_text(json.dumps(data, indent=1), encoding="utf-8")
+        if self.free is None:
+            self._report_contact(folder, data)
+        else:
+            self._report_free(folder, data, self.free)
+
+    def _report_contact(self, folder: Path, data: dict[str, Any]) -> None:
+        from tactile_cube.visualization.contact_report import contact_diagnosis_report
+        from tactile_cube.visualization.report import write_report
+
+        path, made = str(folder / "model.yaml"), self.model.provenance
+        page = contact_diagnosis_report(data, self.model.rig, made.command, made.recording, path)
+        write_report(page, folder / "report.html")
+
+    def _report_free(self, folder: Path, data: dict[str, Any], found: Diagnosis) -> None:
+        from tactile_cube.measurement.bench import without_touches
+        from tactile_cube.measurement.comparing.comparison import compare
+        from tactile_cube.visualization.comparison_episode import write_comparison
+        from tactile_cube.visualization.comparison_summary import markdown
+        from tactile_cube.visualization.diagnosis_report import diagnosis_report
+        from tactile_cube.visualization.report import write_report
+
+        config, recording = self.job.config, without_touches(self.recording)
+        before = compare(recording, self.known, "fast", config.step, floor=found.floor)
+        after = compare(recording, self.model, config.engine, config.step, floor=found.floor)
+        shapes = [shape for one in found.unexplained for shape in one.shapes[:SHAPES]]
+        path = str(folder / "model.yaml")
+        page = diagnosis_report(data, before, after, self.job.command, path, shapes, found.experiment)
+        write_report(page, folder / "report.html")
+        write_comparison(after, folder / "diagnosis.rrd", markdown(after))
+
+
+def diagnose(
+    recording: Recording | PathLike,
+    *settings: str,
+    effects: Sequence[str] = (),
+    model: ModelFile | PathLike | None = None,
+    say: Say | None = None,
+) -> DiagnosisResult:
+    """Find out which physical effect a model lacks, from a recording of the real mechanism.
+
+    Args:
+        recording: what was measured, or its folder; two or more trials.
+        settings: values as on the command line, e.g. "engine=fast", "seed=1".
+        effects: effects of your own beside the catalogue, as dotted paths.
+        model: to begin with, or its file: what else is missing? None: what the recording states.
+        say: takes lines of progress; None: stderr.
+
+    Raises:
+        InputError: a recording, a model or an effect that cannot be used.
+
+    Example:
+        >>> found = tactile_cube.diagnose("my_recording", "engine=fast")
+        >>> print(found.text, found.verdict, found.effects)
+        >>> found.write("outputs/my_diagnosis")
+    """
+    job = called_job(
+        "diagnose",
+        settings,
+        recording=recording_name(recording),
+        model=model_name(model),
+        effects=list(effects) or None,
+    )
+    return run_diagnosis(job, opened(recording), modelled(model), say or job.say)
+
+
+def run_diagnosis(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
+    """Diagnose free motion, grasps, or both, as the recording has them."""
+    from tactile_cube.measurement.bench import has_free_motion, with_object
+    from tactile_cube.measurement.replay.parameters import require_same_joints
+
+    if known is not None:
+        require_same_joints(recording, known)
+    if with_object(recording).trials and not has_free_motion(recording):
+        return _of_grasps(job, recording, known, say)
+    return _of_free_motion(job, recording, known, say)
+
+
+def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
+    from tactile_cube.identification.contact.diagnosis import diagnose_contact
+    from tactile_cube.identification.contact.identification import stated_model
+
+    config = job.config
+    contact = diagnose_contact(recording, known, config.step, config.seed, say)
+    model = stated_model(recording, job.command, config.seed)
+    if known is not None:
+        model = known.model_copy(update={"provenance": model.provenance})
+    model = contact.into(model, alone=True)
+    news = {one.effect for one in contact.effects()}
+    data = contact.as_json()
+    data["known_effects"] = [one.effect for one in model.effects if one.effect not in news]
+    data["seconds"] = job.seconds
+    return DiagnosisResult(recording, known, None, contact, model, data, job)
+
+
+def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
+    from tactile_cube.drivetrain.effects import catalogue, find_effect
+    from tactile_cube.identification.contact.diagnosis import diagnose_contact, with_contact
+    from tactile_cube.identification.diagnosis import diagnose as diagnose_free
+    from tactile_cube.identification.diagnosis_json import as_json
+    from tactile_cube.identification.recommended import model_file
+    from tactile_cube.measurement.bench import with_object, without_touches
+
+    config = job.config
+    effects = tuple(dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)]))
+    moving = without_touches(recording)
+    found = diagnose_free(moving, effects, config.engine, config.step, config.seed, say, known)
+    model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
+    data = as_json(found, None, job.seconds)
+    if known is not None:
+        model = model.model_copy(update={"effects": model.with_effects(known.object_effects)})
+        data["known_effects"] += [one.effect for one in known.object_effects]
+    contact = None
+    if with_object(recording).trials:
+        contact = diagnose_contact(recording, model, config.step, config.seed, say)
+        model, data = contact.into(model, alone=False), with_contact(data, contact)
+        data["seconds"] = job.seconds
+    return DiagnosisResult(recording, known, found, contact, model, data, job)

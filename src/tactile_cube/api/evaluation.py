@@ -1,0 +1,118 @@
+"""Try a policy from a program."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactile_cube.api.job import Job, PathLike, Say, called_job
+
+if TYPE_CHECKING:
+    from tactile_cube.evaluation.episode_record import EpisodeRecord
+    from tactile_cube.evaluation.evaluation import Evaluation, VariantResult
+    from tactile_cube.evaluation.results_file import Run
+    from tactile_cube.evaluation.summary import Summary
+
+
+@dataclass(frozen=True)
+class EvaluationResult:
+    """What came of a protocol.
+
+    Attributes:
+        run: what was run.
+        variants: what came of each condition, the first one first.
+        evaluation: runs an episode again.
+    """
+
+    run: Run
+    variants: list[VariantResult]
+    evaluation: Evaluation
+
+    @property
+    def summary(self) -> Summary:
+        """Angles and verdicts of the first condition."""
+        return self.variants[0].summary
+
+    @property
+    def text(self) -> str:
+        """A sentence for each condition."""
+        from tactile_cube.evaluation.summary import sentence
+
+        return "\n".join(sentence(one.variant.name, one.summary) for one in self.variants)
+
+    def episode(self, number: int, variant: int = 0) -> EpisodeRecord:
+        """Every signal of an episode; it runs once more, equal to the bit."""
+        chosen = self.variants[variant]
+        return self.evaluation.record(chosen.variant, chosen.results[number])
+
+    def write(self, folder: PathLike, film: bool = True) -> None:
+        """Write results.json, the robustness map where conditions lie on axes, and films of the best episodes."""
+        from tactile_cube.evaluation.results_file import write_results
+
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_results(folder / "results.json", self.run, self.variants)
+        print(f"results: {folder / 'results.json'}")
+        if any(variant.variant.axis for variant in self.variants):
+            from tactile_cube.visualization.curves import write_robustness_map
+
+            write_robustness_map(self.variants, self.run.protocol.nominal_values, folder / "robustness.png")
+            print(f"robustness map: {folder / 'robustness.png'}")
+        if film:
+            from tactile_cube.visualization.showcase import showcase
+
+            showcase(self.evaluation, self.variants, folder)
+
+
+def evaluate(
+    policy: PathLike | None = None, *settings: str, model: PathLike | None = None, say: Say = print
+) -> EvaluationResult:
+    """Try a policy as a protocol says, and judge every episode.
+
+    Args:
+        policy: a policy file, a training run's folder, a policy that ships with the package, `hold`, `random` or
+            `scripted`; None: the shipped one.
+        settings: choices and values as on the command line, e.g. "protocol=paper", "task=full", "seed=1".
+        model: model.yaml of the world; None: as in training.
+        say: takes a line for each episode.
+
+    Raises:
+        InputError: there is no such policy, or a value that cannot be used.
+
+    Example:
+        >>> result = tactile_cube.evaluate("table", "protocol=smoke")
+        >>> print(result.text, result.summary.mean_angle)
+    """
+    names = {"policy": policy, "model": model}
+    job = called_job("evaluate", settings, **{key: None if name is None else str(name) for key, name in names.items()})
+    return run_evaluation(job, say)
+
+
+def run_evaluation(job: Job, say: Say) -> EvaluationResult:
+    """Run the episodes of a job's protocol."""
+    import torch
+    from hydra.utils import instantiate
+
+    from tactile_cube.evaluation.environment import environment
+    from tactile_cube.evaluation.evaluation import Evaluation
+    from tactile_cube.evaluation.policy_source import find_policy
+    from tactile_cube.evaluation.results_file import Run
+    from tactile_cube.evaluation.summary import HEADER, row
+
+    torch.set_num_threads(1)
+    config = job.config
+    source = find_policy(config.policy)
+    protocol = instantiate(config.protocol)
+    settings = environment(config, source, job.choices)
+    evaluation = Evaluation(settings, source.policy, protocol, config.seed)
+    task = settings.task
+    say(
+        f"policy {source.label}, protocol {protocol.name}, seed {config.seed}, task {task.name}: "
+        f"T_s {task.filter_time:g} s, {100 * task.gravity_scale:.0f} % of the weight\n{HEADER}"
+    )
+    began = time.process_time()
+    variants = evaluation.run(lambda name, result: say(row(result, name)))
+    hours = (time.process_time() - began) / 3600
+    return EvaluationResult(Run(protocol, source, task, config.seed, job.command, hours), variants, evaluation)

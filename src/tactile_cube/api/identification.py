@@ -1,0 +1,160 @@
+"""Identify effects from a program: fit them, with intervals, and see the error fall."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactile_cube.api.comparison import opened, recording_name
+from tactile_cube.api.job import Job, PathLike, Say, called_job
+
+if TYPE_CHECKING:
+    from tactile_cube.drivetrain.model_file import ModelFile
+    from tactile_cube.identification.contact.identification import ContactIdentification
+    from tactile_cube.identification.identification import Identification
+    from tactile_cube.measurement.recordings.recording import Recording
+
+
+@dataclass(frozen=True)
+class IdentificationResult:
+    """A fitted model, and the error after each stage.
+
+    Attributes:
+        recording: what was measured.
+        free: the fit of trials in free motion; None without such trials.
+        contact: the fit of trials in which the hand holds an object; None without effects of fingertips and object.
+        model: values, effects and intervals.
+        data: the content of identification.json: plain numbers, errors in rad.
+        job: the call.
+    """
+
+    recording: Recording
+    free: Identification | None
+    contact: ContactIdentification | None
+    model: ModelFile
+    data: dict[str, Any]
+    job: Job
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Held-out RMS position error after each stage, from `nominal` on, and `noise_floor` [rad]."""
+        return dict(self.data["error"])
+
+    @property
+    def text(self) -> str:
+        """The error after each stage, and the values with their intervals."""
+        from tactile_cube.identification.in_words import staircase
+
+        lines = [staircase(self.data["error"], self.model)]
+        for parameter in self.contact.as_json()["silent"] if self.contact else []:
+            lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
+        return "\n".join(lines)
+
+    def write(self, folder: PathLike) -> None:
+        """Write model.yaml, identification.json, report.html and, of free motion, identification.rrd."""
+        from tactile_cube.drivetrain.model_file import write_model
+        from tactile_cube.visualization.report import write_report
+
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_model(self.model, folder / "model.yaml")
+        (folder / "identification.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
+        if self.free is not None:
+            write_report(self._free_report(folder, self.free), folder / "report.html")
+        elif self.contact is not None:
+            from tactile_cube.visualization.contact_report import contact_report
+
+            path = str(folder / "model.yaml")
+            write_report(contact_report(self.contact, self.model.rig, self.job.command, path), folder / "report.html")
+
+    def _free_report(self, folder: Path, found: Identification) -> Any:
+        from tactile_cube.measurement.bench import without_touches
+        from tactile_cube.measurement.comparing.comparison import compare
+        from tactile_cube.visualization.comparison_episode import write_comparison
+        from tactile_cube.visualization.comparison_summary import markdown
+        from tactile_cube.visualization.contact_report import contact_sections
+        from tactile_cube.visualization.diagnosis_report import identification_report
+
+        config, command = self.job.config, self.job.command
+        after = compare(without_touches(self.recording), self.model, config.engine, config.step, floor=found.floor)
+        write_comparison(after, folder / "identification.rrd", markdown(after))
+        held = contact_sections(self.contact, alone=False) if self.contact else []
+        path = str(folder / "model.yaml")
+        return identification_report(after, self.data["error"], self.data["joints"], command, path, held)
+
+
+def identify(
+    recording: Recording | PathLike, effects: Sequence[str], *settings: str, say: Say | None = None
+) -> IdentificationResult:
+    """Fit a rig's constants and exactly the effects that you name.
+
+    Args:
+        recording: what was measured, or its folder; two or more trials.
+        effects: NAME@JOINT, NAME (every joint), a dotted path to a class of your own, or an effect of fingertips and
+            object where the hand holds something.
+        settings: values as on the command line, e.g. "engine=fast", "seed=1".
+        say: takes lines of progress; None: stderr.
+
+    Raises:
+        InputError: a recording that cannot be used, an unknown effect or joint.
+
+    Example:
+        >>> fitted = tactile_cube.identify("my_recording", ["stribeck_friction@q3"])
+        >>> print(fitted.text, fitted.model.effects)
+        >>> fitted.write("outputs/my_model")
+    """
+    job = called_job("identify", settings, recording=recording_name(recording), effects=list(effects))
+    return run_identification(job, opened(recording), say or job.say)
+
+
+def run_identification(job: Job, recording: Recording, say: Say) -> IdentificationResult:
+    """Fit what a job names: effects of the drivetrain, of fingertips and object, or both."""
+    from tactile_cube.identification.contact.identification import contact_effects
+    from tactile_cube.measurement.bench import has_free_motion
+
+    contact = contact_effects(job.config.effects, recording)
+    names = [effect.name for effect in contact]
+    drive = [name for name in job.config.effects if name not in names]
+    if contact and not drive and not has_free_motion(recording):
+        return _of_grasps(job, recording, contact, say)
+    return _of_free_motion(job, recording, drive, contact, say)
+
+
+def _of_grasps(job: Job, recording: Recording, effects: list[Any], say: Say) -> IdentificationResult:
+    from tactile_cube.identification.contact.identification import identify_contact, stated_model
+
+    config = job.config
+    found = identify_contact(recording, effects, None, config.step, config.seed, say)
+    model = found.into(stated_model(recording, job.command, config.seed), alone=True)
+    contact = found.as_json()
+    data = {key: contact[key] for key in ("error", "joints", "held_out")}
+    data |= {"model": model.model_dump(), "contact": contact, "seconds": job.seconds}
+    return IdentificationResult(recording, None, found, model, data, job)
+
+
+def _of_free_motion(
+    job: Job, recording: Recording, drive: list[str], effects: list[Any], say: Say
+) -> IdentificationResult:
+    from tactile_cube.identification.contact.identification import identify_contact
+    from tactile_cube.identification.identification import identify as identify_free
+    from tactile_cube.identification.recommended import model_file
+    from tactile_cube.measurement.bench import without_touches
+    from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
+
+    config = job.config
+    offsets = bench_estimates(recording).offsets
+    moving = without_touches(recording)
+    found = identify_free(moving, drive, config.engine, config.step, config.seed, say)
+    model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
+    model = BenchEstimates(offsets=offsets).into(model)
+    contact = identify_contact(recording, effects, model, config.step, config.seed, say) if effects else None
+    model = model if contact is None else contact.into(model, alone=False)
+    stages = {name: summary.overall for name, summary in found.stages.items()} | {"noise_floor": found.floor.overall}
+    joints = {name: summary.joints for name, summary in found.stages.items()}
+    data = {"error": stages, "joints": joints, "held_out": found.held_out, "model": model.model_dump()}
+    data |= {} if contact is None else {"contact": contact.as_json()}
+    data["seconds"] = job.seconds
+    return IdentificationResult(recording, found, contact, model, data, job)

@@ -1,0 +1,49 @@
+"""Make recordings from a program: from a simulated rig, from files of other programs, from arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactile_cube.api.job import Job, PathLike, called_job
+
+if TYPE_CHECKING:
+    from tactile_cube.measurement.recordings.recording import Recording
+
+
+def record(out: PathLike, *settings: str) -> dict[str, Recording]:
+    """Write a recording from a source of conf/source, and read it back as every command would.
+
+    Args:
+        out: folder to write.
+        settings: choices and values as on the command line, e.g. "source=finger",
+            "source.hidden=['backlash@q2: play=0.03']".
+
+    Returns:
+        Sub-folder of `out` -> recording: "" is the recording itself, "validation" what identification must not see.
+
+    Raises:
+        InputError: `out` holds a recording already, or a file that cannot be used.
+
+    Example:
+        >>> measured = tactile_cube.record("made", "source=finger", "source.hidden=[backlash@q2]")[""]
+    """
+    return run_recording(called_job("record", settings, out=str(out)))
+
+
+def run_recording(job: Job) -> dict[str, Recording]:
+    """Write what a job's source gives."""
+    from hydra.utils import instantiate
+    from omegaconf import OmegaConf
+
+    from tactile_cube.measurement.recordings.reading import read_recording
+    from tactile_cube.measurement.recordings.whole import require_free, write_whole
+    from tactile_cube.measurement.sources.missing import require_settings
+
+    out = Path(job.config.out)
+    require_free(out)
+    require_settings(job.config.source, job.choices["source"])
+    source = instantiate(OmegaConf.to_container(job.config.source, resolve=True))
+    tables = source.recordings(job.config.seed)
+    write_whole(out, tables)
+    return {name: read_recording(out / name) for name in tables}

@@ -1,0 +1,105 @@
+"""Train a policy from a program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactile_cube.api.job import Job, PathLike, called_job
+
+if TYPE_CHECKING:
+    from tactile_cube.training.run import Run
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """How a training ended.
+
+    Attributes:
+        folder: with policies, checkpoint, metrics.csv and the costs.
+        reason: why it ended, in words.
+        steps: environment steps so far.
+        final_angle: mean over the last training episodes [rad].
+    """
+
+    folder: Path
+    reason: str
+    steps: int
+    final_angle: float
+
+    @property
+    def policy(self) -> Path:
+        """The latest policy."""
+        return self.folder / "policy.safetensors"
+
+    @property
+    def best_policy(self) -> Path | None:
+        """The policy of the best training episodes; None while too few have ended."""
+        path = self.folder / "policy_best.safetensors"
+        return path if path.is_file() else None
+
+    def curve(self) -> dict[str, list[float]]:
+        """Columns of metrics.csv, one number for each line of the log."""
+        from tactile_cube.evaluation.training_curve import read_curve
+
+        return read_curve(self.folder, self.folder.name).columns
+
+
+def train(*settings: str, model: PathLike | None = None, folder: PathLike | None = None) -> TrainingResult:
+    """Train a policy, or go on training it: the same call resumes.
+
+    Args:
+        settings: choices and values as on the command line, e.g. "+experiment=table", "seed=1".
+        model: model.yaml that describes the hand; None: as the settings say.
+        folder: run folder; None: outputs/train/<name>-seed<seed>.
+
+    Raises:
+        InputError: a value that cannot be used, or the folder is in use.
+        CollectionError: a worker process died; the same call goes on from the last checkpoint.
+
+    Example:
+        >>> result = tactile_cube.train("+experiment=table", "training.steps=60000")
+        >>> print(result.final_angle, result.policy)
+    """
+    job = called_job("train", settings, folder, model=None if model is None else str(model))
+    return run_training(job)
+
+
+def run_training(job: Job) -> TrainingResult:
+    """Build the run of a job, train, and say how it went."""
+    run = training_run(job)
+    try:
+        run.announce()
+        reason = run.train()
+    finally:
+        run.close()
+    run.conclude(reason)
+    return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
+
+
+def training_run(job: Job) -> Run:
+    """The run that a job describes: new, or where its checkpoint says."""
+    from hydra.utils import instantiate
+    from omegaconf import OmegaConf
+
+    from tactile_cube.drivetrain.model_file import read_model
+    from tactile_cube.evaluation.policy_path import networks_path
+    from tactile_cube.training.build import build_run
+    from tactile_cube.training.environment import as_environment
+    from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
+
+    config = job.config
+    plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
+    if config.model is not None:  # its contents, so that the policy file needs no other file
+        plain["env"]["model"] = read_model(config.model).model_dump()
+    return build_run(
+        folder=job.folder,
+        seed=RunSettings(name=config.name, seed=config.seed).seed,
+        environment=as_environment(instantiate(config.env)),
+        make_agent=instantiate(config.agent, _partial_=True),
+        collector=CollectorSettings(**plain["collector"]),
+        training=TrainingSettings(**plain["training"] | {"init_from": networks_path(config.training.init_from)}),
+        loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
+        config=plain,
+    )

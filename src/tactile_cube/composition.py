@@ -1,0 +1,36 @@
+"""A configuration out of conf/, composed as a command line would, from within any program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+
+def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False) -> DictConfig:
+    """The configuration of a command with some of its settings chosen.
+
+    A Hydra application that calls this keeps its own configuration.
+
+    Args:
+        name: of the command whose conf/<name>.yaml it is; None: nothing but what `settings` add.
+        settings: choices and values as on the command line, e.g. "task=table", "seed=1".
+        with_hydra: also give Hydra's own part, which names run folder and choices.
+
+    Raises:
+        hydra.errors.HydraException: a setting that there is not.
+    """
+    from hydra import compose, initialize_config_dir
+    from hydra.core.global_hydra import GlobalHydra
+
+    from tactile_cube.cli import CONFIG
+
+    application = GlobalHydra.instance().hydra
+    GlobalHydra.instance().hydra = None
+    try:
+        with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
+            return compose(name, [*settings], return_hydra_config=with_hydra)
+    finally:
+        GlobalHydra.instance().hydra = application

@@ -1,0 +1,126 @@
+"""A recording out of arrays, for programs that have measured signals in memory."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.description import Controller, Description, PerJoint, Sensors, TrialEntry
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
+
+
+@dataclass(frozen=True)
+class TrialArrays:
+    """One trial, sampled at the recording's rate.
+
+    Attributes:
+        command: desired joint angles (n, joints) [rad].
+        position: measured joint angles (n, joints) [rad].
+        torque: measured joint torques (n, joints) [N m]; None: not measured.
+        kind: of excitation; trials of one kind repeat one command.
+        initialisation: of the robot that it belongs to; each has joint offsets of its own.
+    """
+
+    command: ArrayLike
+    position: ArrayLike
+    torque: ArrayLike | None = None
+    kind: str = "unspecified"
+    initialisation: int = 0
+
+
+def recording_from_arrays(
+    trials: Sequence[TrialArrays],
+    joints: Sequence[str],
+    urdf: str | Path,
+    rate: float,
+    kp: PerJoint,
+    kd: PerJoint,
+    torque_limit: PerJoint = float("inf"),
+    nominal: Mapping[str, PerJoint] | None = None,
+    gravity: Sequence[float] = (0.0, 0.0, -9.81),
+    read: Literal["before", "after"] = "before",
+    resolution: float = 0.0,
+    folder: str | Path | None = None,
+) -> Recording:
+    """A recording as `compare`, `diagnose` and `identify` take it, checked as if it had been read from disk.
+
+    Args:
+        trials: what was measured.
+        joints: names in the URDF, in the order of the columns.
+        urdf: path of the rig's URDF, or its text.
+        rate: samples per second [Hz].
+        kp: stiffness of the impedance controller [N m/rad], one number or one for each joint.
+        kd: its damping [N m s/rad].
+        torque_limit: its limit [N m].
+        nominal: what you believe of the drive: stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2].
+        gravity: in the base frame (3,) [m/s^2].
+        read: whether a row's position was read before its command was sent, as most loops log, or after it acted.
+        resolution: of the position [rad].
+        folder: where to keep it; None: nowhere.
+
+    Raises:
+        InputError: naming trial, joint and value of what cannot be used.
+
+    Example:
+        >>> trial = TrialArrays(command=q_d, position=q, torque=tau, kind="ramps")
+        >>> recording = recording_from_arrays([trial, ...], ["elbow"], "arm.urdf", rate=500.0, kp=3.7, kd=0.25)
+    """
+    tables = [_table(trial, number, len(joints), rate) for number, trial in enumerate(trials)]
+    description = Description(
+        format=1,
+        gravity=list(gravity),
+        rate_hz=rate,
+        joints=list(joints),
+        controller=Controller(kp=kp, kd=kd, torque_limit=torque_limit),
+        nominal=dict(nominal or {}),
+        sensors=Sensors(read=read, position_resolution=resolution),
+        trials=[table.entry for table in tables],
+    )
+    recording = RecordingTables(description, _urdf_text(urdf), tables)
+    if folder is not None:
+        write_recording(Path(folder), recording)
+        return read_recording(folder)
+    with tempfile.TemporaryDirectory() as passing:
+        write_recording(Path(passing) / "arrays", recording)
+        return read_recording(Path(passing) / "arrays")
+
+
+def _table(trial: TrialArrays, number: int, joints: int, rate: float) -> TrialTable:
+    command = _signal(trial.command, "command", number, joints)
+    position = _signal(trial.position, "position", number, joints)
+    torque = None if trial.torque is None else _signal(trial.torque, "torque", number, joints)
+    for name, signal in (("position", position), ("torque", torque)):
+        if signal is not None and len(signal) != len(command):
+            raise InputError(f"trials[{number}]: {name} has {len(signal)} samples, command has {len(command)}")
+    entry = TrialEntry(
+        file=f"trials/{trial.kind}_{number}.parquet", initialisation=trial.initialisation, kind=trial.kind
+    )
+    return TrialTable(entry, np.arange(len(command)) / rate, command, position, torque)
+
+
+def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[np.float64]:
+    """The signal as (n, joints); a flat array will do for one joint."""
+    signal = np.asarray(values, dtype=np.float64)
+    if signal.ndim == 1 and joints == 1:
+        signal = signal[:, None]
+    if signal.ndim != 2 or signal.shape[1] != joints:
+        raise InputError(f"trials[{number}]: {name} has shape {signal.shape}; expected (samples, {joints})")
+    return signal
+
+
+def _urdf_text(urdf: str | Path) -> str:
+    if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
+        return urdf
+    try:
+        return Path(urdf).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"urdf={urdf}: cannot be read: {error.strerror}") from None

@@ -1,0 +1,50 @@
+"""Training, trying and exporting a policy without a command line."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tactile_cube
+from tactile_cube import InputError
+
+SHORT = [
+    "+experiment=smoke",
+    "collector=single",
+    "collector.worlds=4",
+    "training.learning_starts=100",
+    "training.random_steps=100",
+]
+
+
+def test_train_evaluate_export_and_the_command_goes_on_where_the_function_stopped(tmp_path: Path) -> None:
+    result = tactile_cube.train(*SHORT, "training.steps=200", folder=tmp_path / "run")
+    assert result.steps == 200
+    assert result.curve()["steps"][-1] == 200
+    tried = tactile_cube.evaluate(result.folder, "protocol=smoke", "protocol.seconds=0.5", say=lambda line: None)
+    assert tried.summary.episodes == 2
+    assert tried.episode(1).theta[-1] == tried.variants[0].results[1].final_angle
+    action = tactile_cube.load_policy(result.policy)(np.zeros((3, 120), dtype=np.float32))
+    assert action.shape == (3, 12)
+    assert tactile_cube.export(result.policy, tmp_path / "policy.npz").is_file()
+
+    words = [*SHORT, "training.steps=240", f"hydra.run.dir={tmp_path}/run"]
+    command = [sys.executable, "-m", "tactile_cube.train", *words]
+    again = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=200, check=False)
+    assert again.returncode == 0, again.stderr
+    assert "goes on at 200 steps" in again.stdout
+
+
+def test_an_environment_is_made_of_the_settings_of_train() -> None:
+    env = tactile_cube.make_env("task=table", "env.stack=3", worlds=2)
+    assert env.rollout(2)["observation"].shape == (2, 2, 72)
+    assert tactile_cube.env_config("task.filter_time=0.25").task.filter_time == 0.25
+
+
+def test_wrong_values_are_input_errors_as_on_the_command_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="policy=nobody: no such file"):
+        tactile_cube.evaluate("nobody")
+    with pytest.raises(InputError, match=r"task\.filter_time is -1"):
+        tactile_cube.make_env("task.filter_time=-1")

@@ -1,0 +1,69 @@
+"""What `import tactile_cube` gives, and what it costs."""
+
+import inspect
+import subprocess
+import sys
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+import tactile_cube
+
+COMMANDS = ("compare", "diagnose", "evaluate", "export", "identify", "record", "train")
+
+
+def test_importing_the_package_imports_nothing_slow() -> None:
+    code = "import sys, tactile_cube; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not set(loaded) & {"numpy", "torch", "torchrl", "hydra", "omegaconf", "pybullet", "gymnasium", "numba"}
+
+
+@pytest.mark.parametrize("name", tactile_cube.__all__)
+def test_every_name_resolves_is_annotated_and_documented(name: str) -> None:
+    thing = getattr(tactile_cube, name)
+    assert inspect.getdoc(thing)
+    if inspect.isfunction(thing):
+        signature = inspect.signature(thing)
+        assert signature.return_annotation is not inspect.Signature.empty
+        assert all(one.annotation is not inspect.Parameter.empty for one in signature.parameters.values())
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'tranin'"):
+        _ = tactile_cube.tranin  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_functions_stay_functions_after_the_command_of_that_name_was_imported(name: str) -> None:
+    code = (
+        f"import tactile_cube.{name}, sys\nfrom tactile_cube.{name} import main\n"
+        f"import tactile_cube\nassert callable(main) and callable(tactile_cube.{name}), tactile_cube.{name}"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+
+
+def test_type_checkers_are_told_that_the_package_is_annotated() -> None:
+    assert resources.files("tactile_cube").joinpath("py.typed").is_file()
+
+
+def package(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tactile_cube", *words]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_commands_are_words_of_the_package_too(tmp_path: Path) -> None:
+    listed = package("--help", folder=tmp_path)
+    assert listed.returncode == 0
+    assert all(f"  {name} " in listed.stdout for name in COMMANDS)
+    asked = package("compare", "recording=here", "--cfg", "job", folder=tmp_path)
+    assert asked.returncode == 0, asked.stderr
+    assert "recording: here" in asked.stdout
+
+
+def test_a_word_that_is_no_command_ends_with_the_commands_there_are(tmp_path: Path) -> None:
+    run = package("tran", folder=tmp_path)
+    assert run.returncode == 2
+    assert run.stderr.startswith("error: tran: no such command; choose one of benchmark, compare")
+    assert run.stderr.count("\n") == 1
