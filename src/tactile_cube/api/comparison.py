@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, Say, called_job
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ class ComparisonResult:
             write_comparison(self.comparison, folder / "comparison.rrd", markdown(self.comparison))
 
 
+@as_input_errors
 def compare(
     recording: Recording | PathLike, *settings: str, model: ModelFile | PathLike | None = None, say: Say | None = None
 ) -> ComparisonResult:

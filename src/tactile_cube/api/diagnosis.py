@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, Say, called_job
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ class DiagnosisResult:
         write_comparison(after, folder / "diagnosis.rrd", markdown(after))
 
 
+@as_input_errors
 def diagnose(
     recording: Recording | PathLike,
     *settings: str,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.composition import composed
 
 if TYPE_CHECKING:
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from tactile_cube.transforms import EnvConfig
 
 
+@as_input_errors
 def env_config(*settings: str) -> EnvConfig:
     """The environment of the groups of conf/train.yaml, as plain data.
 

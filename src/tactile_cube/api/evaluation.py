@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, Say, called_job
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ class EvaluationResult:
             showcase(self.evaluation, self.variants, folder)
 
 
+@as_input_errors
 def evaluate(
     policy: PathLike | None = None, *settings: str, model: PathLike | None = None, say: Say = print
 ) -> EvaluationResult:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import PathLike
 
 if TYPE_CHECKING:
     from tactile_cube.deployment.network import Network
 
 
+@as_input_errors
 def load_policy(policy: PathLike | None = None) -> Network:
     """A trained policy in numpy: call it with observations `(..., 120)` for actions `(..., 12)` in [-1, 1].
 
@@ -29,6 +31,7 @@ def load_policy(policy: PathLike | None = None) -> Network:
     return read_network(policy_path(None if policy is None else str(policy)))
 
 
+@as_input_errors
 def export(policy: PathLike | None, output: PathLike) -> Path:
     """Write a policy as plain arrays (.npz) or ONNX (.onnx), with the contract it is to be run by beside it.
 

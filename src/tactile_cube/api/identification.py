@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_cube.api.comparison import opened, recording_name
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, Say, called_job
 
 if TYPE_CHECKING:
@@ -86,6 +87,7 @@ class IdentificationResult:
         return identification_report(after, self.data["error"], self.data["joints"], command, path, held)
 
 
+@as_input_errors
 def identify(
     recording: Recording | PathLike, effects: Sequence[str], *settings: str, say: Say | None = None
 ) -> IdentificationResult:

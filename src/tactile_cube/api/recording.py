@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.measurement.recordings.recording import Recording
 
 
+@as_input_errors
 def record(out: PathLike, *settings: str) -> dict[str, Recording]:
     """Write a recording from a source of conf/source, and read it back as every command would.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, called_job
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class TrainingResult:
         return read_curve(self.folder, self.folder.name).columns
 
 
+@as_input_errors
 def train(*settings: str, model: PathLike | None = None, folder: PathLike | None = None) -> TrainingResult:
     """Train a policy, or go on training it: the same call resumes.
 
