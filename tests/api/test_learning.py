@@ -48,5 +48,5 @@ def test_wrong_values_are_input_errors_as_on_the_command_line(tmp_path: Path) ->
         tactile_cube.evaluate("nobody")
     with pytest.raises(InputError, match=r"task\.filter_time is -1"):
         tactile_cube.make_env("task.filter_time=-1")
-    with pytest.raises(InputError, match="agent.gama"):
+    with pytest.raises(InputError, match=r"agent\.gama"):
         tactile_cube.train("agent.gama=1", folder=tmp_path)
