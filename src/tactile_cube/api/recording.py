@@ -44,7 +44,7 @@ def run_recording(job: Job) -> dict[str, Recording]:
 
     out = Path(job.config.out)
     require_free(out)
-    require_settings(job.config.source, job.choices["source"])
+    require_settings(job.config.source, str(job.choices["source"]))
     source = instantiate(OmegaConf.to_container(job.config.source, resolve=True))
     tables = source.recordings(job.config.seed)
     write_whole(out, tables)
