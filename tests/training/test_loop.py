@@ -1,7 +1,5 @@
 """Same seed, same weights: for two runs, for other ways of collecting, and for a run that was interrupted."""
 
-import os
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +9,6 @@ import torch
 from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.errors import InputError
 from tactile_cube.training.build import FROZEN
-from tactile_cube.training.checkpoint import load_checkpoint, save_checkpoint
 from tactile_cube.training.loop import barrier_seed
 from tactile_cube.training.run import Run
 from tests.training.tiny_env import tiny_environment
@@ -87,71 +84,12 @@ def test_fast_agent_resumes_bit_for_bit_too(tmp_path: Path) -> None:
     assert torch.equal(flat("parts"), expected)
 
 
-def test_ctrl_c_stops_at_the_next_barrier_and_the_run_goes_on_as_if_nothing_happened(
-    tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = tiny_run(tmp_path)
-    iterate = run.learner.iterate
-
-    def interrupted_iterate() -> None:
-        if run.learner.iteration == 2:
-            os.kill(os.getpid(), signal.SIGINT)
-        iterate()
-
-    monkeypatch.setattr(run.learner, "iterate", interrupted_iterate)
-    assert run.train() == "interrupted"
-    run.close()
-    assert run.learner.iteration == 4
-    assert torch.equal(finish(tiny_run(tmp_path)), reference)
-
-
-def test_second_ctrl_c_stops_at_once_and_keeps_the_last_checkpoint(
-    tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = tiny_run(tmp_path)
-    iterate = run.learner.iterate
-
-    def interrupted_iterate() -> None:
-        if run.learner.iteration == 6:
-            os.kill(os.getpid(), signal.SIGINT)
-            os.kill(os.getpid(), signal.SIGINT)
-        iterate()
-
-    monkeypatch.setattr(run.learner, "iterate", interrupted_iterate)
-    with pytest.raises(KeyboardInterrupt):
-        run.train()
-    run.close()
-    resumed = tiny_run(tmp_path)
-    assert resumed.learner.iteration == 4
-    assert torch.equal(finish(resumed), reference)
-
-
 def test_changed_settings_are_not_mixed_into_a_run(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path, steps=80))
     with pytest.raises(InputError, match=r"agent\.learning_rate was 0.01, is 0.5"):
         tiny_run(tmp_path, agent_settings={"learning_rate": 0.5})
     fresh = tiny_run(tmp_path, agent_settings={"learning_rate": 0.5}, resume="never")
     assert fresh.learner.steps == 0
-
-
-def test_damaged_checkpoint_is_named(tmp_path: Path) -> None:
-    (tmp_path / "checkpoint.pt").write_bytes(b"not a checkpoint")
-    with pytest.raises(InputError, match=r"checkpoint\.pt: damaged checkpoint"):
-        tiny_run(tmp_path)
-
-
-def test_a_full_disk_leaves_the_checkpoint_before_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    save_checkpoint(tmp_path, {"steps": 1})
-
-    def half(state: Any, path: Path) -> None:
-        path.write_bytes(b"half")
-        raise RuntimeError("unexpected pos 15074304 vs 15074196")
-
-    monkeypatch.setattr(torch, "save", half)
-    with pytest.raises(InputError, match=r"checkpoint\.pt: cannot be written \(unexpected pos .*disk full"):
-        save_checkpoint(tmp_path, {"steps": 2})
-    assert load_checkpoint(tmp_path / "checkpoint.pt") == {"steps": 1}
-    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.pt"]
 
 
 def test_learner_uses_the_replay_of_the_iteration_before(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ SCHEDULE: dict[str, Any] = {
     "random_steps": 40,
     "replay_size": 120,
     "barrier_iterations": 4,
-    "checkpoint_barriers": 1,
     "log_iterations": 1,
 }
 

@@ -21,6 +21,7 @@ from torch import Tensor, nn
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.errors import InputError
+from tactile_cube.whole_file import write_whole
 
 FORMAT = "tactile_cube policy 2"
 WITHOUT_CHECKSUM = "tactile_cube policy 1"
@@ -77,9 +78,7 @@ def save_policy(path: Path, actor: Actor, info: PolicyInfo) -> None:
         tensors[f"actor.{index}.weight"] = layer.weight.detach().cpu().contiguous()
         tensors[f"actor.{index}.bias"] = layer.bias.detach().cpu().contiguous()
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(sealed(tensors, info.model_dump_json()))
-    partial.replace(path)
+    write_whole(path, sealed(tensors, info.model_dump_json()))
 
 
 def sealed(tensors: dict[str, Tensor], info: str) -> bytes:

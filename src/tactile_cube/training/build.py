@@ -1,5 +1,6 @@
 """Put a run together: fresh, or where it was."""
 
+import contextlib
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,7 +13,7 @@ from tactile_cube.agent.interface import Agent
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.errors import InputError
-from tactile_cube.training.checkpoint import FILE, load_checkpoint, require_same_settings
+from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
@@ -59,17 +60,20 @@ def build_run(
             unusable `init_from`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    lock = lock_folder(folder)
-    keep_freed_memory()
-    torch.set_num_threads(training.threads)
-    torch.manual_seed(seed)
-    saved = _saved_state(folder, training, config)
-    agent = make_agent(environment.sizes)
-    training = protected(training)
-    if saved is None and training.init_from:
-        warm_start(agent, Path(training.init_from))
-    collection = build_collection(environment, agent.policy(), collector, training)
-    try:
+    with contextlib.ExitStack() as held:
+        lock = lock_folder(folder)
+        held.callback(lock.release)
+        keep_freed_memory()
+        torch.set_num_threads(training.threads)
+        torch.manual_seed(seed)
+        checkpoints = Checkpoints(folder)
+        saved = _saved_state(checkpoints, training, config)
+        agent = make_agent(environment.sizes)
+        training = protected(training)
+        if saved is None and training.init_from:
+            warm_start(agent, Path(training.init_from))
+        collection = build_collection(environment, agent.policy(), collector, training)
+        held.callback(collection.close)  # worker processes would keep the program from ending
         learner = Learner(
             agent=agent,
             replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
@@ -86,10 +90,8 @@ def build_run(
         ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
         made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
         seconds = expected_seconds(training.steps - learner.steps, agent.settings, collector, training)
-        run = Run(learner, folder, config, Loggers(made), ledger, lock, seconds)
-    except BaseException:
-        collection.close()  # worker processes would keep the program from ending
-        raise
+        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds)
+        held.pop_all()  # it is the run's from here
     run.best_angle = saved["best_angle"] if saved is not None else 0.0
     return run
 
@@ -143,14 +145,13 @@ def _fit(path: Path, load: Callable[[], None]) -> None:
         ) from error
 
 
-def _saved_state(folder: Path, training: TrainingSettings, config: dict[str, Any]) -> dict[str, Any] | None:
-    path = folder / FILE
+def _saved_state(checkpoints: Checkpoints, training: TrainingSettings, config: dict[str, Any]) -> dict[str, Any] | None:
+    folder = checkpoints.folder
     if training.resume == "never":
-        path.unlink(missing_ok=True)
+        checkpoints.clear()
         (folder / LEDGER).unlink(missing_ok=True)
         shutil.rmtree(folder / "tensorboard", ignore_errors=True)
-    if not path.is_file():
-        return None
-    saved = load_checkpoint(path)
-    require_same_settings(path, saved["config"], config)
+    saved = checkpoints.load()
+    if saved is not None:
+        require_same_settings(folder / FILE, saved["config"], config)
     return saved

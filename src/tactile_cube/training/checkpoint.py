@@ -1,13 +1,20 @@
-"""One file that a run goes on from, bit for bit."""
+"""What a run goes on from, bit for bit: the two newest checkpoints, and the replay they share."""
 
+import hashlib
+import io
+import shutil
 from pathlib import Path
 from typing import Any
 
 import torch
 
 from tactile_cube.errors import InputError
+from tactile_cube.training.replay_files import FOLDER, ReplayFiles, Segment
+from tactile_cube.whole_file import sync_folder, write_whole
 
-FILE = "checkpoint.pt"
+FILE, BEFORE = "checkpoint.pt", "checkpoint_before.pt"
+HEAD = b"tactile_cube checkpoint 2, sha256 "
+"""First words of a file; its checksum follows, then a line break, then what torch.save wrote."""
 FREE_KEYS = {
     "training.steps",
     "training.checkpoint_barriers",
@@ -24,28 +31,97 @@ FREE_KEYS = {
 """Settings that may change between the sessions of a run: they do not touch what is learned from an iteration."""
 
 
-def save_checkpoint(folder: Path, state: dict[str, Any]) -> Path:
-    """Write the state so that a crash in between leaves the previous checkpoint whole.
+class Checkpoints:
+    """The checkpoints of a run folder: the newest, the one before in case that is damaged, and the replay's rows.
 
-    Raises:
-        InputError: it cannot be written, for instance because the disk is full.
+    Args:
+        folder: run folder.
     """
-    path = folder / FILE
-    partial = path.with_suffix(".partial")
-    try:
-        torch.save(state, partial)
-    except (OSError, RuntimeError) as error:  # torch raises a RuntimeError of its own where a disk is full
-        partial.unlink(missing_ok=True)
-        raise InputError(
-            f"{path}: cannot be written ({str(error).splitlines()[0]}); is the disk full? The checkpoint before it, if "
-            "there is one, is whole, and the same command goes on from there"
-        ) from error
-    partial.replace(path)
-    return path
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.notice = ""
+        self._replay = ReplayFiles(folder)
+        self._segments: list[Segment] = []
+
+    def save(self, state: dict[str, Any]) -> None:
+        """Write a state whose `["learner"]["replay"]` is that of a `Replay`; a crash leaves the one before.
+
+        Raises:
+            InputError: it cannot be written, for instance because the disk is full.
+        """
+        path = self.folder / FILE
+        try:
+            replay = dict(state["learner"]["replay"])
+            rows = replay.pop("rows")
+            segments = self._replay.append(rows, replay["written"], replay["capacity"])
+            replay |= {"segments": segments, "width": rows.shape[1]}
+            self._write(path, state | {"learner": state["learner"] | {"replay": replay}})
+            self._replay.delete_all_but([*self._segments, *segments])
+        except OSError as error:
+            raise InputError(
+                f"{path}: cannot be written ({error.strerror or error}); is the disk full? The checkpoint before it is "
+                "whole, and the same command goes on from there"
+            ) from error
+        self._segments = segments
+
+    def _write(self, path: Path, state: dict[str, Any]) -> None:
+        stream = io.BytesIO()
+        torch.save(state, stream)
+        content = stream.getbuffer()
+        aside = self.folder / "checkpoint_next.pt"
+        write_whole(aside, HEAD, hashlib.sha256(content).hexdigest().encode(), b"\n", content)
+        if path.exists():
+            path.replace(self.folder / BEFORE)
+        aside.replace(path)
+        sync_folder(self.folder)
+
+    def load(self) -> dict[str, Any] | None:
+        """The newest whole checkpoint, or None where there never was one; `notice` says if it is not the newest.
+
+        Raises:
+            InputError: all that there are are damaged.
+        """
+        self.notice = ""
+        refusals: list[InputError] = []
+        for path in (self.folder / FILE, self.folder / BEFORE):
+            try:
+                state = self._load(path) if path.is_file() else None
+            except InputError as error:
+                refusals.append(error)
+                continue
+            if state is not None:
+                if path.name == BEFORE:
+                    self._go_back(path, refusals)
+                return state
+        if refusals:
+            raise InputError(f"{refusals[0]}; training.resume=never starts over")
+        return None
+
+    def _load(self, path: Path) -> dict[str, Any]:
+        state = load_checkpoint(path)
+        replay = state["learner"]["replay"]
+        if "segments" in replay:
+            segments = [(int(first), int(count), str(digest)) for first, count, digest in replay["segments"]]
+            replay["rows"] = self._replay.read(segments, replay["written"], replay["capacity"], replay["width"])
+            self._segments = segments
+        return state
+
+    def _go_back(self, path: Path, refusals: list[InputError]) -> None:
+        newest = self.folder / FILE
+        reason = refusals[0] if refusals else f"{newest}: was not finished"
+        self.notice = f"{reason}; the run goes on from the checkpoint before it"
+        path.replace(newest)  # else the next checkpoint would replace the whole one and keep the damaged one
+
+    def clear(self) -> None:
+        """Delete them all, to start over."""
+        for name in (FILE, BEFORE):
+            (self.folder / name).unlink(missing_ok=True)
+        shutil.rmtree(self.folder / FOLDER, ignore_errors=True)
 
 
 def load_checkpoint(path: Path) -> dict[str, Any]:
-    """Read a checkpoint.
+    """Read one file, weights only: nothing in it is run. Its replay's rows lie in files of their own.
 
     Raises:
         InputError: the file is missing or damaged.
@@ -53,10 +129,16 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path}: no such checkpoint")
     try:
-        state: dict[str, Any] = torch.load(path, weights_only=True)
+        content = memoryview(path.read_bytes())
+        head = bytes(content[: len(HEAD) + 65])
+        if head.startswith(HEAD):  # without it, from before there were checksums
+            content = content[len(head) :]
+            if hashlib.sha256(content).hexdigest().encode() != head[len(HEAD) : -1]:
+                raise ValueError("its checksum is wrong")
+        state: dict[str, Any] = torch.load(io.BytesIO(content), weights_only=True)
     except Exception as error:  # torch raises half a dozen kinds for damaged files
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: damaged checkpoint ({reason}); training.resume=never starts over") from error
+        raise InputError(f"{path}: damaged checkpoint ({reason})") from error
     return state
 
 

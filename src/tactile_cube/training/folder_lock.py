@@ -20,7 +20,7 @@ def lock_folder(folder: Path) -> BaseFileLock:
         lock.acquire(blocking=False)
     except Timeout:
         raise InputError(
-            f"{folder}: another process trains in this folder; wait for its end (after Ctrl-C it goes on to the next "
-            "point where it can be saved), or give this run another name=... or seed=..."
+            f"{folder}: another process trains in this folder; wait for its end (seconds after Ctrl-C), or "
+            "give this run another name=... or seed=..."
         ) from None
     return lock

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from tactile_cube.whole_file import write_whole
+
 LEDGER = "ledger.json"
 
 
@@ -61,7 +63,8 @@ class Ledger:
         """Put the costs into the run folder, in hours as in the paper."""
         costs = self.costs()
         hours = {f"{name}_hours": round(value / 3600, 4) for name, value in asdict(costs).items()}
-        self.path.write_text(json.dumps({"steps": steps, "seconds": asdict(costs), **hours}, indent=2) + "\n")
+        text = json.dumps({"steps": steps, "seconds": asdict(costs), **hours}, indent=2) + "\n"
+        write_whole(self.path, text.encode())
 
 
 def _read(path: Path) -> Costs:

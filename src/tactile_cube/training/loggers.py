@@ -1,11 +1,13 @@
 """Where metrics go: CSV, TensorBoard, Weights & Biases."""
 
 import csv
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 from tactile_cube.errors import InputError
+from tactile_cube.whole_file import write_whole
 
 
 class MetricLogger(Protocol):
@@ -23,25 +25,21 @@ class CsvLogger:
 
     def __init__(self, folder: Path, resumed_at: int):
         self.path = folder / "metrics.csv"
-        rows = _read_rows(self.path) if resumed_at else []
-        kept = [row for row in rows if float(row["steps"]) <= resumed_at]
-        self._columns: list[str] = list(kept[0]) if kept else []
-        self._file = self.path.open("w", newline="")
-        if kept:
-            self._write_header()
-            self._writer.writerows(kept)
-
-    def _write_header(self) -> None:
-        self._writer = csv.DictWriter(self._file, self._columns, extrasaction="ignore", restval="")
-        self._writer.writeheader()
+        rows = _whole_rows(self.path) if resumed_at else []
+        kept = rows[:1] + [row for row in rows[1:] if float(row[0]) <= resumed_at]
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows(kept if len(kept) > 1 else [])
+        write_whole(self.path, text.getvalue().encode())
+        self._columns: list[str] = kept[0] if len(kept) > 1 else []
+        self._file = self.path.open("a", newline="")
 
     def log(self, steps: int, metrics: Mapping[str, float]) -> None:
         """Write one row; the first row fixes the columns."""
         row = {"steps": steps, **{key: f"{value:.6g}" for key, value in metrics.items()}}
         if not self._columns:
             self._columns = list(row)
-            self._write_header()
-        self._writer.writerow(row)
+            csv.writer(self._file).writerow(self._columns)
+        csv.writer(self._file).writerow([row.get(column, "") for column in self._columns])
         self._file.flush()
 
     def close(self) -> None:
@@ -104,8 +102,10 @@ class Loggers:
             logger.close()
 
 
-def _read_rows(path: Path) -> list[dict[str, str]]:
+def _whole_rows(path: Path) -> list[list[str]]:
+    """Header and rows; without a last row that a crash cut off."""
     if not path.is_file():
         return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+    lines = path.read_text().splitlines(keepends=True)
+    rows = list(csv.reader(line for line in lines if line.endswith("\n")))
+    return [row for row in rows if len(row) == len(rows[0])]

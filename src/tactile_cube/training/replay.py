@@ -64,7 +64,12 @@ class Replay:
 
     def state_dict(self) -> dict[str, Any]:
         """The filled part of the ring, where to write next, and the generator."""
-        return {"rows": self.rows[: len(self)], "written": self.written, "generator": self.generator.get_state()}
+        return {
+            "rows": self.rows[: len(self)],
+            "written": self.written,
+            "capacity": self.capacity,
+            "generator": self.generator.get_state(),
+        }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Inverse of `state_dict`, for a ring of the same capacity and widths."""

@@ -1,19 +1,16 @@
 """A run: its folder, its sessions, when it saves and when it stops."""
 
 import contextlib
-import shutil
-import signal
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from filelock import BaseFileLock
 
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
-from tactile_cube.training.checkpoint import save_checkpoint
+from tactile_cube.training.checkpoint import Checkpoints
+from tactile_cube.training.interruption import Interruption
 from tactile_cube.training.ledger import Ledger
 from tactile_cube.training.loggers import Loggers
 from tactile_cube.training.loop import Learner
@@ -34,6 +31,7 @@ class Run:
         loggers: where metrics go.
         ledger: what it costs.
         lock: keeps other processes out of the folder.
+        checkpoints: where its state goes.
         expected_seconds: on the clock until all steps are done, on two idle cores.
     """
 
@@ -43,6 +41,7 @@ class Run:
     loggers: Loggers
     ledger: Ledger
     lock: BaseFileLock
+    checkpoints: Checkpoints
     expected_seconds: float
 
     def __post_init__(self) -> None:
@@ -50,20 +49,27 @@ class Run:
         self.line = ProgressLine(self.learner.settings.steps, self.learner.steps, self.learner.updates)
         self.best_angle = 0.0
         self.commit = current_commit()
-        self._interrupted = False
-        self._kept_at = self.learner.steps
-        self._round_seconds = 0.0
+        self._saved_at = self.learner.steps
+        self._interruption = Interruption(self._seconds_to_barrier, self.line.say)
+        self._iteration_ended = time.perf_counter()
+        self._iteration_seconds: float | None = None
 
     def train(self) -> str:
         """Learn until done, stopped or interrupted; gives the reason in words."""
         reason = self._reason_to_stop()
-        with self._ctrl_c():
-            while not reason:
-                began = time.perf_counter()
-                self.learner.run_to_barrier(self._after_iteration)
-                self._round_seconds = time.perf_counter() - began
-                reason = self._reason_to_stop()
-                self._save(everything=bool(reason) or self._checkpoint_due())
+        try:
+            with self._interruption:
+                if not reason and not self.learner.iteration:
+                    self._save()  # from here it goes on when something happens before the first barrier
+                while not reason:
+                    self._iteration_ended = time.perf_counter()
+                    self.learner.run_to_barrier(self._after_iteration)
+                    reason = self._reason_to_stop()
+                    with self._interruption.not_by_the_clock():
+                        self._save()
+                    reason = reason or (INTERRUPTED if self._interruption.asked else "")
+        except KeyboardInterrupt:
+            return INTERRUPTED
         return reason
 
     def announce(self) -> None:
@@ -72,6 +78,8 @@ class Run:
         start = f"goes on at {learner.steps} steps" if learner.steps else "starts"
         expected = clock(self.expected_seconds)
         self.line.say(f"{self.folder}: {start}, {settings.steps} steps in all, about {expected} on two idle cores")
+        if self.checkpoints.notice:
+            self.line.say(self.checkpoints.notice)
         if not learner.steps and settings.init_from:
             waits = f"; critics begin anew, the actor waits for {settings.actor_frozen} updates"
             self.line.say(f"networks of {settings.init_from}{waits if settings.actor_frozen else ''}")
@@ -82,23 +90,32 @@ class Run:
         """Say how it ended and where the result lies."""
         costs = self.ledger.costs()
         cpu_hours = (costs.simulating + costs.learning) / 3600
-        angle = self.learner.episodes.mean_angle
-        self.line.say(
-            f"{reason}: {self.learner.steps} steps, mean final angle {angle:.2f} rad, {cpu_hours:.2f} CPU-hours"
-        )
-        if self._interrupted:
-            self.line.say("the same command goes on from here")
+        steps, angle = self.learner.steps, self.learner.episodes.mean_angle
+        self.line.say(f"{reason}: {steps} steps, mean final angle {angle:.2f} rad, {cpu_hours:.2f} CPU-hours")
+        if reason == INTERRUPTED:
+            again = f"; the {steps - self._saved_at} steps since then are done again" if steps > self._saved_at else ""
+            self.line.say(f"saved at {self._saved_at} steps: the same command goes on from there{again}")
         self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}")
 
     def close(self) -> None:
         """End the workers and write what is still in memory."""
-        self.ledger.write(self.learner.steps)  # first: the workers take their CPU time with them
-        self.learner.collection.close()
-        self.loggers.close()
-        self.lock.release()
+        with contextlib.ExitStack() as stack:  # in reverse, each even if the one before fails
+            stack.callback(self.lock.release)
+            stack.callback(self.loggers.close)
+            stack.callback(self.learner.collection.close)
+            self.ledger.write(self._saved_at)  # first: the workers take their CPU time with them
+
+    def _seconds_to_barrier(self) -> float | None:
+        if self._iteration_seconds is None:
+            return None
+        settings = self.learner.settings
+        iterations = settings.barrier_iterations - self.learner.iteration % settings.barrier_iterations
+        return max(iterations * self._iteration_seconds - (time.perf_counter() - self._iteration_ended), 0.0)
 
     def _after_iteration(self) -> None:
         learner = self.learner
+        now = time.perf_counter()
+        self._iteration_ended, self._iteration_seconds = now, now - self._iteration_ended
         summary = learner.episodes.summary()
         self.line.show(learner.steps, learner.updates, summary, learner.conditions)
         if learner.iteration % learner.settings.log_iterations == 0:
@@ -113,8 +130,6 @@ class Run:
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
         angle = self.learner.episodes.mean_angle
-        if self._interrupted:
-            return INTERRUPTED
         if steps >= settings.steps:
             return f"all {settings.steps} steps done"
         if settings.stop_when_angle_above is not None and angle > settings.stop_when_angle_above:
@@ -124,32 +139,20 @@ class Run:
             return f"no regrasping (mean final angle never above {settings.regrasp_angle:g} rad) by {deadline} steps"
         return ""
 
-    def _checkpoint_due(self) -> bool:
-        settings = self.learner.settings
-        barriers = self.learner.iteration // settings.barrier_iterations
-        return barriers % settings.checkpoint_barriers == 0
-
-    def _save(self, everything: bool) -> None:
-        """Write the policy if it is the best so far; with `everything`, the latest policy and a checkpoint too."""
-        angle = self.learner.episodes.mean_angle
-        full_window = len(self.learner.episodes.angles) == self.learner.episodes.angles.maxlen
-        if full_window and angle > self.best_angle:
-            self.best_angle = angle
+    def _save(self) -> None:
+        """Write the latest policy, the best so far, and a checkpoint."""
+        learner = self.learner
+        full_window = len(learner.episodes.angles) == learner.episodes.angles.maxlen
+        if full_window and learner.episodes.mean_angle > self.best_angle:
+            self.best_angle = learner.episodes.mean_angle
             self._save_policy(BEST_POLICY)
-        if not everything:
-            return
         self._save_policy(POLICY)
-        self._keep_policy()
-        state = {"learner": self.learner.state_dict(), "best_angle": self.best_angle, "config": self.config}
-        save_checkpoint(self.folder, state)
-        self.ledger.write(self.learner.steps)
-
-    def _keep_policy(self) -> None:
-        """Keep a policy of its own for each `policy_every` steps."""
-        every = self.learner.settings.policy_every
-        if every and self.learner.steps // every > self._kept_at // every:
-            self._kept_at = self.learner.steps
-            shutil.copy(self.folder / POLICY, self.folder / f"policy_{self._kept_at}.safetensors")
+        every = learner.settings.policy_every
+        if every and learner.steps // every > self._saved_at // every:
+            self._save_policy(f"policy_{learner.steps}.safetensors")
+        self.checkpoints.save({"learner": learner.state_dict(), "best_angle": self.best_angle, "config": self.config})
+        self._saved_at = learner.steps
+        self.ledger.write(learner.steps)
 
     def _save_policy(self, name: str) -> None:
         learner = self.learner
@@ -164,21 +167,3 @@ class Run:
             config=self.config,
         )
         save_policy(self.folder / name, actor, info)
-
-    @contextlib.contextmanager
-    def _ctrl_c(self) -> Iterator[None]:
-        """The first Ctrl-C ends the run at the next barrier, the second at once."""
-
-        def interrupt(number: int, frame: FrameType | None) -> None:
-            if self._interrupted:
-                raise KeyboardInterrupt
-            self._interrupted = True
-            wait = f" (at most {self._round_seconds:.0f} s)" if self._round_seconds else ""
-            self.line.say(f"Ctrl-C: going on to the next point where the run can be saved{wait}; again to stop now")
-
-        before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)

@@ -66,8 +66,7 @@ class TrainingSettings(BaseModel):
         random_steps: uniform random actions before.
         replay_size: transitions kept.
         barrier_iterations: iterations between two resets of all worlds. A run can be saved and resumed bit for bit
-            there and nowhere else, since the state of a simulator cannot be saved.
-        checkpoint_barriers: barriers from one checkpoint to the next.
+            there and nowhere else, since the state of a simulator cannot be saved; and it is saved at each of them.
         policy_every: keep a separate policy file each so many steps; 0 keeps only latest and best.
         log_iterations: iterations from one row of metrics to the next.
         resume: "auto" goes on from the newest checkpoint of this run folder; "never" starts over.
@@ -92,7 +91,6 @@ class TrainingSettings(BaseModel):
     random_steps: NonNegativeInt = 10_000
     replay_size: PositiveInt = 150_000
     barrier_iterations: PositiveInt = 25
-    checkpoint_barriers: PositiveInt = 4
     policy_every: NonNegativeInt = 0
     log_iterations: PositiveInt = 5
     resume: Literal["auto", "never"] = "auto"

@@ -1,0 +1,91 @@
+"""The replay on disk: a file for the rows that each checkpoint adds, none of them ever rewritten."""
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from tactile_cube.errors import InputError
+from tactile_cube.whole_file import write_whole
+
+FOLDER = "replay"
+
+Segment = tuple[int, int, str]
+"""Number of the first row, number of rows, SHA-256 of their float32 values."""
+
+
+class ReplayFiles:
+    """Rows by their number in order of arrival; row n lies at n % capacity of the ring.
+
+    Args:
+        folder: run folder.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = folder / FOLDER
+        self._segments: list[Segment] = []
+
+    def append(self, rows: Tensor, written: int, capacity: int) -> list[Segment]:
+        """Write the rows that are not on disk yet; gives the segments that hold the ring.
+
+        Args:
+            rows: the filled part of the ring, (min(written, capacity), width).
+            written: rows that have arrived so far.
+            capacity: of the ring.
+
+        Raises:
+            OSError: they cannot be written.
+        """
+        oldest = max(written - capacity, 0)
+        kept = [segment for segment in self._segments if _end(segment) > oldest]
+        first = max(_end(kept[-1]) if kept else oldest, oldest)
+        if first < written:
+            block = rows[torch.arange(first, written) % capacity].numpy().astype("<f4", copy=False).tobytes()
+            self.folder.mkdir(exist_ok=True)
+            write_whole(self._path(first), block)
+            kept.append((first, written - first, hashlib.sha256(block).hexdigest()))
+        self._segments = kept
+        return kept
+
+    def read(self, segments: Sequence[Segment], written: int, capacity: int, width: int) -> Tensor:
+        """The filled part of the ring, (min(written, capacity), width); later rows are appended to these segments.
+
+        Raises:
+            InputError: a segment is missing or damaged.
+        """
+        ring = torch.empty(min(written, capacity), width)
+        for segment in segments:
+            block = torch.from_numpy(self._read(segment).reshape(-1, width))
+            number = torch.arange(segment[0], _end(segment))
+            inside = number >= written - capacity
+            ring[number[inside] % capacity] = block[inside]
+        self._segments = [(first, count, digest) for first, count, digest in segments]
+        return ring
+
+    def delete_all_but(self, segments: Iterable[Segment]) -> None:
+        """Delete what no checkpoint refers to."""
+        wanted = {self._path(first) for first, _, _ in segments}
+        for path in self.folder.glob("*"):
+            if path not in wanted:
+                path.unlink(missing_ok=True)
+
+    def _path(self, first: int) -> Path:
+        return self.folder / f"{first:012d}.f32"
+
+    def _read(self, segment: Segment) -> Any:
+        path = self._path(segment[0])
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+        if hashlib.sha256(content).hexdigest() != segment[2]:
+            raise InputError(f"{path}: its checksum is wrong")
+        return np.frombuffer(bytearray(content), "<f4")
+
+
+def _end(segment: Segment) -> int:
+    return segment[0] + segment[1]

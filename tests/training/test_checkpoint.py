@@ -1,0 +1,132 @@
+"""Checkpoints are whole or not there, cost what is new, and the one before serves when the newest is damaged."""
+
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from tactile_cube.errors import InputError
+from tactile_cube.training import checkpoint, replay_files
+from tactile_cube.training.checkpoint import BEFORE, FILE, load_checkpoint
+from tests.training.test_loop import finish
+from tests.training.tiny_run import tiny_run
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> torch.Tensor:
+    return finish(tiny_run(tmp_path_factory.mktemp("reference")))
+
+
+def test_two_checkpoints_and_no_more_rows_than_they_need_are_kept(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path))
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {FILE, BEFORE} <= names
+    assert not any("partial" in name or "next" in name for name in names)
+    rows = sorted(int(path.stem) for path in (tmp_path / "replay").iterdir())
+    assert rows == [0, 80], "the ring of 120 rows, and what the checkpoint before needs of the rows that left it"
+
+
+def test_a_checkpoint_writes_only_the_rows_that_are_new(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path, steps=80))
+    before = (tmp_path / "replay/000000000000.f32").stat()
+    finish(tiny_run(tmp_path))
+    after = (tmp_path / "replay/000000000000.f32").stat()
+    assert (before.st_ino, before.st_mtime_ns) == (after.st_ino, after.st_mtime_ns)
+
+
+def test_the_replay_comes_back_row_for_row_after_the_ring_went_round(tmp_path: Path) -> None:
+    whole = tiny_run(tmp_path, steps=240)
+    finish(whole)
+    resumed = tiny_run(tmp_path, steps=240)
+    assert resumed.learner.replay.written > resumed.learner.replay.capacity
+    assert torch.equal(resumed.learner.replay.rows, whole.learner.replay.rows)
+
+
+@pytest.mark.parametrize("victim", [FILE, "replay/000000000080.f32"])
+@pytest.mark.parametrize("damage", ["flip", "cut", "gone"])
+def test_damage_to_the_newest_is_said_and_the_one_before_is_used(
+    tmp_path: Path, reference: torch.Tensor, victim: str, damage: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    finish(tiny_run(tmp_path))
+    path = tmp_path / victim
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    {
+        "flip": lambda: path.write_bytes(content),
+        "cut": lambda: path.write_bytes(content[: len(content) // 2]),
+        "gone": path.unlink,
+    }[damage]()
+    resumed = tiny_run(tmp_path)
+    assert resumed.learner.steps == 80
+    resumed.announce()
+    said = capsys.readouterr().out
+    assert "the run goes on from the checkpoint before it" in said
+    assert victim in said
+    assert torch.equal(finish(resumed), reference)
+
+
+def test_when_both_are_damaged_the_file_and_the_remedy_are_named(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path))
+    for name in (FILE, BEFORE):
+        (tmp_path / name).write_bytes(b"not a checkpoint")
+    with pytest.raises(InputError, match=r"checkpoint\.pt: damaged checkpoint .*training\.resume=never starts over"):
+        tiny_run(tmp_path)
+    assert tiny_run(tmp_path, resume="never").learner.steps == 0
+
+
+@pytest.mark.parametrize("failing", ["rows", "state", "rename"])
+def test_a_full_disk_leaves_the_checkpoint_before_whole(
+    tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    finish(tiny_run(tmp_path, steps=80))
+    run = tiny_run(tmp_path)
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    where = {
+        "rows": (replay_files, "write_whole"),
+        "state": (checkpoint, "write_whole"),
+        "rename": (checkpoint, "sync_folder"),
+    }
+    monkeypatch.setattr(*where[failing], full)
+    with pytest.raises(InputError, match=r"checkpoint\.pt: cannot be written \(No space left.*disk full"):
+        run.train()
+    run.close()
+    monkeypatch.undo()
+    resumed = tiny_run(tmp_path)
+    assert resumed.learner.steps >= 80
+    assert torch.equal(finish(resumed), reference)
+
+
+def test_a_crash_between_two_renames_goes_on_from_the_one_before(tmp_path: Path, reference: torch.Tensor) -> None:
+    finish(tiny_run(tmp_path, steps=80))
+    (tmp_path / FILE).replace(tmp_path / BEFORE)
+    resumed = tiny_run(tmp_path)
+    assert resumed.learner.steps == 80
+    assert torch.equal(finish(resumed), reference)
+
+
+def test_a_checkpoint_runs_no_code(tmp_path: Path) -> None:
+    class Harmful:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return os.mkdir, (str(tmp_path / "harm"),)
+
+    torch.save({"learner": Harmful()}, tmp_path / FILE)
+    with pytest.raises(InputError, match="damaged checkpoint"):
+        load_checkpoint(tmp_path / FILE)
+    assert not (tmp_path / "harm").exists()
+
+
+def test_a_checkpoint_without_checksum_from_before_there_were_any_is_read(tmp_path: Path) -> None:
+    run = tiny_run(tmp_path / "a", steps=80)
+    finish(run)
+    (tmp_path / "b").mkdir()
+    state = {"learner": run.learner.state_dict(), "best_angle": 0.0, "config": run.config}
+    torch.save(state, tmp_path / "b" / FILE)
+    resumed = tiny_run(tmp_path / "b", steps=80)
+    assert resumed.learner.steps == 80
+    assert torch.equal(resumed.learner.replay.rows, run.learner.replay.rows)
