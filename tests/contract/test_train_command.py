@@ -120,6 +120,7 @@ def test_wrong_value_ends_with_one_line_and_exit_code_2(tmp_path: Path) -> None:
 
 def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
     short = ["+experiment=smoke", "collector=single", "collector.worlds=4", "training.learning_starts=100"]
+    short += ["agent.precision=bf16"]
     first = train(*short, "training.steps=200", folder=tmp_path)
     assert first.returncode == 0, first.stderr
     folder = tmp_path / "outputs/train/smoke-seed0"
