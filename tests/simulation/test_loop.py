@@ -6,9 +6,8 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, grasp_angles
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, native_library
 from tactile_cube.simulation import loop as loop_module
-from tactile_cube.simulation import native_library
 from tactile_cube.simulation.native_library import find_compiler
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")

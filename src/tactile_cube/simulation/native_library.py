@@ -20,7 +20,7 @@ from tactile_cube.errors import InputError
 _FOLDER = Path(__file__).parent / "native"
 BULLET_STEPS, MUJOCO_STEPS = "physics_steps", "mujoco_steps"
 STATUS_OFFSETS = {"3.2.7": 0x800310}
-"""How far before its copy PyBullet's status buffer stands, by version [bytes]: a stream of 8 MiB and what follows it."""
+"""How far before its copy PyBullet's status buffer stands, by version [bytes]: a stream of 8 MiB and what follows."""
 _FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
 
 
