@@ -1,6 +1,7 @@
 """The pages and recordings that compare, diagnose and identify write."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -11,14 +12,17 @@ from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFi
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison, compare
+from tactile_cube.measurement.comparing.error import ErrorSummary
+from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.units import of_joint
 from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
 from tactile_cube.visualization.comparison_report import comparison_report
 from tactile_cube.visualization.comparison_summary import markdown, summary
 from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
 from tactile_cube.visualization.diagnosis_sections import staircase_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report
-from tests.measurement.small_rig import write
+from tests.measurement.small_rig import URDF, write
 
 VOID = {"meta", "br", "line", "rect", "circle", "path", "input", "link"}
 
@@ -72,6 +76,67 @@ def test_the_comparison_page_says_what_how_well_where_and_what_next(comparison: 
     assert "command_delay@a" in text
     assert "tactile_cube.diagnose recording=" in text
     assert all(sentence in text for sentence in comparison.sentences)
+
+
+def test_after_a_complete_success_what_is_left_is_called_noise(comparison: Comparison, tmp_path: Path) -> None:
+    alike = replace(
+        comparison,
+        errors=ErrorSummary(comparison.floor.overall, dict(comparison.floor.joints)),
+        whiteness=[replace(one, p_value=1e-9) for one in comparison.whiteness],
+    )
+    text = page(comparison_report(alike, "cmd", None), tmp_path / "report.html")
+    section = text[text.index("Yes, as far as this recording can tell") :]
+    assert "at the noise floor" in section
+    assert "< 0.001" not in section
+    worse = page(comparison_report(comparison, "cmd", None), tmp_path / "worse.html")
+    assert "times: something is left to be found" in worse
+    assert "by chance (p)" in worse
+
+
+def test_compare_and_diagnose_state_one_floor(comparison: Comparison) -> None:
+    assert comparison.floor.step_size, "compare looks at the time step too"
+    assert comparison.floor.overall == noise_floor(comparison.recording).overall
+    lines = summary(comparison).splitlines()
+    assert "noise floor: scatter of 2 repeats" in lines
+    assert any(line.startswith("beside it: sensor noise 0.") for line in lines)
+    assert any(line.startswith("beside it: the simulator's own time step") for line in lines)
+
+
+def test_the_diagnosis_draws_traces_before_and_after(comparison: Comparison, tmp_path: Path) -> None:
+    before = compare(comparison.recording, floor=comparison.floor)
+    text = page(diagnosis_report(DIAGNOSIS, before, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
+    assert "Measured and simulated, before and after what was found" in text
+    for name in ("simulated before", "simulated after", "error before", "error after"):
+        assert name in text
+
+
+def test_a_sliding_joint_is_shown_in_millimetres_and_newtons(tmp_path: Path) -> None:
+    urdf = URDF.replace('name="a" type="revolute"', 'name="a" type="prismatic"')
+    recording = read_recording(write(tmp_path / "r", urdf=urdf))
+    assert recording.units == {"a": "m", "b": "rad"}
+    kd = {joint: Estimate(value=0.2, low=0.1, high=0.3, unit="N m s/rad") for joint in "ab"}
+    friction = EffectEstimate(
+        effect="coulomb_friction@a", parameters={"friction": Estimate(value=0.1, low=0.05, high=0.2, unit="N m")}
+    )
+    one = compare(recording, ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[friction]))
+    text = page(identification_report(one, DIAGNOSIS["error"], {}, "cmd", "m.yaml"), tmp_path / "i.html")
+    assert "kd a 0.2 0.1 .. 0.3 0.2 N s/m" in text
+    assert "kd b 0.2 0.1 .. 0.3 0.2 N m s/rad" in text
+    assert "0.1 N [0.05, 0.2]" in text
+    assert "a [mm]" in text
+    assert "b [mrad]" in text
+    assert "mrad or mm" in summary(one)
+    assert [" mm" in line for line in sorted(one.sentences)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("turning", "sliding"),
+    [("N m s/rad", "N s/m"), ("N m/rad^3", "N/m^3"), ("kg m^2", "kg"), ("rad/s per N m", "m/s per N"), ("s", "s"),
+     ("position of b [rad]", "position of b [m]"), ("torque of gradient [N m]", "torque of gradient [N]")],
+)  # fmt: skip
+def test_units_of_a_sliding_joint(turning: str, sliding: str) -> None:
+    assert of_joint(turning, "m") == sliding
+    assert of_joint(turning, "rad") == turning
 
 
 DIAGNOSIS = {
@@ -142,7 +207,7 @@ def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Compariso
     assert "not explained: b; a black box" in text
     assert "93 %" in text
     assert "helps, but is not the whole of it: command_delay at a" in text
-    assert "a guess: no repeats" in text
+    assert "sensor noise, a guess: no repeats" in text
     assert "my_rig.MyEffect@b" in text
 
 

@@ -180,7 +180,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     moving = without_touches(recording)
     found = diagnose_free(moving, effects, config.engine, config.step, config.seed, say, known)
     model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
-    data = as_json(found, None, job.seconds)
+    data = as_json(found, None, job.seconds) | {"units": recording.units}
     if known is not None:
         model = model.model_copy(update={"effects": model.with_effects(known.object_effects)})
         data["known_effects"] += [one.effect for one in known.object_effects]

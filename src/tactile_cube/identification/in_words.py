@@ -7,6 +7,7 @@ from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import Experiment
+from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint
 
 OPENING = {
     "adequate": "Nothing is missing at this noise: with its constants refitted the model explains the recording.",
@@ -21,42 +22,45 @@ HELD = "Nothing is missing that these grasps show: the world follows them about 
 
 def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     """A few lines for the terminal, from the content of diagnosis.json."""
+    units = result.get("units", {})
     grasps = result.get("noise_floor_source") == "contact"
     unproven = result.get("unproven_effects")
     opening = UNPROVEN if unproven else OPENING[result["verdict"]]
     lines = [HELD if grasps and result["verdict"] == "adequate" else opening]
-    lines += [_effect(entry) for entry in result["effects"]]
+    lines += [_effect(entry, units) for entry in result["effects"]]
     if known := result.get("known_effects"):
         lines.append(f"  beside what was known: {', '.join(known)}")
     if partial := result.get("partial_effects"):
         lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
-        lines += [_effect(entry) for entry in partial]
+        lines += [_effect(entry, units) for entry in partial]
     lines += [f"  {line}" for line in unproven_effects(unproven)] if unproven else []
     lines += [_unexplained(entry) for entry in result["unexplained"]]
-    lines += [f"  {common_offset(entry)}" for entry in result.get("common_offsets", [])]
-    error = result["error"]
-    refitted = f"{_mrad(error['refitted'])} with constants refitted, " if not grasps else ""
+    lines += [f"  {common_offset(entry, units)}" for entry in result.get("common_offsets", [])]
+    error, unit = result["error"], common_unit(units.values())
+    refitted = f"{milli(error['refitted'], unit)} with constants refitted, " if not grasps else ""
     lines.append(
-        f"Held-out error: {_mrad(error['nominal'])} as stated, {refitted}"
-        f"{_mrad(error['with_effects'])} with the recommended model; noise floor {_mrad(error['noise_floor'])}."
+        f"Held-out error: {milli(error['nominal'], unit)} as stated, {refitted}"
+        f"{milli(error['with_effects'], unit)} with the recommended model; "
+        f"noise floor {milli(error['noise_floor'], unit)}."
     )
     if experiment is not None:
-        lines.append(f"To decide, play {result['next_experiment']}: {expected(experiment)}")
+        lines.append(f"To decide, play {result['next_experiment']}: {expected(experiment, units)}")
     return "\n".join(lines)
 
 
-def expected(experiment: Experiment) -> str:
+def expected(experiment: Experiment, units: Mapping[str, str]) -> str:
     """What the next experiment is expected to show."""
     names = ", ".join(experiment.predictions)
     return (
         f"{experiment.name} of {experiment.time[-1]:.0f} s; at {experiment.joint} any two of {names} will differ by at "
-        f"least {_mrad(experiment.difference)}."
+        f"least {milli(experiment.difference, units.get(experiment.joint, TURNS))}."
     )
 
 
-def _effect(entry: dict[str, Any]) -> str:
+def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
+    own = common_unit(units[joint] for joint in entry["joints"] if joint in units)
     values = ", ".join(
-        f"{name} {one['value']:.4g} [{one['low']:.4g}, {one['high']:.4g}] {one['unit']}"
+        f"{name} {one['value']:.4g} [{one['low']:.4g}, {one['high']:.4g}] {of_joint(one['unit'], own)}"
         for name, one in entry["parameters"].items()
     )
     return f"  {entry['name']} at {', '.join(entry['joints'])}: {values}"
@@ -83,24 +87,25 @@ def unproven_effects(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def common_offset(entry: Mapping[str, Any]) -> str:
+def common_offset(entry: Mapping[str, Any], units: Mapping[str, str]) -> str:
     """A joint offset that all initialisations have, and what would tell where it comes from."""
+    offset = milli(entry["offset"], units.get(entry["joint"], TURNS))
     return (
-        f"{entry['joint']} reads about {_mrad(entry['offset'])} too much in each of {entry['initialisations']} "
+        f"{entry['joint']} reads about {offset} too much in each of {entry['initialisations']} "
         "initialisations: by chance, or its encoder's zero is wrong (position_offset); more initialisations will tell."
     )
 
 
-def _mrad(value: float) -> str:
-    return f"{1e3 * value:.3g} mrad"
-
-
-def staircase(stages: Mapping[str, float], model: ModelFile) -> str:
+def staircase(stages: Mapping[str, float], model: ModelFile, units: Mapping[str, str]) -> str:
     """How the held-out error fell, and the values of the effects that were fitted."""
+    unit = common_unit(units.values())
     lines = ["Held-out error, free-running simulation:"]
-    lines += [f"  {stage.replace('_', ' '):<40} {_mrad(value)}" for stage, value in stages.items()]
+    lines += [f"  {stage.replace('_', ' '):<40} {milli(value, unit)}" for stage, value in stages.items()]
     for effect in model.effects:
         fitted = {name: one for name, one in effect.parameters.items() if one.high > one.low}
-        values = ", ".join(f"{n} {e.value:.4g} [{e.low:.4g}, {e.high:.4g}] {e.unit}" for n, e in fitted.items())
+        values = ", ".join(
+            f"{n} {e.value:.4g} [{e.low:.4g}, {e.high:.4g}] {of_joint(e.unit, units.get(effect.joint or '', TURNS))}"
+            for n, e in fitted.items()
+        )
         lines.append(f"{effect.effect}: {values}")
     return "\n".join(lines)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
 
 from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.units import THOUSANDTHS, milli
 from tactile_cube.visualization.comparison_figures import marked
 from tactile_cube.visualization.solid_links import fill_shapes
 
@@ -21,7 +22,7 @@ SIGNAL_RATE = 250.0  # [Hz] of the signals at most
 PAUSE = 1.0  # [s] between two trials on the time line
 COLORS = {
     "command": (140, 140, 140),
-    "measured": (240, 240, 240),
+    "measured": (230, 130, 20),
     "simulated": (80, 150, 255),
     "measured - simulated": (80, 150, 255),
     "measured, failing": (230, 60, 60),
@@ -61,11 +62,13 @@ def blueprint(comparison: Comparison) -> rrb.Blueprint:
     """The robot and a summary on the left, one tab a joint on the right."""
     tabs = [
         rrb.Vertical(
-            rrb.TimeSeriesView(name=f"{joint}: command, measured, simulated [rad]", origin=f"/joints/{joint}/angle"),
-            rrb.TimeSeriesView(name=f"{joint}: measured - simulated [mrad]", origin=f"/joints/{joint}/error"),
+            rrb.TimeSeriesView(name=f"{joint}: command, measured, simulated [{unit}]", origin=f"/joints/{joint}/angle"),
+            rrb.TimeSeriesView(
+                name=f"{joint}: measured - simulated [{THOUSANDTHS[unit]}]", origin=f"/joints/{joint}/error"
+            ),
             name=joint,
         )
-        for joint in comparison.recording.joints
+        for joint, unit in comparison.recording.units.items()
     ]
     worst = max(comparison.errors.joints, key=lambda j: comparison.errors.joints[j] / comparison.floor.joints[j])
     left = rrb.Vertical(
@@ -144,9 +147,10 @@ def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list
     for trial, start in begin.items():
         stream.set_time(TIMELINE, duration=start)
         stream.log("failing", rr.TextLog(f"trial {trial}", level=rr.TextLogLevel.INFO))
+    units = comparison.recording.units
     for one in comparison.stretches:
         stream.set_time(TIMELINE, duration=begin[one.trial] + one.start)
-        line = f"{one.joint} in {one.trial}: {one.start:.2f} .. {one.end:.2f} s, {1e3 * one.error:.3g} mrad"
+        line = f"{one.joint} in {one.trial}: {one.start:.2f} .. {one.end:.2f} s, {milli(one.error, units[one.joint])}"
         stream.log("failing", rr.TextLog(line, level=rr.TextLogLevel.WARN))
     stream.reset_time()
 

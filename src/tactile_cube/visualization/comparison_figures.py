@@ -4,23 +4,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.comparing.comparison import Comparison
-from tactile_cube.visualization.svg import ERROR, FLOOR, MEASURED, SIMULATED, Axes, Band, Line, line_chart
+from tactile_cube.measurement.units import THOUSANDTHS
+from tactile_cube.visualization.svg import ERROR, FLOOR, MEASURED, PALETTE, SIMULATED, Axes, Band, Line, line_chart
 from tactile_cube.visualization.svg_tables import heat_map
 
 Array = NDArray[np.float64]
 MOST_KINDS = 6
+BEFORE = PALETTE[1]
 
 
-def overlay(comparison: Comparison, trial: int, joint: int) -> str:
-    """Command, measured and simulated angle of one joint in one trial; failing stretches are marked."""
+def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
+    """Command, measured and simulated angle of one joint in one trial, failing stretches marked.
+
+    With `before`, the comparison of the model as it was, its simulation is drawn too.
+    """
     one = comparison.recording.trials[trial]
     offset = _offset(comparison, trial, joint)
     lines = [Line("measured", one.time, one.position[:, joint], MEASURED, 1.8)]
-    lines.append(Line("simulated", one.time, comparison.simulated[trial].position[:, joint] + offset, SIMULATED, 1.4))
+    if before is not None:
+        was = before.simulated[trial].position[:, joint] + _offset(before, trial, joint)
+        lines.append(Line("simulated before", one.time, was, BEFORE, 1.2, "6 3"))
+    after = "simulated" if before is None else "simulated after"
+    lines.append(Line(after, one.time, comparison.simulated[trial].position[:, joint] + offset, SIMULATED, 1.4))
     if not comparison.recording.torque_controlled:
         lines.insert(0, Line("command", one.time, one.command[:, joint], FLOOR, 1.0, "4 3"))
     name = comparison.recording.joints[joint]
-    return line_chart(Axes("time [s]", f"{name} [rad]", marked=marked(comparison, trial, joint)), lines)
+    return line_chart(
+        Axes("time [s]", f"{name} [{comparison.recording.units[name]}]", marked=marked(comparison, trial, joint)), lines
+    )
+
+
+def before_and_after(before: Comparison, after: Comparison, trial: int, joint: int) -> str:
+    """What the model as it was, and with what was found, do not follow of one joint in one trial."""
+    time = before.recording.trials[trial].time
+    name = before.recording.joints[joint]
+    lines = [
+        Line("error before", time, 1e3 * before.residuals[trial][:, joint], BEFORE, 1.2),
+        Line("error after", time, 1e3 * after.residuals[trial][:, joint], SIMULATED, 1.4),
+    ]
+    floor = 1e3 * 1.96 * after.floor.joints[name] * np.ones_like(time)
+    band = [Band("noise floor (95 %)", time, -floor, floor, FLOOR)]
+    return line_chart(Axes("time [s]", f"{name} [{small(before, joint)}]", height=200), lines, band)
 
 
 def residual(comparison: Comparison, trial: int, joint: int) -> str:
@@ -30,7 +54,7 @@ def residual(comparison: Comparison, trial: int, joint: int) -> str:
     floor = 1e3 * 1.96 * comparison.floor.joints[name] * np.ones_like(time)
     line = Line("measured - simulated", time, 1e3 * comparison.residuals[trial][:, joint], ERROR, 1.2)
     band = [Band("noise floor (95 %)", time, -floor, floor, FLOOR)]
-    axes = Axes("time [s]", f"{name} [mrad]", height=170, marked=marked(comparison, trial, joint))
+    axes = Axes("time [s]", f"{name} [{small(comparison, joint)}]", height=170, marked=marked(comparison, trial, joint))
     return line_chart(axes, [line], band)
 
 
@@ -42,8 +66,13 @@ def band(comparison: Comparison, trial: int, joint: int) -> str:
     nominal = comparison.simulated[trial].position[:, joint]
     low, high = (1e3 * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
     line = Line("measured", one.time, 1e3 * (one.position[:, joint] - nominal), MEASURED, 1.2)
-    axes = Axes("time [s]", f"{comparison.recording.joints[joint]} [mrad]", height=200)
+    axes = Axes("time [s]", f"{comparison.recording.joints[joint]} [{small(comparison, joint)}]", height=200)
     return line_chart(axes, [line], [Band("95 % of the simulations", one.time, low, high)])
+
+
+def small(comparison: Comparison, joint: int) -> str:
+    """The unit of a joint's errors, mrad or mm."""
+    return THOUSANDTHS[comparison.recording.units[comparison.recording.joints[joint]]]
 
 
 def regime_map(comparison: Comparison) -> str:

@@ -1,6 +1,7 @@
 """The report of `compare`: how well the model follows, where it fails, how sure that is, what to do next."""
 
 from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.units import common_unit, milli, short
 from tactile_cube.visualization.comparison_sections import (
     band_section,
     error_section,
@@ -11,10 +12,7 @@ from tactile_cube.visualization.comparison_sections import (
     test_section,
     where_section,
 )
-from tactile_cube.visualization.numbers import mrad, short
 from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
-
-AT_THE_FLOOR = 1.3
 
 
 def comparison_report(comparison: Comparison, command: str, model_path: str | None) -> Report:
@@ -25,7 +23,7 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
         command: the command line that made it.
         model_path: the model file, for the suggested next command; None for the owner's values.
     """
-    good = comparison.ratio <= AT_THE_FLOOR
+    good = comparison.at_the_floor
     return Report(
         title=f"Model and measurement: {comparison.recording.name}",
         answer=answer(comparison),
@@ -48,22 +46,26 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
 def answer(comparison: Comparison) -> str:
     """The result in one or two sentences."""
     error, floor, ratio = comparison.errors.overall, comparison.floor.overall, comparison.ratio
+    unit = common_unit(comparison.recording.units.values())
     head = (
-        f"The simulated joints are {mrad(error)} (RMS) away from the measured ones; {mrad(floor)} would be noise alone."
+        f"The simulated joints are {milli(error, unit)} (RMS) away from the measured ones; {milli(floor, unit)} would "
+        "be noise alone."
     )
-    if ratio <= AT_THE_FLOOR:
+    if comparison.at_the_floor:
         return f"{head} The model is as good as this recording can tell."
     return f"{head} That is {short(ratio)} times the noise: {comparison.sentences[0]}."
 
 
 def _tiles(comparison: Comparison) -> list[Tile]:
     worst = max(comparison.errors.joints, key=lambda j: comparison.errors.joints[j] / comparison.floor.joints[j])
-    tone: Tone = "good" if comparison.ratio <= AT_THE_FLOOR else "warn"
+    tone: Tone = "good" if comparison.at_the_floor else "warn"
+    units = comparison.recording.units
+    unit = common_unit(units.values())
     tiles = [
-        Tile(mrad(comparison.errors.overall), "error, all joints (RMS)", tone),
-        Tile(mrad(comparison.floor.overall), f"noise floor ({floor_source(comparison.floor)})"),
+        Tile(milli(comparison.errors.overall, unit), "error, all joints (RMS)", tone),
+        Tile(milli(comparison.floor.overall, unit), f"noise floor ({floor_source(comparison.floor)})"),
         Tile(f"{short(comparison.ratio)} x", "error / noise floor", tone),
-        Tile(worst, f"worst joint: {mrad(comparison.errors.joints[worst])}"),
+        Tile(worst, f"worst joint: {milli(comparison.errors.joints[worst], units[worst])}"),
     ]
     if comparison.band is not None:
         tiles.append(
@@ -76,7 +78,7 @@ def next_section(comparison: Comparison, model_path: str | None) -> Section:
     """What to type next."""
     folder = comparison.recording.folder
     model = f" model={model_path}" if model_path else ""
-    if comparison.ratio <= AT_THE_FLOOR:
+    if comparison.at_the_floor:
         said = (
             "Nothing is missing at this noise. Check the same model on a recording of other motions, or train with it:"
         )

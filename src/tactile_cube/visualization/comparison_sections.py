@@ -1,21 +1,22 @@
 """Sections of a comparison's report; the other reports use them too."""
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.units import common_unit, milli, short
 from tactile_cube.visualization import comparison_figures as figures
-from tactile_cube.visualization.numbers import mrad, p_value
+from tactile_cube.visualization.numbers import p_value
 from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Section, Table
 
 MOST_OVERLAYS = 6
 MOST_CORRELATIONS = 8
 MOST_WARNINGS = 4
 FLOORS = {
-    "repeats": "The noise floor is the scatter of trials that repeated one command, together with the error of the "
-    "simulator's own time step.",
-    "guess": "Nothing was repeated, so the noise floor is a guess from the fast part of the signals and the sensor's "
-    "resolution, together with the error of the simulator's own time step.",
+    "repeats": "The noise floor is the scatter of repeats: how far trials of one command are from one another. It "
+    "holds the sensor's noise, and what the machine itself does not repeat.",
+    "guess": "Nothing was repeated, so the noise floor is a guess: the noise of the position sensor, from the fast "
+    "part of the signals and the sensor's resolution. What the machine does not repeat is not in it.",
     "contact": "The noise floor is what the world leaves of a grasp when all contact effects are true: drives are "
     "known to some 10 % only, and the contact solver stops early. Each trial has the joint offsets and the place of "
     "the object that suit it.",
@@ -54,17 +55,28 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
 
 def error_section(comparison: Comparison) -> Section:
     """The error of each joint beside its noise floor."""
-    floor = comparison.floor
+    floor, units = comparison.floor, comparison.recording.units
     rows = []
     for joint, error in comparison.errors.joints.items():
-        step = floor.step_size.get(joint, 0.0)
-        rows.append((joint, mrad(error), mrad(floor.joints[joint]), f"{error / floor.joints[joint]:.2f}", mrad(step)))
-    rows.append(("all", mrad(comparison.errors.overall), mrad(floor.overall), f"{comparison.ratio:.2f}", ""))
+        beside = [by_joint.get(joint) for by_joint in (floor.sensor, floor.step_size)]
+        rows.append(
+            (
+                joint,
+                milli(error, units[joint]),
+                milli(floor.joints[joint], units[joint]),
+                f"{error / floor.joints[joint]:.2f}",
+                *("" if one is None else milli(one, units[joint]) for one in beside),
+            )
+        )
+    unit = common_unit(units.values())
+    overall = (milli(comparison.errors.overall, unit), milli(floor.overall, unit))
+    rows.append(("all", *overall, f"{comparison.ratio:.2f}", "", ""))
     text = [
         f"{FLOORS[floor.source]} A perfect model would score 1 in the column 'error / floor'; a model that scores 3 "
-        "leaves something out that is three times as large as the noise."
+        "leaves something out that is three times as large as the noise. The last two columns stand for themselves: "
+        "the position sensor's own noise, and what the simulator's time step adds to any model's error."
     ]
-    header = ("joint", "error (RMS)", "noise floor", "error / floor", "of it time step")
+    header = ("joint", "error (RMS)", "noise floor", "error / floor", "sensor noise", "time step")
     guess = [Callout("The noise floor is a guess: repeat each kind of trial to measure it.", "warn")]
     return Section("How well", text, [Table(header, rows), *(guess if floor.source == "guess" else [])])
 
@@ -80,27 +92,27 @@ def where_section(comparison: Comparison, title: str = "Where it fails") -> Sect
     return Section(title, (), blocks)
 
 
-def overlay_section(comparison: Comparison, title: str = "Measured and simulated") -> Section:
-    """Measured over simulated, the worst trial of each joint."""
+def overlay_section(
+    comparison: Comparison, title: str = "Measured and simulated", before: Comparison | None = None
+) -> Section:
+    """Measured over simulated, the worst trial of each joint; with `before`, the model as it was is drawn too."""
+    worst = before or comparison
     blocks = []
-    order = sorted(comparison.errors.joints, key=lambda j: -comparison.errors.joints[j] / comparison.floor.joints[j])
+    order = sorted(worst.errors.joints, key=lambda j: -worst.errors.joints[j] / worst.floor.joints[j])
     for name in order[:MOST_OVERLAYS]:
         joint = comparison.recording.joints.index(name)
-        trial = figures.worst_trial(comparison, joint)
-        one = comparison.recording.trials[trial]
-        error = comparison.trials[trial].joints[name]
-        blocks.append(
-            Figure(
-                figures.overlay(comparison, trial, joint),
-                f"{name}, its worst trial {one.name} ({one.kind}): {mrad(error)}.",
-            )
-        )
-        blocks.append(
-            Figure(
-                figures.residual(comparison, trial, joint),
-                "What the simulation did not follow. Shaded red: more than three noise floors.",
-            )
-        )
+        trial = figures.worst_trial(worst, joint)
+        one, unit = comparison.recording.trials[trial], comparison.recording.units[name]
+        error = milli(comparison.trials[trial].joints[name], unit)
+        fell = error if before is None else f"{milli(before.trials[trial].joints[name], unit)} before, {error} after"
+        caption = f"{name}, its worst trial {one.name} ({one.kind}): {fell}."
+        blocks.append(Figure(figures.overlay(comparison, trial, joint, before), caption))
+        if before is None:
+            left, said = figures.residual(comparison, trial, joint), "Shaded red: more than three noise floors."
+        else:
+            left = figures.before_and_after(before, comparison, trial, joint)
+            said = "Before and after, beside what noise alone leaves."
+        blocks.append(Figure(left, f"What the simulation did not follow. {said}"))
     return Section(title, (), blocks)
 
 
@@ -129,22 +141,41 @@ def band_section(comparison: Comparison) -> list[Section]:
 
 
 def test_section(comparison: Comparison) -> Section:
-    """Whiteness and cross-correlation tests."""
+    """What is left beside the noise floor, and, where it is more, what it goes with."""
+    floor = comparison.floor.joints
+    ratios = {joint: error / floor[joint] for joint, error in comparison.errors.joints.items()}
+    memory = {one.joint: f"{1e3 * one.correlation_time:.0f} ms" for one in comparison.whiteness}
+    rows = [(joint, f"{ratio:.2f}", memory[joint], _what_is_left(ratio)) for joint, ratio in ratios.items()]
+    table = Table(("joint", "left, in noise floors", "memory of what is left", "in words"), rows)
+    above = [joint for joint, ratio in ratios.items() if ratio > AT_THE_FLOOR]
+    if not above:
+        return Section(
+            "Is it noise?",
+            [
+                "Yes, as far as this recording can tell: what is left is no larger than the noise floor at any joint. "
+                "A free-running simulation integrates every small error, so that it remembers itself is normal, and no "
+                "test of whiteness says more than that here."
+            ],
+            [table],
+        )
     text = [
-        "If nothing is missing, what is left is noise: it neither remembers itself (whiteness) nor goes with any "
-        "other signal (cross-correlation). A free-running simulation integrates every small error, so a short memory "
-        "is normal."
+        f"Not at {', '.join(above)}: what is left is larger than the noise floor. Noise goes with no other signal; the "
+        "signals below go with what is left, and hint at its cause. 'By chance' is the probability of such a "
+        "correlation between unrelated signals that remember themselves as these do."
     ]
-    memory = [(w.joint, f"{1e3 * w.correlation_time:.0f} ms", p_value(w.p_value)) for w in comparison.whiteness]
     strongest = [
-        (f"{c.joint} residual", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", p_value(c.p_value))
-        for c in comparison.cross_correlations[:MOST_CORRELATIONS]
-    ]
-    blocks = [
-        Table(("joint", "memory of the residual", "p (white noise)"), memory),
-        Table(("", "goes with", "correlation", "after", "p (unrelated)"), strongest),
-    ]
-    return Section("Is it noise?", text, blocks)
+        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", p_value(c.p_value))
+        for c in comparison.cross_correlations
+        if c.joint in above
+    ][:MOST_CORRELATIONS]
+    header = ("", "goes with", "correlation", "after", "by chance (p)")
+    return Section("Is it noise?", text, [table, *([Table(header, strongest)] if strongest else [])])
+
+
+def _what_is_left(ratio: float) -> str:
+    if ratio <= AT_THE_FLOOR:
+        return "at the noise floor"
+    return f"more than noise, {short(ratio, 2)} times: something is left to be found"
 
 
 def method_section() -> Section:
@@ -153,11 +184,13 @@ def method_section() -> Section:
         "Error: root mean square of measured minus simulated angle over all samples of all trials; the mean "
         "difference of each joint in each robot initialisation is removed first, because a joint's zero is "
         "calibrated anew each time.",
-        "Noise floor: standard deviation of repeats of one command about their mean, and, added in quadrature, the "
-        "difference between the simulation at its own time step and at an eighth of it.",
+        "Noise floor: standard deviation of repeats of one command about their mean, or the sensor's noise where "
+        "nothing was repeated; compare, diagnose and identify state the same. Time step: difference between the "
+        "simulation at its own time step and at an eighth of it. A model is at the floor within 1.3 times "
+        "both in quadrature.",
         "Just after a reversal: within 0.2 s after a joint's velocity changed its sign. Standstill, low, medium and "
-        "high speed: below 0.02, 0.3, 1.5 rad/s and above. Low and high load: below and above half of the largest "
-        "torque.",
+        "high speed: below 0.02, 0.3, 1.5 rad/s and above (m/s where a joint slides). Low and "
+        "high load: below and above half of the largest torque.",
         "Whiteness: Ljung-Box test over 20 lags. Cross-correlation: the strongest within 0.1 s; its p-value allows "
         "for the memory of both signals.",
     ]
@@ -168,4 +201,14 @@ def floor_source(floor: NoiseFloor) -> str:
     """Where the noise floor comes from, in words."""
     if floor.source == "contact":
         return "what a world with the true effects leaves of a grasp"
-    return f"from {floor.repeats} repeats" if floor.source == "repeats" else "a guess: nothing was repeated"
+    return f"scatter of {floor.repeats} repeats" if floor.source == "repeats" else "sensor noise, a guess: no repeats"
+
+
+def floor_in_words(floor: NoiseFloor, unit: str) -> list[str]:
+    """The noise floor and what stands beside it, each by its name."""
+    lines = [f"noise floor: {floor_source(floor)}"]
+    for name, by_joint in (("sensor noise", floor.sensor), ("the simulator's own time step", floor.step_size)):
+        if by_joint:
+            size = (sum(value**2 for value in by_joint.values()) / len(by_joint)) ** 0.5
+            lines.append(f"beside it: {name} {milli(size, unit)}")
+    return lines

@@ -1,20 +1,22 @@
 """A comparison in the terminal, and as Markdown beside the robot."""
 
 from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.units import THOUSANDTHS, common_unit, milli
 from tactile_cube.visualization.comparison_report import answer
-from tactile_cube.visualization.comparison_sections import floor_source
+from tactile_cube.visualization.comparison_sections import floor_in_words
 
 
 def summary(comparison: Comparison) -> str:
     """What the command line prints: the answer, one line a joint, where it fails."""
-    lines = [answer(comparison), "", f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor   (RMS, mrad)"]
+    units = comparison.recording.units
+    said = THOUSANDTHS[common_unit(units.values())]
+    lines = [answer(comparison), "", f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor   (RMS, {said})"]
     for joint, error in comparison.errors.joints.items():
         floor = comparison.floor.joints[joint]
         lines.append(f"{joint:<16}{1e3 * error:>9.3f}{1e3 * floor:>9.3f}{error / floor:>11.2f}")
     overall, floor = comparison.errors.overall, comparison.floor.overall
     lines.append(f"{'all':<16}{1e3 * overall:>9.3f}{1e3 * floor:>9.3f}{comparison.ratio:>11.2f}")
-    step = ", with the simulator's own time step" if comparison.floor.step_size else ""
-    lines += ["", f"noise floor: {floor_source(comparison.floor)}{step}"]
+    lines += ["", *floor_in_words(comparison.floor, common_unit(units.values()))]
     if comparison.band is not None:
         inside = 100 * comparison.band.inside
         lines.append(
@@ -25,10 +27,11 @@ def summary(comparison: Comparison) -> str:
 
 def markdown(comparison: Comparison) -> str:
     """The same for a reader of the Rerun recording."""
+    units = comparison.recording.units
     rows = [
-        f"| {joint} | {1e3 * error:.3g} | {1e3 * comparison.floor.joints[joint]:.3g} |"
+        f"| {joint} | {milli(error, units[joint])} | {milli(comparison.floor.joints[joint], units[joint])} |"
         for joint, error in comparison.errors.joints.items()
     ]
-    table = ["| joint | error [mrad] | noise floor [mrad] |", "|---|---|---|", *rows]
+    table = ["| joint | error | noise floor |", "|---|---|---|", *rows]
     where = [f"- {sentence}" for sentence in comparison.sentences]
     return "\n".join([f"# {comparison.recording.name}", "", answer(comparison), "", *table, "", *where])

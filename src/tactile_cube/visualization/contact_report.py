@@ -7,6 +7,7 @@ from typing import Any
 
 from tactile_cube.identification.contact.identification import ContactIdentification
 from tactile_cube.identification.in_words import GAIN_OF
+from tactile_cube.measurement.units import milli
 from tactile_cube.visualization.diagnosis_report import VERDICTS
 from tactile_cube.visualization.diagnosis_sections import (
     HELD,
@@ -15,7 +16,6 @@ from tactile_cube.visualization.diagnosis_sections import (
     ranking_section,
     staircase_section,
 )
-from tactile_cube.visualization.numbers import mrad
 from tactile_cube.visualization.report import Listing, Report, Section, Table
 
 EXPLANATION = (
@@ -95,7 +95,7 @@ def contact_report(found: ContactIdentification, name: str, command: str, model_
     )
     return Report(
         title=f"Identified: {name}",
-        answer=f"The error on trials that the fit never saw fell from {mrad(before)} to {mrad(after)}.",
+        answer=f"The error on trials that the fit never saw fell from {milli(before)} to {milli(after)}.",
         tone="plain" if found.fit.silent() else "good",
         sections=[*contact_sections(found), follow],
         footer=f"Made by tactile_cube: {command}",

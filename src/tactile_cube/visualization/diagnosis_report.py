@@ -7,6 +7,7 @@ from tactile_cube.identification.in_words import UNPROVEN, common_offset, unprov
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.units import common_unit, milli, of_joint, short
 from tactile_cube.visualization.comparison_sections import (
     band_section,
     overlay_section,
@@ -23,7 +24,6 @@ from tactile_cube.visualization.diagnosis_sections import (
     staircase_section,
     value_section,
 )
-from tactile_cube.visualization.numbers import mrad, short
 from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
 
 VERDICTS: dict[str, tuple[Tone, str]] = {
@@ -57,25 +57,28 @@ def diagnosis_report(
     tone, said = VERDICTS[diagnosis["verdict"]]
     if diagnosis.get("unproven_effects"):
         said = UNPROVEN
+    units = before.recording.units
     names = _names(diagnosis["effects"], " or " if diagnosis["verdict"] == "ambiguous" else " and ")
     sections = [
-        _verdict_section(diagnosis),
-        staircase_section(diagnosis["error"], diagnosis.get("error_joints", {})),
+        _verdict_section(diagnosis, units),
+        staircase_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
         *([held_section(diagnosis["contact"])] if "contact" in diagnosis else []),
-        *effect_section(diagnosis["effects"]),
-        *shape_section(shapes),
+        *effect_section(diagnosis["effects"], units),
+        *shape_section(shapes, units),
         *ranking_section(diagnosis["ranking"]),
         next_section(diagnosis, model_path, before, experiment),
         recording_section(before.recording, before.model),
         where_section(before, "Where the stated model fails"),
-        overlay_section(after or before, "Measured and simulated, with what was found"),
+        overlay_section(before)
+        if after is None
+        else overlay_section(after, "Measured and simulated, before and after what was found", before),
         *([] if after is None else [test_section(after)]),
     ]
     return Report(
         title=f"What is missing? {before.recording.name}",
         answer=f"{said}: {names}." if names else said,
         tone=tone,
-        tiles=_tiles(diagnosis),
+        tiles=_tiles(diagnosis, common_unit(units.values())),
         sections=sections,
         footer=f"Made by tactile_cube in {diagnosis['seconds']:.0f} s: {command}",
     )
@@ -102,15 +105,17 @@ def identification_report(
     steps = [value for key, value in stages.items() if key != "noise_floor" and value is not None]
     effects = after.model.effects if after.model is not None else []
     found = [{"name": e.name, "joints": [e.joint or "object"], "parameters": e.parameters} for e in effects]
+    units = after.recording.units
+    unit = common_unit(units.values())
     train = Listing([f"python -m tactile_cube.train +experiment=finetune model={model_path}"], code=True)
     return Report(
         title=f"Identified: {after.recording.name}",
-        answer=f"The error on trials that the fit never saw fell from {mrad(steps[0])} to {mrad(steps[-1])}; "
-        f"{mrad(stages['noise_floor'] or after.floor.overall)} would be noise alone.",
+        answer=f"The error on trials that the fit never saw fell from {milli(steps[0], unit)} to "
+        f"{milli(steps[-1], unit)}; {milli(stages['noise_floor'] or after.floor.overall, unit)} would be noise alone.",
         tone="good",
         sections=[
-            staircase_section(stages, joints),
-            *effect_section(found),
+            staircase_section(stages, joints, units=units),
+            *effect_section(found, units),
             *further,
             value_section(after),
             recording_section(after.recording, after.model),
@@ -126,21 +131,23 @@ def identification_report(
     )
 
 
-def _verdict_section(diagnosis: Mapping[str, Any]) -> Section:
-    lines = [_in_a_line(effect) for effect in diagnosis["effects"]]
+def _verdict_section(diagnosis: Mapping[str, Any], units: Mapping[str, str]) -> Section:
+    lines = [_in_a_line(effect, units) for effect in diagnosis["effects"]]
     if known := diagnosis.get("known_effects"):
         lines.append(f"beside what was known: {', '.join(known)}")
-    lines += [f"helps, but is not the whole of it: {_in_a_line(one)}" for one in diagnosis.get("partial_effects", [])]
+    partial = diagnosis.get("partial_effects", [])
+    lines += [f"helps, but is not the whole of it: {_in_a_line(one, units)}" for one in partial]
     if unproven := diagnosis.get("unproven_effects"):
         lines += unproven_effects(unproven)
-    lines += [common_offset(entry) for entry in diagnosis.get("common_offsets", [])]
+    lines += [common_offset(entry, units) for entry in diagnosis.get("common_offsets", [])]
     for joint in diagnosis["unexplained_joints"]:
         lines.append(f"not explained: {joint}{_ceiling(diagnosis, joint)}")
     return Section("The answer", (), [Listing(lines or ["no effect has to be added"])])
 
 
-def _in_a_line(effect: Mapping[str, Any]) -> str:
-    values = [f"{name} {short(p['value'])} {p['unit']}" for name, p in effect["parameters"].items()]
+def _in_a_line(effect: Mapping[str, Any], units: Mapping[str, str]) -> str:
+    own = common_unit(units[joint] for joint in effect["joints"] if joint in units)
+    values = [f"{name} {short(p['value'])} {of_joint(p['unit'], own)}" for name, p in effect["parameters"].items()]
     return f"{effect['name']} at {', '.join(effect['joints'])}: {', '.join(values)}"
 
 
@@ -155,17 +162,20 @@ def _ceiling(diagnosis: Mapping[str, Any], joint: str) -> str:
     )
 
 
-def _tiles(diagnosis: Mapping[str, Any]) -> list[Tile]:
+def _tiles(diagnosis: Mapping[str, Any], unit: str) -> list[Tile]:
     errors = diagnosis["error"]
     tiles = [Tile(diagnosis["verdict"].replace("_", " "), "verdict", VERDICTS[diagnosis["verdict"]][0])]
     guessed = diagnosis.get("noise_floor_source") == "guess"
     for key, label in (
         ("nominal", "held-out error as stated"),
         ("with_effects", "held-out error with the recommended model"),
-        ("noise_floor", "noise floor (a guess: no repeats)" if guessed else "noise floor"),
+        (
+            "noise_floor",
+            "noise floor (sensor noise, a guess: no repeats)" if guessed else "noise floor (scatter of repeats)",
+        ),
     ):
         if errors.get(key) is not None:
-            tiles.append(Tile(mrad(errors[key]), label))
+            tiles.append(Tile(milli(errors[key], unit), label))
     return tiles
 
 

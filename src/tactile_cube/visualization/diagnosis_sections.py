@@ -7,7 +7,8 @@ from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
-from tactile_cube.visualization.numbers import mrad, p_value, short
+from tactile_cube.measurement.units import THOUSANDTHS, TURNS, common_unit, milli, of_joint, short
+from tactile_cube.visualization.numbers import p_value
 from tactile_cube.visualization.report import Figure, Listing, Section, Table
 from tactile_cube.visualization.svg import PALETTE, SIMULATED, Axes, Band, Line, line_chart
 from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_chart
@@ -30,19 +31,24 @@ HELD = "How the error with an object falls"
 
 
 def staircase_section(
-    stages: Mapping[str, float | None], joints: Mapping[str, Mapping[str, float]], title: str = "How the error falls"
+    stages: Mapping[str, float | None],
+    joints: Mapping[str, Mapping[str, float]],
+    title: str = "How the error falls",
+    units: Mapping[str, str] | None = None,
 ) -> Section:
-    """The error after each step, down to the noise floor."""
+    """The error after each step, down to the noise floor; `units` are those of the joints, by default rad."""
+    units = units or {}
+    unit = THOUSANDTHS[common_unit(units.values())]
     bars = [(STAGES.get(key, key), 1e3 * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
     floor = stages.get("noise_floor")
     caption = (
         "RMS position error on trials that were held out from the fit; the dashed line is what noise alone would leave."
     )
-    blocks: list[Figure | Table] = [Figure(bar_chart(bars, "mrad", None if floor is None else 1e3 * floor), caption)]
+    blocks: list[Figure | Table] = [Figure(bar_chart(bars, unit, None if floor is None else 1e3 * floor), caption)]
     if joints:
         names = list(next(iter(joints.values())))
         steps = [STAGES.get(stage, stage) for stage in joints]
-        cells = [[mrad(row[name]) for name in names] for row in joints.values()]
+        cells = [[milli(row[name], units.get(name, TURNS)) for name in names] for row in joints.values()]
         if len(names) > WIDE:
             names, steps, cells = steps, names, [list(column) for column in zip(*cells, strict=True)]
         blocks.append(Table(("", *names), [(step, *row) for step, row in zip(steps, cells, strict=True)]))
@@ -57,7 +63,7 @@ def held_section(contact: Mapping[str, Any]) -> Section:
     )
 
 
-def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
+def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None) -> list[Section]:
     """Every effect that was found: parameters with intervals, held-out gain, rivals."""
     if not effects:
         return []
@@ -67,7 +73,8 @@ def effect_section(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
         for name, estimate in effect["parameters"].items():
             one = estimate if isinstance(estimate, Mapping) else estimate.model_dump()
             label = f"{effect['name']}@{place}: {name}"
-            intervals.append(Interval(label, one["value"], one["low"], one["high"], one["unit"]))
+            unit = of_joint(one["unit"], common_unit((units or {}).get(joint, TURNS) for joint in effect["joints"]))
+            intervals.append(Interval(label, one["value"], one["low"], one["high"], unit))
         if "heldout_gain" in effect:
             lines.append(
                 f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off "
@@ -83,7 +90,7 @@ def _percent(share: float) -> str:
     return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
 
 
-def shape_section(shapes: Sequence[Shape]) -> list[Section]:
+def shape_section(shapes: Sequence[Shape], units: Mapping[str, str] | None = None) -> list[Section]:
     """What the missing torque depends on, where no effect of the catalogue explains it."""
     if not shapes:
         return []
@@ -94,7 +101,8 @@ def shape_section(shapes: Sequence[Shape]) -> list[Section]:
     ]
     blocks = []
     for one in sorted(shapes, key=lambda shape: -shape.explained):
-        axes = Axes(one.against, f"{one.joint} [mN m]", height=200)
+        unit = (units or {}).get(one.joint, TURNS)
+        axes = Axes(of_joint(one.against, unit), f"{one.joint} [m{of_joint('N m', unit)}]", height=200)
         low, high = 1e3 * (one.mean - one.spread), 1e3 * (one.mean + one.spread)
         band = Band("+- one standard deviation", one.centres, low, high)
         chart = line_chart(axes, [Line("missing torque", one.centres, 1e3 * one.mean, SIMULATED, 2.0)], [band])
@@ -123,7 +131,8 @@ def value_section(comparison: Comparison) -> Section:
                 interval = f"{short(one.low)} .. {short(one.high)}" if one.high > one.low else "not fitted"
                 believed = comparison.recording.stated(key, joint)
                 stated = "" if believed is None else short(believed)
-                rows.append((f"{key} {joint}", short(one.value), interval, stated, one.unit))
+                unit = of_joint(one.unit, comparison.recording.units.get(joint, TURNS))
+                rows.append((f"{key} {joint}", short(one.value), interval, stated, unit))
     return Section("The constants", (), [Table(("", "value", "95 % interval", "owner's value", "unit"), rows)])
 
 
@@ -132,7 +141,7 @@ def next_section(
 ) -> Section:
     """What to record or to type next."""
     if experiment is not None:
-        return experiment_section(experiment, str(diagnosis["next_experiment"]))
+        return experiment_section(experiment, str(diagnosis["next_experiment"]), before.recording.units)
     folder, model = before.recording.folder, model_path or "MODEL.yaml"
     identify = f"python -m tactile_cube.identify recording={folder} effects"
     train = f"python -m tactile_cube.train +experiment=finetune model={model}"
@@ -155,23 +164,23 @@ def next_section(
     return Section("What to do next", [said], [Listing(lines, code=True)])
 
 
-def experiment_section(experiment: Experiment, file: str) -> Section:
+def experiment_section(experiment: Experiment, file: str, units: Mapping[str, str]) -> Section:
     """The commands that would decide, and what each rival predicts."""
     text = [
         "This recording cannot decide between the candidates. Play these commands on the rig, add the trial to the "
         "recording and diagnose again:"
     ]
-    joint = experiment.joints.index(experiment.joint)
+    joint, unit = experiment.joints.index(experiment.joint), units.get(experiment.joint, TURNS)
     predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
     mean = sum(predictions.values()) / len(predictions)
     lines = [
         Line(name, experiment.time, 1e3 * (values - mean), PALETTE[k % len(PALETTE)], 1.3)
         for k, (name, values) in enumerate(predictions.items())
     ]
-    chart = line_chart(Axes("time [s]", f"{experiment.joint} [mrad]", height=220), lines)
+    chart = line_chart(Axes("time [s]", f"{experiment.joint} [{THOUSANDTHS[unit]}]", height=220), lines)
     caption = (
         f"What each candidate predicts for {experiment.joint}, relative to their mean: they differ by at least "
-        f"{mrad(experiment.difference)} (RMS)."
+        f"{milli(experiment.difference, unit)} (RMS)."
     )
     return Section("What to record next", text, [Listing([file], code=True), Figure(chart, caption)])
 

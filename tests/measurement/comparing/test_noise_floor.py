@@ -52,10 +52,20 @@ def test_a_coarse_sensor_bounds_the_guess(tmp_path: Path) -> None:
     assert np.all(sensor_noise(read_recording(write(tmp_path, change))) >= 0.01 / np.sqrt(12))
 
 
-def test_the_step_size_error_is_part_of_the_floor(tmp_path: Path) -> None:
+def test_the_floor_is_the_recordings_alone_and_the_step_size_error_stands_beside_it(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path))
-    floor = noise_floor(recording, ErrorSummary(3e-4, {"a": 4e-4, "b": 0.0}))
-    plain = noise_floor(recording)
-    assert floor.joints["a"] == pytest.approx(np.hypot(plain.joints["a"], 4e-4))
-    assert floor.joints["b"] == plain.joints["b"]
+    plain, floor = noise_floor(recording), noise_floor(recording, ErrorSummary(3e-4, {"a": 4e-4, "b": 0.0}))
+    assert (floor.overall, floor.joints) == (plain.overall, plain.joints)
     assert floor.step_size == {"a": 4e-4, "b": 0.0}
+    assert floor.reachable == pytest.approx(np.hypot(floor.overall, np.sqrt(0.5) * 4e-4))
+    assert plain.reachable == plain.overall
+
+
+def test_the_sensors_noise_stands_beside_the_scatter_of_repeats(tmp_path: Path) -> None:
+    def spoil(columns: dict) -> None:
+        columns["a.position"] += 0.003 * np.sin(np.arange(len(columns["time"])) / 20)  # this repeat went another way
+
+    floor = noise_floor(read_recording(write(tmp_path, spoil=spoil)))
+    assert floor.source == "repeats"
+    assert floor.joints["a"] > 1e-3
+    assert floor.sensor["a"] == pytest.approx(2e-4, rel=0.5)

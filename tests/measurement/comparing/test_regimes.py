@@ -23,7 +23,7 @@ def rows(recording: Recording, errors: list[np.ndarray], joint: str) -> dict[str
 
 def words(recording: Recording, errors: list[np.ndarray]) -> list[str]:
     table = regimes(recording.trials, errors, recording.joints)
-    return where_it_fails(table, summarise(errors, recording.joints).joints, noise_floor(recording))
+    return where_it_fails(table, summarise(errors, recording.joints).joints, noise_floor(recording), recording.units)
 
 
 def test_an_error_after_reversals_stands_out_there(recording: Recording) -> None:

@@ -21,6 +21,7 @@ from tactile_cube.measurement.replay.parameters import Parameters, nominal_param
 from tactile_cube.measurement.replay.rig_replay import Engine, Simulated
 
 Array = NDArray[np.float64]
+AT_THE_FLOOR = 1.3  # error over floor and time step up to which a model is as good as they can tell
 FINER = 8  # times smaller than the simulation's step, to see the error of the step itself
 
 
@@ -62,6 +63,11 @@ class Comparison:
     def ratio(self) -> float:
         """Error over noise floor."""
         return self.errors.overall / self.floor.overall
+
+    @property
+    def at_the_floor(self) -> bool:
+        """Whether the model is as good as this recording and this simulator can tell."""
+        return self.errors.overall <= AT_THE_FLOOR * self.floor.reachable
 
 
 def compare(
@@ -115,7 +121,7 @@ def describe(
         trials=[summarise([error], joints) for error in errors],
         floor=floor,
         regimes=table,
-        sentences=where_it_fails(table, summary.joints, floor),
+        sentences=where_it_fails(table, summary.joints, floor, recording.units),
         whiteness=whiteness(trials, errors, joints),
         cross_correlations=cross_correlations(trials, errors, joints),
         stretches=_stretches(recording, errors, floor),
@@ -149,12 +155,14 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     recording, floor, band = comparison.recording, comparison.floor, comparison.band
     return {
         "recording": str(recording.folder),
+        "units": recording.units,
         "error": asdict(comparison.errors),
         "noise_floor": {
             "overall": floor.overall,
             "joints": floor.joints,
             "source": "repeats" if floor.source == "repeats" else "guess",  # scripts know these two
             "repeats": floor.repeats,
+            "sensor": floor.sensor,
             "step_size": floor.step_size,
         },
         "regimes": [asdict(one) for one in comparison.regimes],

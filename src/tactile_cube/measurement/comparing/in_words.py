@@ -1,9 +1,10 @@
 """The table of regimes in sentences: "q3 lags just after reversals, 9 mrad, at low speed"."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.comparing.regimes import Regime
+from tactile_cube.measurement.units import milli, short
 
 WORTH_SAYING = 1.5  # error / noise floor of a joint below which nothing is said
 STANDS_OUT = 1.25  # error of a regime / error of the joint
@@ -13,27 +14,30 @@ PLACES = ("reversal", "speed", "load", "posture", "time", "direction")
 COMPANY = ("kind", "neighbours")
 
 
-def where_it_fails(table: Sequence[Regime], errors: dict[str, float], floor: NoiseFloor) -> list[str]:
+def where_it_fails(
+    table: Sequence[Regime], errors: Mapping[str, float], floor: NoiseFloor, units: Mapping[str, str]
+) -> list[str]:
     """One sentence for each joint, the worst joint first."""
     worst_first = sorted(errors, key=lambda joint: -errors[joint] / floor.joints[joint])
-    return [_sentence(joint, [r for r in table if r.joint == joint], errors[joint], floor) for joint in worst_first]
+    return [
+        _sentence(joint, [r for r in table if r.joint == joint], errors[joint], floor, units[joint])
+        for joint in worst_first
+    ]
 
 
-def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor) -> str:
+def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor, unit: str) -> str:
     ratio = error / floor.joints[joint]
-    size = f"({_two_digits(ratio)} times the noise floor)"
+    size = f"({short(ratio, 2)} times the noise floor)"
     if ratio < WORTH_SAYING:
-        return f"{joint} follows the model: {_two_digits(1e3 * error)} mrad {size}"
+        return f"{joint} follows the model: {milli(error, unit, 2)} {size}"
     standing_out = [row for row in rows if row.error > STANDS_OUT * error and row.share > RARE]
     places = _worst_of_each(standing_out, PLACES)[:2] or _worst_of_each(standing_out, COMPANY)[:1]
     if not places:
-        return f"{joint} {_verb(rows, error)} everywhere, {_two_digits(1e3 * error)} mrad {size}"
+        return f"{joint} {_verb(rows, error)} everywhere, {milli(error, unit, 2)} {size}"
     first, more = places[0], "".join(f", {_place(row)}" for row in places[1:])
     kind = next((row for row in _worst_of_each(standing_out, ("kind",)) if row is not first), None)
     mostly = f", most of all in {kind.regime}" if kind is not None else ""
-    return (
-        f"{joint} {_verb([first], error)} {_place(first)}, {_two_digits(1e3 * first.error)} mrad{more}{mostly} {size}"
-    )
+    return f"{joint} {_verb([first], error)} {_place(first)}, {milli(first.error, unit, 2)}{more}{mostly} {size}"
 
 
 def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime]:
@@ -67,7 +71,3 @@ def _place(row: Regime) -> str:
     if row.dimension == "neighbours":
         return f"with {row.regime}"
     return row.regime
-
-
-def _two_digits(value: float) -> str:
-    return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"

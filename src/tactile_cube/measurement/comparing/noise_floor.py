@@ -1,6 +1,6 @@
-"""The error that no model can undercut: the scatter of repeats, and the simulator's own step-size error."""
+"""The error that no model can undercut: the scatter of repeats, or the sensor's noise where nothing was repeated."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,7 @@ SMOOTHING = 0.05  # [s] a position that changes faster than this is taken for no
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """RMS error [rad] of a perfect model of this rig, this sensor and this simulator.
+    """RMS error [rad] of a perfect model of this rig and this sensor: a property of the recording alone.
 
     Attributes:
         overall: pooled over joints.
@@ -26,7 +26,9 @@ class NoiseFloor:
         source: `repeats` (measured), `guess` (nothing was repeated), or `contact` (how well a world with the true
             effects follows a grasp).
         repeats: how many trials had a repeat.
-        step_size: the part that comes from the simulator's time step, joint by joint; empty if not included.
+        sensor: noise of the position sensor, joint by joint; the floor itself where it is a guess.
+        step_size: what the simulator's own time step adds to a perfect model's error, joint by joint; no part of the
+            floor, and empty where it was not asked for.
     """
 
     overall: float
@@ -34,31 +36,28 @@ class NoiseFloor:
     source: Literal["repeats", "guess", "contact"]
     repeats: int
     step_size: dict[str, float]
+    sensor: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def reachable(self) -> float:
+        """What a perfect model leaves in this simulator: the floor, with the error of the time step in quadrature."""
+        return float(np.hypot(self.overall, np.sqrt(np.mean(np.square([*self.step_size.values()] or [0.0])))))
 
 
 def noise_floor(recording: Recording, step_size: ErrorSummary | None = None) -> NoiseFloor:
-    """Noise floor of a recording; `step_size` is the error of the simulator's time step, added in quadrature."""
+    """Noise floor of a recording; `step_size` is the error of the simulator's time step, stated beside it."""
     groups = aligned_repeats(recording.trials)
-    if groups:
-        variance, source = _scatter(groups), "repeats"
-    else:
-        variance, source = sensor_noise(recording) ** 2, "guess"
+    sensor = sensor_noise(recording)
+    variance = _scatter(groups) if groups else sensor**2
     variance = np.maximum(variance, LEAST**2)
-    measured = NoiseFloor(
+    return NoiseFloor(
         float(np.sqrt(variance.mean())),
         dict(zip(recording.joints, map(float, np.sqrt(variance)), strict=True)),
-        "repeats" if source == "repeats" else "guess",
+        "repeats" if groups else "guess",
         sum(len(group) for group in groups),
-        {},
+        dict(step_size.joints) if step_size is not None else {},
+        dict(zip(recording.joints, map(float, sensor), strict=True)),
     )
-    return measured if step_size is None else with_step_size(measured, step_size)
-
-
-def with_step_size(floor: NoiseFloor, step_size: ErrorSummary) -> NoiseFloor:
-    """The floor with the error of the simulator's time step added in quadrature."""
-    joints = {joint: float(np.hypot(value, step_size.joints[joint])) for joint, value in floor.joints.items()}
-    overall = float(np.hypot(floor.overall, step_size.overall))
-    return replace(floor, overall=overall, joints=joints, step_size=dict(step_size.joints))
 
 
 def _scatter(groups: list[list[Array]]) -> Array:

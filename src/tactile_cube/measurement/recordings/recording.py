@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tactile_cube.measurement.recordings.description import Coupling, Description
 from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Gains, Trial
+from tactile_cube.measurement.units import SLIDES, TURNS
 
 Array = NDArray[np.float64]
 
@@ -80,6 +81,11 @@ class Recording:
     def torque_controlled(self) -> bool:
         """Whether commands are torques [N m]."""
         return self.description.controller.mode == "torque"
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Joint -> unit of its position: `rad` where it turns, `m` where it slides; torques are N m or N likewise."""
+        return {joint: SLIDES if self.rig.joints[joint].prismatic else TURNS for joint in self.joints}
 
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
