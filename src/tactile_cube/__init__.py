@@ -1,8 +1,8 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
-Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`
-and `export`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give what they work on. Nothing
-slow is imported before it is used.
+Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
+`export` and `deploy`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give what they work on.
+Nothing slow is imported before it is used.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
     from tactile_cube.api.comparison import compare
+    from tactile_cube.api.deployment import deploy
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.environment import env_config, make_env
     from tactile_cube.api.evaluation import evaluate
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "compare": "api.comparison",
+    "deploy": "api.deployment",
     "diagnose": "api.diagnosis",
     "env_config": "api.environment",
     "make_env": "api.environment",
@@ -48,6 +50,7 @@ __all__ = [
     "InputError",
     "TrialArrays",
     "compare",
+    "deploy",
     "diagnose",
     "env_config",
     "evaluate",

@@ -1,11 +1,18 @@
+import hashlib
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tactile_cube.deployment.control_loop import ControlLoop, Homing
+from tactile_cube.deployment.controller import Controller
 from tactile_cube.deployment.export import export_policy
+from tactile_cube.deployment.interface_contract import interface_contract
+from tactile_cube.deployment.limits import Limits
 from tactile_cube.deployment.network import Network
+from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 
@@ -53,3 +60,65 @@ def test_the_contract_says_what_a_robot_must_know(network: Network, tmp_path: Pa
 def test_an_unknown_ending_is_refused(network: Network, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.pt"):
         export_policy(network, tmp_path / "policy.pt")
+
+
+def test_the_test_vector_and_the_hashes_tell_whether_a_file_is_what_was_exported(
+    network: Network, tmp_path: Path
+) -> None:
+    path = tmp_path / "policy.npz"
+    contract = json.loads(export_policy(network, path).read_text())
+    vector = contract["test_vector"]
+    action = network(np.array(vector["observation"], dtype=np.float32))
+    np.testing.assert_allclose(action, vector["action"], atol=vector["tolerance"])
+    assert np.abs(vector["observation"]).min() > 0
+    assert contract["sha256"]["policy.npz"] == hashlib.sha256(path.read_bytes()).hexdigest()
+    other = Network((network.weights[0] + 1e-3, *network.weights[1:]), network.biases, network.info)
+    assert interface_contract(other)["sha256"]["weights"] != contract["sha256"]["weights"]
+
+
+def test_the_onnx_file_carries_the_contract(network: Network, tmp_path: Path) -> None:
+    onnx = pytest.importorskip("onnx")
+    beside = json.loads(export_policy(network, tmp_path / "policy.onnx").read_text())
+    entries = {one.key: one.value for one in onnx.load(tmp_path / "policy.onnx").metadata_props}
+    inside = json.loads(entries["tactile_cube.contract"])
+    del beside["sha256"]["policy.onnx"]
+    assert inside == beside
+
+
+def test_a_loop_written_from_the_contract_alone_sends_what_ours_sends(network: Network, tmp_path: Path) -> None:
+    """Everything below reads the two files; of the package only the loop it is compared with."""
+    export_policy(network, tmp_path / "policy.npz")
+    contract = json.loads((tmp_path / "policy.contract.json").read_text())
+    arrays = np.load(tmp_path / "policy.npz")
+    lower, upper = (np.array(contract["action"][key]) for key in ("lower", "upper"))
+    low, high = (np.array(contract["joint_range"][key]) for key in ("lower", "upper"))
+    kp, kd = (contract["impedance"][key]["value"] for key in ("kp", "kd"))
+    rate, torque = (contract["limits"][key]["value"] for key in ("rate", "torque"))
+    readings, keep = (
+        contract["observation"]["readings"],
+        1.0 - np.exp(-1e-3 / contract["target_filter"]["time_constant_s"]),
+    )
+    home = np.array(contract["start_angles"]["angles"])
+
+    def policy(observation: np.ndarray) -> np.ndarray:
+        hidden = np.maximum(arrays["weight0"] @ observation + arrays["bias0"], 0)
+        hidden = np.maximum(arrays["weight1"] @ hidden + arrays["bias1"], 0)
+        return np.tanh(arrays["weight2"] @ hidden + arrays["bias2"])
+
+    gains = (np.full(12, kp), np.full(12, kd))
+    limits = Limits(DLR_HAND2.lower, DLR_HAND2.upper, rate, torque, *gains)
+    loop = ControlLoop(Controller(network), 0.5, limits, StopRules(), Homing(settle=1e-3), seconds=1.0)
+    loop.tick(0.0, Reading(0.0, home, np.zeros(12)))
+    stack, q_f, q_d, q_m = None, home, home, home
+    for tick in range(1, 500):
+        ours = loop.tick(1e-3 * tick, Reading(1e-3 * tick, q_m, np.zeros(12)))
+        if (tick - 1) % 100 == 0:
+            reading = np.concatenate([q_m, q_f - q_m])
+            stack = np.tile(reading, readings) if stack is None else np.concatenate([stack[24:], reading])
+            q_n = 0.5 * (lower + upper) + 0.5 * (upper - lower) * policy(stack.astype(np.float32))
+        q_f = q_f + keep * (q_n - q_f)
+        wanted = np.clip(np.clip(q_f, low, high), q_d - rate * 1e-3, q_d + rate * 1e-3)
+        q_d = np.clip(wanted, q_m - torque / kp, q_m + torque / kp)
+        np.testing.assert_allclose(ours, q_d, atol=1e-6)
+        q_m = q_m + 0.02 * (q_d - q_m)
+    assert np.abs(q_d - home).max() > 0.02

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tactile_cube.deployment.interface_contract import interface_contract
-from tactile_cube.deployment.network import Array, Network
+from tactile_cube.deployment.network import Network
 from tactile_cube.errors import InputError
 
 OPSET = 17
+METADATA = "tactile_cube.contract"
+"""Key of the contract in the metadata of an ONNX file."""
+Contract = dict[str, Any]
 
 
 def export_policy(network: Network, path: Path) -> Path:
@@ -24,29 +29,24 @@ def export_policy(network: Network, path: Path) -> Path:
     if path.suffix not in writers:
         raise InputError(f"output={path}: ending {path.suffix!r} is unknown; choose one of {', '.join(writers)}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    writers[path.suffix](network, path)
-    contract = path.with_suffix(".contract.json")
-    contract.write_text(json.dumps(interface_contract(network), indent=1), encoding="utf-8")
-    return contract
+    contract = interface_contract(network)
+    writers[path.suffix](network, contract, path)
+    contract["sha256"] |= {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}
+    beside = path.with_suffix(".contract.json")
+    beside.write_text(json.dumps(contract, indent=1), encoding="utf-8")
+    return beside
 
 
-def _deterministic_layers(network: Network) -> list[tuple[Array, Array]]:
-    """Return weights and biases without the outputs that only exploration uses."""
-    layers = list(zip(network.weights, network.biases, strict=True))
-    weight, bias = layers.pop()
-    return [*layers, (weight[: network.action_size], bias[: network.action_size])]
-
-
-def _write_npz(network: Network, path: Path) -> None:
-    """Write `weight<k>` (out, in) and `bias<k>` (out,); ReLU between layers, tanh after the last."""
-    arrays: dict[str, Array] = {}
-    for index, (weight, bias) in enumerate(_deterministic_layers(network)):
+def _write_npz(network: Network, contract: Contract, path: Path) -> None:
+    """Write `weight<k>` (out, in) and `bias<k>` (out,), ReLU between layers, tanh after the last, and `contract`."""
+    arrays: dict[str, Any] = {"contract": np.array(json.dumps(contract))}
+    for index, (weight, bias) in enumerate(network.deterministic_layers()):
         arrays |= {f"weight{index}": weight, f"bias{index}": bias}
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    np.savez(path, **arrays)
 
 
-def _write_onnx(network: Network, path: Path) -> None:
-    """Write a graph "observation" (batch, 120) -> "action" (batch, 12)."""
+def _write_onnx(network: Network, contract: Contract, path: Path) -> None:
+    """Write a graph "observation" (batch, 120) -> "action" (batch, 12), the contract in its metadata."""
     try:
         import onnx
         from onnx import TensorProto, helper, numpy_helper
@@ -54,7 +54,7 @@ def _write_onnx(network: Network, path: Path) -> None:
         raise InputError(
             f"output={path}: ONNX is not installed; pip install 'tactile-cube[onnx]' or export .npz"
         ) from None
-    layers = _deterministic_layers(network)
+    layers = network.deterministic_layers()
     nodes, weights, signal = [], [], "observation"
     for index, (weight, bias) in enumerate(layers):
         last = index == len(layers) - 1
@@ -67,5 +67,6 @@ def _write_onnx(network: Network, path: Path) -> None:
     action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["batch", network.action_size])
     graph = helper.make_graph(nodes, "tactile_cube", [observation], [action], weights)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
+    helper.set_model_props(model, {METADATA: json.dumps(contract)})
     onnx.checker.check_model(model)
     onnx.save(model, path)

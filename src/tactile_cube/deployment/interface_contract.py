@@ -1,23 +1,45 @@
-"""What a robot's program must know to run an exported policy: order, units, scaling and rates, as plain data."""
+"""What a robot's program must know to run an exported policy, as plain data: a loop can be written from it alone."""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
+from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.controller import POLICY_RATE, READING
 from tactile_cube.deployment.network import Network
+from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand.dlr_hand2 import KD, KP, TORQUE_LIMIT
+
+FORMAT = "tactile_cube contract 2"
+FINGER = {
+    "q1": "abduction, 0 is straight",
+    "q2": "positive flexes, 0 is straight",
+    "q3": "positive flexes, 0 is straight",
+}
+TOLERANCE = 1e-5  # between float32 products in different orders
 
 
 def interface_contract(network: Network, hand: HandModel = DLR_HAND2) -> dict[str, Any]:
     """Return the contract of a policy, ready for JSON."""
     names = list(hand.joint_names)
+    constants = trained_constants(network.info)
     return {
-        "format": "tactile_cube contract 1",
+        "format": FORMAT,
         "joints": names,
+        "joint_convention": {
+            name: {"unit": "rad", "zero": 0.0, "direction": 1, "meaning": FINGER[name[-2:]]} for name in names
+        },
+        "joint_range": {"lower": _plain(hand.lower), "upper": _plain(hand.upper), "unit": "rad"},
+        "start_angles": {"angles": _plain(hand.start_angles), "unit": "rad", "homing": asdict(Homing())},
         "observation": {
             "name": "observation",
-            "shape": [network.observation_size],
+            "shape": ["batch", network.observation_size],
             "dtype": "float32",
             "readings": network.observation_size // READING,
             "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
@@ -26,22 +48,64 @@ def interface_contract(network: Network, hand: HandModel = DLR_HAND2) -> dict[st
         },
         "action": {
             "name": "action",
-            "shape": [network.action_size],
+            "shape": ["batch", network.action_size],
             "dtype": "float32",
             "range": [-1.0, 1.0],
             "meaning": "q_n = 0.5 * (lower + upper) + 0.5 * (upper - lower) * action, desired joint angles",
-            "lower": [float(value) for value in hand.action_lower],
-            "upper": [float(value) for value in hand.action_upper],
+            "lower": _plain(hand.action_lower),
+            "upper": _plain(hand.action_upper),
             "unit": "rad",
         },
-        "rates": {
-            "policy_hz": POLICY_RATE,
-            "fast_loop_hz": {"simulation": 500, "robot": 1000},
-        },
+        "rates": {"policy_hz": POLICY_RATE, "fast_loop_hz": {"simulation": 500, "robot": 1000}},
         "target_filter": {
             "law": "q_f += (1 - exp(-dt / T_s)) * (q_n - q_f), in the fast loop; starts at the measured angles",
             "time_constant_s": network.info.get("time_constant"),
         },
-        "impedance": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after rate and torque limits",
+        "limits": {
+            "order": "clip q_f to joint_range, then the rate, then the torque",
+            "rate": {"value": StopRules().speed, "unit": "rad/s"},
+            "torque": {"value": constants["torque_limit"], "unit": "N m"},
+            "torque_law": "q_d in [q_m + (K_D dq - limit) / K_P, q_m + (K_D dq + limit) / K_P]",
+        },
+        "impedance": {
+            "law": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after rate and torque limits",
+            "kp": {"value": constants["kp"], "unit": "N m/rad"},
+            "kd": {"value": constants["kd"], "unit": "N m s/rad"},
+        },
+        "stop": {
+            "rules": asdict(StopRules()),
+            "unit": {"silence": "s", "lateness": "s", "margin": "rad", "speed": "rad/s", "saturation": "s"},
+            "then": "hold the measured angles; start again from homing",
+        },
+        "test_vector": _test_vector(network, hand) | {"tolerance": TOLERANCE},
+        "sha256": {"weights": weights_hash(network), "of": "weight0, bias0, weight1, ... as little-endian float32"},
         "policy": {key: value for key, value in network.info.items() if key != "config"},
     }
+
+
+def trained_constants(info: Mapping[str, Any]) -> dict[str, float]:
+    """Return K_P, K_D and the torque limit that the policy was trained with, around which its gains were varied."""
+    given = ((info.get("config") or {}).get("env") or {}).get("constants") or {}
+    published = {"kp": KP, "kd": KD, "torque_limit": TORQUE_LIMIT}
+    return {key: float(given.get(key, value)) for key, value in published.items()}
+
+
+def weights_hash(network: Network) -> str:
+    """Return the SHA-256 of what the file computes with."""
+    digest = hashlib.sha256()
+    for weight, bias in network.deterministic_layers():
+        digest.update(np.ascontiguousarray(weight, dtype="<f4").tobytes())
+        digest.update(np.ascontiguousarray(bias, dtype="<f4").tobytes())
+    return digest.hexdigest()
+
+
+def _test_vector(network: Network, hand: HandModel) -> dict[str, Any]:
+    """An observation that leaves no place at zero, and the action that belongs to it."""
+    places = np.arange(network.observation_size)
+    rest = np.tile(np.concatenate([hand.start_angles, np.zeros(12)]), network.observation_size // READING)
+    observation = (rest + 0.05 * np.sin(1.0 + places)).astype(np.float32)
+    return {"observation": _plain(observation), "action": _plain(network(observation))}
+
+
+def _plain(values: Any) -> list[float]:
+    return [float(value) for value in values]

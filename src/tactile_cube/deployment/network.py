@@ -40,6 +40,12 @@ class Network:
         """Number of joints commanded; the other half of the outputs is the exploration's scale."""
         return int(self.weights[-1].shape[0]) // 2
 
+    def deterministic_layers(self) -> list[tuple[Array, Array]]:
+        """Return weights and biases without the outputs that only exploration uses."""
+        layers = list(zip(self.weights, self.biases, strict=True))
+        weight, bias = layers.pop()
+        return [*layers, (weight[: self.action_size], bias[: self.action_size])]
+
     def __call__(self, observation: Array) -> Array:
         """Return the action `(..., 12)` in [-1, 1] for observations `(..., 120)`."""
         signal = observation

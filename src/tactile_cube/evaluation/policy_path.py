@@ -6,7 +6,6 @@ from importlib import resources
 from pathlib import Path
 
 from tactile_cube.errors import InputError
-from tactile_cube.training.checkpoint import FILE
 
 BASELINES = ("hold", "random", "scripted", "replay:EPISODE.npz")
 """Names that are no files; evaluate knows them."""
@@ -49,6 +48,8 @@ def networks_path(name: str | None) -> str | None:
     Raises:
         InputError: there is no such file.
     """
+    from tactile_cube.training.checkpoint import FILE  # torch, which the robot's computer does without
+
     if name is None:
         return None
     checkpoint = Path(name) / FILE if Path(name).is_dir() else Path(name)

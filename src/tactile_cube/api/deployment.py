@@ -1,0 +1,136 @@
+"""Run a policy's control loop on a hand from a program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactile_cube.api.export import load_policy
+from tactile_cube.api.input_errors import as_input_errors
+from tactile_cube.api.job import Job, PathLike, Say, called_job
+
+if TYPE_CHECKING:
+    from tactile_cube.deployment.control_loop import ControlLoop
+    from tactile_cube.deployment.limits import Limits
+    from tactile_cube.deployment.network import Network
+    from tactile_cube.deployment.played_targets import PlayedTargets
+    from tactile_cube.deployment.robot import Robot
+    from tactile_cube.deployment.run_loop import LoopRun
+
+
+@dataclass(frozen=True)
+class DeploymentResult:
+    """What came of the control loop.
+
+    Attributes:
+        runs: how each run ended, its log and its tick times.
+        turned: how far the simulated hand turned the cube in each run [rad]; empty on another hand.
+        limits: of the commands.
+        job: the call.
+    """
+
+    runs: list[LoopRun]
+    turned: list[float]
+    limits: Limits
+    job: Job
+
+    @property
+    def text(self) -> str:
+        """Why each run ended, what the simulated hand turned, and how long a tick took."""
+        lines = [f"run {number}: {run.reason}" for number, run in enumerate(self.runs)]
+        if self.turned:
+            lines = [f"{line}; cube turned {a:.2f} rad" for line, a in zip(lines, self.turned, strict=True)]
+        ticks = {name: 1e6 * value for name, value in self.runs[-1].tick_times.items()}
+        shown = ", ".join(f"{name} {value:.0f} us" for name, value in ticks.items())
+        return "\n".join([*lines, f"computing time of a tick: {shown}; a period lasts {1e6 / self.rate:.0f} us"])
+
+    @property
+    def rate(self) -> float:
+        """Of the fast loop [Hz]."""
+        return float(self.job.config.robot.rate)
+
+    def write(self, folder: PathLike) -> Path | None:
+        """Write the log of every run in which the policy decided as one recording; None if there is none."""
+        from tactile_cube.deployment.run_log import write_runs
+
+        logs = [run.log for run in self.runs if run.log.time]
+        resolution = float(self.job.config.robot.get("resolution", 0.0))
+        return write_runs(logs, Path(folder), self.limits, self.rate, resolution) if logs else None
+
+
+@as_input_errors
+def deploy(policy: PathLike | None = None, *settings: str, say: Say = print) -> DeploymentResult:
+    """Run the control loop of a policy on a hand: by default a dry run on the simulated one.
+
+    Args:
+        policy: a policy file, a training run's folder, or a policy that ships with the package; None: the shipped one.
+        settings: choices and values as on the command line, e.g. "seconds=10", "robot.cube=false", "robot=ros2".
+        say: takes a line at each change of mode.
+
+    Raises:
+        InputError: a policy without a filter time, a hand that is not there.
+    """
+    return run_deployment(called_job("deploy", settings, policy=None if policy is None else str(policy)), say)
+
+
+def run_deployment(job: Job, say: Say) -> DeploymentResult:
+    """Home, run, stop, as often as the job says; every run with a new loop."""
+    from hydra.utils import instantiate
+
+    from tactile_cube.deployment.run_loop import run_loop
+    from tactile_cube.deployment.simulated_hand import SimulatedHand
+
+    config, network = job.config, load_policy(job.config.policy)
+    limits = contract_limits(network, float(config.rate_limit))
+    runs, turned = [], []
+    for number in range(config.runs):
+        seed = {"seed": config.seed + number} if "simulated" in str(config.robot._target_) else {}
+        robot: Robot = instantiate(config.robot, **seed)
+        try:
+            runs.append(run_loop(control_loop(job, network, limits), robot, say))
+            if isinstance(robot, SimulatedHand) and robot.has_cube:
+                turned.append(robot.turned)
+        finally:
+            robot.close()
+    return DeploymentResult(runs, turned, limits, job)
+
+
+def control_loop(job: Job, network: Network, limits: Limits) -> ControlLoop:
+    """A new loop as a job describes it."""
+    from hydra.utils import instantiate
+
+    from tactile_cube.deployment.control_loop import ControlLoop
+    from tactile_cube.deployment.controller import Controller
+    from tactile_cube.deployment.played_targets import excited_targets
+    from tactile_cube.errors import InputError
+
+    config = job.config
+    trained: Any = network.info.get("time_constant")
+    time_constant = trained if config.filter_time is None else config.filter_time
+    if time_constant is None:
+        raise InputError("the policy file does not say its filter time T_s; give filter_time=SECONDS")
+    if config.motion == "policy":
+        decides: Controller | PlayedTargets = Controller(network)
+    else:  # every run the same commands: repeats show the noise floor
+        decides = excited_targets(config.motion, float(config.reach), float(config.seconds), config.seed)
+    rules, homing = instantiate(config.stop), instantiate(config.homing)
+    return ControlLoop(decides, float(time_constant), limits, rules, homing, float(config.seconds))
+
+
+def contract_limits(network: Network, rate: float) -> Limits:
+    """The limits of the interface contract: the hand's range, the gains and the torque of the training.
+
+    Args:
+        network: the policy.
+        rate: largest change of a desired angle [rad/s].
+    """
+    import numpy as np
+
+    from tactile_cube.deployment.interface_contract import trained_constants
+    from tactile_cube.deployment.limits import Limits
+    from tactile_cube.hand import DLR_HAND2
+
+    trained = trained_constants(network.info)
+    gains = (np.full(12, trained["kp"]), np.full(12, trained["kd"]))
+    return Limits(DLR_HAND2.lower, DLR_HAND2.upper, rate, trained["torque_limit"], *gains)

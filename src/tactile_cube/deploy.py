@@ -1,0 +1,27 @@
+"""Run a policy's control loop on a hand: a dry run on the simulated one, or ROS 2."""
+
+from __future__ import annotations
+
+from omegaconf import DictConfig
+
+from tactile_cube.cli import verb
+
+
+@verb("deploy")
+def main(config: DictConfig) -> None:
+    """Home the fingers, let the policy decide, stop; write the loop's log as a recording."""
+    import functools
+
+    from tactile_cube.api.deployment import run_deployment
+    from tactile_cube.api.job import typed_job
+
+    job = typed_job(config)
+    result = run_deployment(job, functools.partial(print, flush=True))
+    print(result.text)
+    recording = result.write(job.folder / "recording") if config.record else None
+    if recording is not None:
+        print(f"log: {recording}\nnext: python -m tactile_cube.compare recording={recording}")
+
+
+if __name__ == "__main__":
+    main()

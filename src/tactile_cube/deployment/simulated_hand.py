@@ -1,0 +1,125 @@
+"""The simulated hand as the control loop sees a real one: for dry runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.deployment.robot import Reading
+from tactile_cube.hand import DLR_HAND2
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
+
+Array = NDArray[np.float64]
+AWAY = (0.0, 0.0, -0.3)  # [m] where the cube waits
+NO_FILTER = 1e-9  # [s]: the loop filters, the world must not filter again
+
+
+@dataclass(frozen=True)
+class Disturbed:
+    """What a link between loop and hand gets wrong.
+
+    Attributes:
+        lost: share of the measurements that never arrive.
+        jitter: share of the ticks that come one to five periods late.
+    """
+
+    lost: float = 0.0
+    jitter: float = 0.0
+
+
+class SimulatedHand:
+    """A world that moves on while the loop waits, at the rate of the loop.
+
+    Args:
+        rate: of the fast loop [Hz].
+        cube: whether there is one to hand over.
+        noise: standard deviation of the measured angles [rad].
+        resolution: of the measured angles [rad].
+        opened: how far the fingers are from the start angles at first [rad].
+        link: what gets lost on the way.
+        seed: of noise and link.
+        constants: of the world; None: the published ones.
+    """
+
+    def __init__(
+        self,
+        rate: float = 1000.0,
+        cube: bool = True,
+        noise: float = 2e-4,
+        resolution: float = 1e-4,
+        opened: float = 0.1,
+        link: Disturbed | None = None,
+        seed: int = 0,
+        constants: EpisodeConstants | None = None,
+    ) -> None:
+        self._world = World(options=SimulationOptions(dt=1.0 / rate, substeps=1))
+        self._rate, self._noise, self._resolution = rate, noise, resolution
+        self._cube, self._link = cube, link or Disturbed()
+        self._rng = np.random.default_rng(seed)
+        self._given = constants or EpisodeConstants()
+        self._ticks, self._late = 0, 0
+        home = np.asarray(DLR_HAND2.start_angles)
+        away = home - opened * np.tile([0.0, 1.0, 1.0], 4)
+        self._world.reset(self._constants(weight=0.0), Start(np.maximum(away, DLR_HAND2.lower), AWAY))
+        self._q_d = np.array(self._world.q_m)
+        self._yaw, self._last_yaw = 0.0, 0.0
+
+    @property
+    def world(self) -> World:
+        """What simulates."""
+        return self._world
+
+    @property
+    def has_cube(self) -> bool:
+        """Whether there is a cube to turn."""
+        return self._cube
+
+    @property
+    def turned(self) -> float:
+        """How far the cube has been turned about the vertical since it was handed over, unwrapped [rad]."""
+        return abs(self._yaw)
+
+    def wait(self) -> float:
+        """Let the world go on by a period, by more where the tick is late."""
+        late = self._rng.random() < self._link.jitter
+        for _ in range(1 + (int(self._rng.integers(1, 6)) if late else 0)):
+            self._world.step(self._q_d)
+            self._ticks += 1
+            self._follow_cube()
+        return self._ticks / self._rate
+
+    def read(self) -> Reading | None:
+        """Return what the sensors show now, unless it is lost."""
+        if self._rng.random() < self._link.lost:
+            return None
+        q_m = self._world.q_m + self._rng.normal(0.0, self._noise, 12)
+        if self._resolution > 0.0:
+            q_m = np.round(q_m / self._resolution) * self._resolution
+        return Reading(self._ticks / self._rate, q_m, np.array(self._world.dq), np.array(self._world.torque))
+
+    def send(self, q_d: Array) -> None:
+        """The world's impedance controller takes these angles from the next physics step on."""
+        self._q_d = np.array(q_d)
+
+    def hand_over(self) -> None:
+        """Put the cube between the fingers, held by somebody for the first 0.4 s."""
+        if self._cube:
+            world, held = self._world, self._given.gravity_onset
+            start = Start(np.array(world.q), target=np.array(self._q_d), velocities=np.array(world.dq))
+            world.reset(self._constants(self._given.gravity_scale, round(0.1 * held * self._rate)), start)
+
+    def close(self) -> None:
+        """End the physics server."""
+        self._world.close()
+
+    def _follow_cube(self) -> None:
+        x, y, z, w = self._world.cube_quaternion
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        self._yaw += math.remainder(yaw - self._last_yaw, 2.0 * math.pi)
+        self._last_yaw = yaw
+
+    def _constants(self, weight: float, onset: int = 0) -> EpisodeConstants:
+        return replace(self._given, filter_time=NO_FILTER, gravity_scale=weight, gravity_onset=onset)

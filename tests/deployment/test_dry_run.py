@@ -1,0 +1,64 @@
+"""The whole loop against the simulated hand: it turns the cube, its log is a recording, faults of the link stop it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hydra.utils import instantiate
+
+import tactile_cube
+from tactile_cube.composition import composed
+from tactile_cube.deployment.control_loop import Homing
+from tactile_cube.deployment.run_log import RunLog
+from tactile_cube.deployment.stop_rules import StopRules
+
+
+def quiet(line: str) -> None:
+    """Takes progress."""
+
+
+def test_the_loop_turns_the_cube_with_jitter_and_lost_messages_too() -> None:
+    done = tactile_cube.deploy(None, "seconds=3", "robot.link.lost=0.2", "robot.link.jitter=0.05", say=quiet)
+    assert done.runs[0].reason == "time is over"
+    assert done.turned[0] > 0.7
+    assert done.runs[0].tick_times["median"] < 0.05
+    assert "cube turned" in done.text
+
+
+def test_the_log_of_a_dry_run_is_a_recording_that_the_model_follows_down_to_the_noise(tmp_path: Path) -> None:
+    settings = ["seconds=2.5", "runs=2", "robot.cube=false", "motion=multisine", "filter_time=0.1", "reach=0.12"]
+    done = tactile_cube.deploy(None, *settings, say=quiet)
+    assert done.turned == []
+    recording = done.write(tmp_path / "log")
+    assert recording is not None
+    compared = tactile_cube.compare(recording, "band.simulations=0", "step=0.001", say=quiet)
+    assert compared.comparison.floor.repeats > 0
+    assert compared.error < 1.3 * compared.noise_floor
+    assert np.ptp(compared.comparison.recording.trials[0].position, axis=0).min() > 0.05
+    description = recording / "recording.yaml"
+    description.write_text(description.read_text().replace("3.69", "3.3"))
+    wrong = tactile_cube.compare(recording, "band.simulations=0", "step=0.001", say=quiet)
+    assert wrong.error > 2.0 * compared.error
+
+
+def test_a_broken_link_stops_the_fingers_and_what_came_before_is_kept() -> None:
+    done = tactile_cube.deploy(None, "seconds=2", "robot.link.lost=0.9", "stop.silence=0.01", say=quiet)
+    assert "no measurement for" in done.runs[0].reason
+
+
+def test_ticks_without_a_measurement_leave_a_gap_in_the_log() -> None:
+    log = RunLog()
+    log.add(None, np.zeros(12))
+    assert log.time == []
+
+
+@pytest.mark.parametrize("settings", [["motion=jumps"], ["seconds=0"]])
+def test_what_cannot_be_run_is_an_input_error(settings: list[str]) -> None:
+    with pytest.raises(tactile_cube.InputError):
+        tactile_cube.deploy(None, *settings, say=quiet)
+
+
+def test_the_contract_states_the_stop_rules_and_the_homing_that_the_loop_takes() -> None:
+    config = composed("deploy", [])
+    assert instantiate(config.stop) == StopRules()
+    assert instantiate(config.homing) == Homing()
