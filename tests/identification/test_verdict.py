@@ -9,7 +9,7 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.diagnosis import Unexplained, follows_signals
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.model import Model, Term
-from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings
@@ -247,7 +247,7 @@ def test_much_that_few_segments_do_not_tell_from_chance_is_unproven_not_unknown(
 def with_waves(one: Explanation, sine: float) -> Explanation:
     values = {"sine": sine, "cosine": 0.0, "harmonic": 4.5}
     term = Term(find_effect("transmission_error"), "q1", values, tuple(values))
-    return replace(one, fit=replace(FIT, model=Model({}, (term,), {})))
+    return replace(one, fit=replace(FIT, model=Model({}, (term,), {}), unknowns=term_unknowns(term, 0)))
 
 
 def test_an_effect_whose_number_ends_at_the_edge_of_the_plausible_stands_in_for_another() -> None:

@@ -4,8 +4,6 @@ The names in capitals are offsets into the memory, see `memory_layout`; C chains
 """
 
 FREE_STEP = '''
-UNSURE = 0.025  # [s] to either side of a segment's start, from which its measured speed is read
-
 
 @inner
 def free_step(command, memory):
@@ -117,7 +115,7 @@ def roll_segments(
     commands, length, history, substeps, segment, position, speed, beginning, nudge, memory, rows, out
 ):
     trial, free = memory.copy(), np.zeros(C * n)
-    around = round(UNSURE / memory[DT])
+    around = round(memory[UNSURE] / memory[DT])  # steps from which the measured speed is read
     for k in range(history + length):
         if k >= history and (k - history) % segment == 0:
             part = (k - history) // segment

@@ -85,7 +85,7 @@ def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, 
 
 
 def _header() -> dict[str, Shape]:
-    return {key: (1,) for key in ("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading")}
+    return {key: (1,) for key in ("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading", "unsure")}
 
 
 def _joint_constants(joints: int) -> dict[str, Shape]:

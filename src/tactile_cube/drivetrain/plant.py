@@ -38,6 +38,8 @@ CONTACT_TORQUE_LIMIT = 5.0
 
 LAST_SUBSTEP = 1e9
 """Default of the key `reading`: a rollout reads each row's signals when its command has acted for the whole row."""
+UNSURE = 0.025
+"""Default of the key `unsure`: time to either side of a segment's start from which its measured speed is read [s]."""
 
 
 class Plant:
@@ -194,6 +196,7 @@ class Plant:
             "trace_rows": self.trace_rows,
             "trace_offset": first_state,
             "reading": LAST_SUBSTEP,
+            "unsure": UNSURE,
         }
         for key, value in header.items():
             self.view(memory, key)[...] = value

@@ -137,7 +137,7 @@ def diagnose(
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
         known=tuple(term.label for term in search.start.terms),
-        common=common_offsets(findings.base, recording.joints) if verdict.kind == "adequate" else (),
+        common=common_offsets(findings.base, search.shooting.sizes) if verdict.kind == "adequate" else (),
     )
 
 

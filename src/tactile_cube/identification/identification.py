@@ -106,7 +106,7 @@ def _judged(search: Search, held_out: Recording, model: Model) -> Model:
 def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str) -> Fit:
     """The fit with one more effect, in whichever of its forms and from whichever start it does best."""
     frozen = search.frozen(current)
-    every = candidates(search.fitted, [effect])
+    every = candidates(search.shooting.sizes, [effect])
     every += residual_candidates(search.problem, search.fitted, frozen, [effect])
     options = [c for c in every if c.joints == (joint,)]
     refitted = [search.refit(frozen, option)[1] for option in options]

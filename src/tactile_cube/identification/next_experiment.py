@@ -16,7 +16,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 
 Array = NDArray[np.float64]
-DURATION = 12.0  # [s]
+DURATION = 12.0  # [s] of a finger
 FASTEST = 1.5  # times the fastest command of the recording: known to be safe, with a little more
 
 
@@ -55,9 +55,9 @@ def next_experiment(
     shooting: Shooting, recording: Recording, rivals: dict[str, Model], noise: Array, seed: int = 0
 ) -> Experiment:
     """The excitation whose worst-told pair of rivals differs most, in units of the noise."""
-    excitations = safe_excitations(recording, seed)
+    excitations = safe_excitations(recording, seed, shooting.time)
     trials = [_trial(recording, name, commands) for name, commands in excitations.items()]
-    stretches = [cut(recording, noise, [trial], segment=len(trial.time)) for trial in trials]
+    stretches = [cut(recording, noise, [trial], segment=len(trial.time), time=shooting.time) for trial in trials]
     models = [_without_offsets(model) for model in rivals.values()]
     best: Experiment | None = None
     for trial, stretch in zip(trials, stretches, strict=True):
@@ -73,12 +73,12 @@ def next_experiment(
     return best
 
 
-def safe_excitations(recording: Recording, seed: int) -> dict[str, Array]:
+def safe_excitations(recording: Recording, seed: int, unit: float = 1.0) -> dict[str, Array]:
     """Commands (T, n) inside the positions and near the speeds that the recording has shown to be safe."""
     everything = np.concatenate([trial.command for trial in recording.trials])
     low, high = everything.min(axis=0), everything.max(axis=0)
     fastest = max(np.abs(np.diff(trial.command, axis=0)).max() / trial.step for trial in recording.trials)
-    time: Array = np.arange(round(DURATION / recording.step), dtype=np.float64) * recording.step
+    time: Array = np.arange(round(DURATION * unit / recording.step), dtype=np.float64) * recording.step / unit
     rng = np.random.default_rng(seed)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     phases = rng.uniform(0.0, 2.0 * np.pi, len(low))

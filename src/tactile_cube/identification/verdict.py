@@ -67,13 +67,12 @@ def stretched(one: Explanation) -> bool:
 
     Then the law stands in for another one: so do waves longer than the range of motion for any bent curve.
     """
-    terms = one.fit.model.terms
+    model = one.fit.model
     return any(
-        math.isclose(term.values[p.name], edge, rel_tol=1e-6) and edge != p.neutral
-        for term in terms[max(len(terms) - one.terms, 0) :]
-        for p in term.effect.parameters
-        if p.name in term.fitted
-        for edge in (p.low, p.high)
+        math.isclose(unknown.of(model), edge, rel_tol=1e-6) and edge != unknown.neutral
+        for unknown in one.fit.unknowns
+        if unknown.kind == "effect" and unknown.place >= len(model.terms) - one.terms
+        for edge in (unknown.low, unknown.high)
     )
 
 

@@ -6,24 +6,32 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.drivetrain.effects.scales import FINGER, Scales
 from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.search.candidates import Candidate, _mirrored, candidates
+from tactile_cube.identification.joint_scales import joint_scales
+from tactile_cube.identification.search.candidates import Candidate, candidates
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.shortlist import resized
 from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
 from tests.measurement.small_rig import write
 
 SCORE = Score(Candidate(find_effect("command_delay"), ("q1",), {"delay": 0.005}), Model({}, (), {}), 1.0, 3.0)
 
 
+def sizes(recording: Recording) -> dict[str, Scales]:
+    return dict(zip(recording.joints, joint_scales(recording), strict=True))
+
+
 def test_several_numbers_start_with_either_sign() -> None:
-    form = {"difference": 0.02, "friction": 0.02}
-    assert _mirrored(find_effect("asymmetric_friction"), form) == [{"difference": -0.02, "friction": 0.02}]
+    starts = find_effect("asymmetric_friction").starts_at(FINGER)
+    assert {"difference": 0.02, "friction": 0.02} in starts
+    assert {"difference": -0.02, "friction": 0.02} in starts
 
 
 def test_a_single_number_and_a_place_have_no_other_sign() -> None:
-    assert _mirrored(find_effect("torque_bias"), {"bias": 0.005}) == []
-    assert _mirrored(find_effect("joint_stop"), {"upper": 1.0, "stiffness": 5.0}) == []
+    assert find_effect("torque_bias").starts_at(FINGER) == [{"bias": 0.005}]
+    assert len(find_effect("joint_stop").starts_at(FINGER)) == 6
 
 
 def test_a_single_number_starts_as_large_as_the_first_look_says() -> None:
@@ -44,7 +52,7 @@ def test_other_starts_stay(score: Score) -> None:
 
 def test_a_stiffening_drive_starts_where_its_bend_can_be_seen(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path))
-    found = [c for c in candidates(recording, [find_effect("stiffening_elasticity")]) if c.joints == ("a",)]
+    found = [c for c in candidates(sizes(recording), [find_effect("stiffening_elasticity")]) if c.joints == ("a",)]
     torque = [3.0 * (t.command - t.position) - 0.2 * t.velocity() for t in recording.trials]
     usual = float(np.quantile(np.abs(np.concatenate(torque)[:, 0]), 0.9))
     bends = [c.form["cubic"] * (c.form["compliance"] * usual) ** 3 / usual for c in found]
@@ -56,7 +64,7 @@ def test_where_torques_are_commanded_a_saturation_starts_among_them(tmp_path: Pa
         data["controller"] = {"mode": "torque"}
 
     recording = read_recording(write(tmp_path, commanded))
-    found = candidates(recording, [find_effect("torque_saturation")])
+    found = candidates(sizes(recording), [find_effect("torque_saturation")])
     largest = max(np.abs(t.command[:, 0]).max() for t in recording.trials)
     starts = [c.form["limit"] for c in found if c.joints == ("a",)]
     assert len(starts) == 9

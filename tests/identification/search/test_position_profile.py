@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import ANGLE, JOINT_TORQUE, find_effect
+from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.drivetrain.signals import ROWS
-from tactile_cube.identification.search import position_profile
 from tactile_cube.identification.search.candidates import forms
 from tactile_cube.identification.search.position_profile import PROFILE, start_of
 from tactile_cube.identification.search.residual_shape import Missing
@@ -18,14 +20,13 @@ def detent(position: np.ndarray) -> np.ndarray:
     return -0.05 * x * np.exp(0.5 - 0.5 * x**2)
 
 
-def test_a_profile_starts_at_the_torque_that_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(position_profile, "position_range", lambda recording, joint: (-0.8, 1.0))
+def test_a_profile_starts_at_the_torque_that_is_missing() -> None:
     rng = np.random.default_rng(3)
     position = rng.uniform(-0.8, 1.0, 20_000)
     torque = detent(position) + 0.02 * rng.normal(size=len(position))
     none = np.zeros(len(position), dtype=np.int64)
     missing = Missing("q1", torque, {"position of q1 [rad]": position}, none, none)
-    start = start_of(EFFECT, FORM, missing, recording=None)  # type: ignore[arg-type]
+    start = start_of(EFFECT, FORM, missing, replace(FINGER, low=-0.8, high=1.0))
     values = np.array([({"first": -0.8, "last": 1.0} | start).get(p.name, p.neutral) for p in EFFECT.parameters])
     x = np.zeros((ROWS, 1))
     for angle in np.linspace(-0.7, 0.9, 30):

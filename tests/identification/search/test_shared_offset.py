@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.shared_offset import common_offsets, shared_offset
 from tests.identification.test_verdict import FIT, judged
 
+SIZES = {"q1": FINGER, "q2": FINGER}
 RECORDING = type("Recording", (), {"joints": ("q1", "q2")})
 
 
@@ -20,7 +22,8 @@ def base(*postures: list[float]) -> Explanation:
 
 
 def test_offsets_alike_in_many_initialisations_are_the_encoders() -> None:
-    found = shared_offset(base(*([-0.08 + 1e-4 * k, 0.01] for k in range(5))), RECORDING, list(catalogue().values()))
+    start = base(*([-0.08 + 1e-4 * k, 0.01] for k in range(5)))
+    found = shared_offset(start, RECORDING, list(catalogue().values()), SIZES)
     assert found is not None
     assert found.effects[0].joints == ("q1",)
     assert found.fit.model.terms[0].values["offset"] == pytest.approx(0.08, abs=1e-3)
@@ -29,11 +32,11 @@ def test_offsets_alike_in_many_initialisations_are_the_encoders() -> None:
 @pytest.mark.parametrize("second", [-0.078, 0.05])
 def test_two_initialisations_that_agree_are_worth_a_word_and_no_more(second: float) -> None:
     start = base([-0.08, 0.01], [second, -0.02])
-    assert shared_offset(start, RECORDING, list(catalogue().values())) is None
-    assert [(one.joint, one.initialisations) for one in common_offsets(start, ("q1", "q2"))] == (
+    assert shared_offset(start, RECORDING, list(catalogue().values()), SIZES) is None
+    assert [(one.joint, one.initialisations) for one in common_offsets(start, SIZES)] == (
         [("q1", 2)] if second < 0 else []
     )
 
 
 def test_one_initialisation_tells_nothing() -> None:
-    assert common_offsets(base([-0.08, 0.01]), ("q1", "q2")) == ()
+    assert common_offsets(base([-0.08, 0.01]), SIZES) == ()

@@ -1,7 +1,11 @@
 """A command that is ignored while it asks for little."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import COMMAND, DAMPING, MOTOR_POSITION, TORQUE, VELOCITY
+
+DEAD = (0.1, 0.4)
+"""Parts of the usual torque at which a dead zone of the torque starts."""
 
 
 class CommandDeadZone(Effect):
@@ -32,6 +36,12 @@ class CommandDeadZone(Effect):
         {"play": 0.005},
         {"torque": 0.01},
     )
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """The forms; that of the torque at parts of the usual torque."""
+        others = [form for form in super().starts_at(scales) if "torque" not in form]
+        return [*others, *({"torque": share * scales.torque} for share in DEAD)]
 
     @classmethod
     def state_size(cls, dt: float) -> int:

@@ -6,7 +6,8 @@ from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Sta
 from tactile_cube.drivetrain.signals import COMMAND
 
 LONGEST = 0.1
-"""Longest delay that is remembered [s]."""
+"""Longest delay that is remembered [s], if it is not less than so many steps."""
+STEPS = 50
 
 
 class CommandDelay(Effect):
@@ -21,7 +22,7 @@ class CommandDelay(Effect):
 
     @classmethod
     def state_size(cls, dt: float) -> int:  # noqa: D102
-        return 4 + ceil(LONGEST / dt - 1e-9)
+        return 4 + max(STEPS, ceil(LONGEST / dt - 1e-9))
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:  # noqa: D102

@@ -1,6 +1,7 @@
 """A coupled joint that does not follow its leader exactly."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Stage, View
+from tactile_cube.drivetrain.effects.scales import Scales
 
 
 class CouplingError(Effect):
@@ -20,6 +21,11 @@ class CouplingError(Effect):
         {"offset": 0.05},
         {"ratio": 0.1, "offset": 0.05},
     )
+
+    @classmethod
+    def can_act(cls, scales: Scales) -> bool:
+        """Only a joint that another one follows has a coupling."""
+        return scales.leads
 
     @staticmethod
     def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102

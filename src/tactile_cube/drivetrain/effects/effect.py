@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import isfinite
 from typing import ClassVar
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactile_cube.drivetrain import signals
+from tactile_cube.drivetrain.effects.scales import Scales, unit_at
 from tactile_cube.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -33,11 +34,11 @@ class Stage(Enum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect.
+    """A number of an effect, its sizes stated for a finger's joint; `at` tells them for a joint of any other size.
 
     Attributes:
         name: its key in configurations and model files.
-        unit: SI, `1` for none.
+        unit: SI, `1` for none, of a joint that turns; at one that slides `N m` stands for N and `rad` for m.
         neutral: the value at which the effect changes nothing.
         low: smallest value that a search may try.
         high: largest.
@@ -54,6 +55,13 @@ class Parameter:
     typical: float
     source: str
     scale: float | None = None
+
+    def at(self, scales: Scales) -> Parameter:
+        """The same number at a joint of these sizes."""
+        factor = scales.of(self.unit)
+        sizes = {key: factor * getattr(self, key) for key in ("neutral", "low", "high", "typical")}
+        scale = None if self.scale is None else factor * self.scale
+        return replace(self, **sizes, scale=scale, unit=unit_at(self.unit, scales.slides))
 
 
 @dataclass(frozen=True)
@@ -104,6 +112,10 @@ class Effect:
     """
     contains: ClassVar[tuple[str, ...]] = ()
     """Names of simpler effects that this one becomes at some of its values, so that it always follows data as well."""
+    constant_reading: ClassVar[str] = ""
+    """The parameter by which it adds a constant to the reading of the position, as every initialisation does."""
+    from_residual: ClassVar[tuple[str, ...]] = ("harmonic", "torque_0")
+    """Parameters whose start is read from what is missing: a form that has one waits for a fitted model."""
     acts_on_torque: ClassVar[bool] = False
     """Whether the effect has a `torque_law` beside its `law`."""
     acts_ahead: ClassVar[bool] = False
@@ -123,6 +135,42 @@ class Effect:
         for key, value in self.values.items():
             if not isfinite(value):
                 raise InputError(f"effect '{self.name}': {key} is {value}; give a finite number")
+
+    @classmethod
+    def parameters_at(cls, scales: Scales) -> dict[str, Parameter]:
+        """The parameters by name with the sizes that they have at a joint."""
+        return {p.name: p.at(scales) for p in cls.parameters}
+
+    @classmethod
+    def forms_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """The forms, or all parameters at their typical values, with the sizes that they have at a joint."""
+        factor = {p.name: scales.of(p.unit) for p in cls.parameters}
+        plain = cls.forms or ({p.name: p.typical for p in cls.parameters},)
+        return [{name: factor[name] * value for name, value in form.items()} for form in plain]
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Where a search begins at a joint: parameters to fit and their starts.
+
+        By default the forms. In a form of several numbers the first one that may have either sign starts with both: a
+        first look scales a whole effect, and one number's sign is not that of the whole.
+        """
+        known = cls.forms_at(scales)
+        signed = {p.name for p in cls.parameters if p.neutral == 0.0 and p.low < 0.0}
+        for form in list(known):
+            first = next((name for name, value in form.items() if name in signed and value), None)
+            known += [{**form, first: -form[first]}] if first and len(form) > 1 else []
+        return known
+
+    @classmethod
+    def placed_at(cls, scales: Scales) -> dict[str, float]:
+        """Values of parameters that are not fitted but follow from what a recording shows of the joint."""
+        return {}
+
+    @classmethod
+    def can_act(cls, scales: Scales) -> bool:
+        """Whether it can act at a joint at all."""
+        return True
 
     @classmethod
     def state_size(cls, dt: float) -> int:

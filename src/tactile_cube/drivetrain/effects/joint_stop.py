@@ -1,7 +1,11 @@
 """An end stop inside the range of motion."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, VELOCITY
+
+SHARES = (0.03, 0.12, 0.3)
+"""Of the range of motion by which a stop lies within it, where a search starts."""
 
 
 class JointStop(Effect):
@@ -41,6 +45,16 @@ class JointStop(Effect):
         {"upper": 1.0, "stiffness": 5.0},
         {"lower": -1.0, "stiffness": 5.0},
     )
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Stops within the range that the recording shows."""
+        inside = [share * scales.span for share in SHARES]
+        upper, lower = cls.forms_at(scales)
+        return [
+            *({**upper, "upper": scales.high - step} for step in inside),
+            *({**lower, "lower": scales.low + step} for step in inside),
+        ]
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

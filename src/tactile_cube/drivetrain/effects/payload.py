@@ -3,6 +3,7 @@
 import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Stage, View
+from tactile_cube.drivetrain.effects.scales import Scales
 
 
 class Payload(Effect):
@@ -19,6 +20,12 @@ class Payload(Effect):
         Parameter("mass", "kg", 0.0, -0.2, 5.0, 0.02, "0-20 % of the link's mass, or a tool"),
         Parameter("distance", "m", 0.03, 0.0, 1.0, 0.03, "within the link"),
     )
+
+    @classmethod
+    def forms_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """A joint that slides does not feel where on the link the mass lies."""
+        (form,) = super().forms_at(scales)
+        return [{"mass": form["mass"]} if scales.slides else form]
 
     @staticmethod
     def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102

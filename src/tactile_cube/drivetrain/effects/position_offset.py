@@ -11,6 +11,7 @@ class PositionOffset(Effect):
     """
 
     name = "position_offset"
+    constant_reading = "offset"
     stage = Stage.POSITION_SENSOR
     parameters = (Parameter("offset", unit="rad", neutral=0.0, low=-0.3, high=0.3, typical=0.02, source="0.5-3 deg"),)
 

@@ -1,6 +1,7 @@
 """A torque that depends on the position alone."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE
 
 KNOTS = 17
@@ -33,6 +34,11 @@ class PositionTorque(Effect):
         {"stiffness": 0.05, "bias": 0.0},
         {f"torque_{k}": 0.01 for k in range(KNOTS)},
     )
+
+    @classmethod
+    def placed_at(cls, scales: Scales) -> dict[str, float]:
+        """The profile spans the range that the recording shows."""
+        return {"first": scales.low, "last": scales.high}
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

@@ -1,7 +1,11 @@
 """A command that may only change so fast."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import COMMAND
+
+SHARES = (0.8, 0.4, 0.15)
+"""Of the fastest command, where a search starts."""
 
 
 class RateLimit(Effect):
@@ -23,6 +27,11 @@ class RateLimit(Effect):
             source="below the fastest command",
         ),
     )
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Limits below the fastest command."""
+        return [{"speed": share * scales.command_speed} for share in SHARES]
 
     @classmethod
     def state_size(cls, dt: float) -> int:

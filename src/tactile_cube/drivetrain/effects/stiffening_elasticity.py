@@ -3,7 +3,11 @@
 from math import asinh, sinh, sqrt
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DEFLECTION, TORQUE
+
+CUBIC = (0.01, 0.1, 1.0)
+"""Parts of the usual torque at which the cubic part of the spring bends as far as the linear one."""
 
 
 class StiffeningElasticity(Effect):
@@ -37,6 +41,13 @@ class StiffeningElasticity(Effect):
     )
 
     forms = ({"compliance": 0.1, "cubic": 2e3},)
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Springs whose cubic part is as large as the linear one below, at about, or beyond the usual torque."""
+        (form,) = cls.forms_at(scales)
+        soft = form["compliance"]
+        return [{**form, "cubic": 1.0 / (soft**3 * (part * scales.torque) ** 2)} for part in CUBIC]
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

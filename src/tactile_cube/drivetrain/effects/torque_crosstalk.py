@@ -1,6 +1,7 @@
 """A joint that feels part of its neighbours' torque."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import TORQUE
 
 
@@ -21,6 +22,11 @@ class TorqueCrosstalk(Effect):
         {"from_previous": 0.05},
         {"from_next": 0.05},
     )
+
+    @classmethod
+    def can_act(cls, scales: Scales) -> bool:
+        """Only where there are neighbours."""
+        return scales.neighbours > 0
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

@@ -1,7 +1,13 @@
 """A torque limit below the stated one."""
 
+import numpy as np
+
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DAMPING, TORQUE
+
+LEVELS = 9
+"""Between the torque exceeded in half of the samples and the largest ones, by equal factors."""
 
 
 class TorqueSaturation(Effect):
@@ -24,6 +30,11 @@ class TorqueSaturation(Effect):
             scale=0.02,
         ),
     )
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Limits among the torques that the recording asks for."""
+        return [{"limit": float(level)} for level in np.geomspace(scales.often, scales.seldom, LEVELS)]
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

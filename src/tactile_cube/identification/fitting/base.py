@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import EffectEstimate, ModelFile
 from tactile_cube.identification.fitting.model import Model, Term, Unknown
 from tactile_cube.measurement.comparing.postures import LARGEST_OFFSET
@@ -24,9 +25,8 @@ TOLERANCE = {
 """Part of the nominal value at which a constant still counts as the nominal one; more is an effect that is missing."""
 MEASURED = (0.2, 5.0)
 SPREAD = 0.12  # relative standard deviation of a true constant about its nominal value
-CREEP_SPREAD = 0.1  # [rad/s per N m]
-OFFSET_SPREAD = 0.01  # [rad]
-LARGEST_CREEP = 1.0  # [rad/s per N m] joints that stick give way slowly where friction is regularised
+OFFSET, OFFSET_SPREAD = 0.05, 0.01  # [rad] of a finger
+CREEP, CREEP_SPREAD, LARGEST_CREEP = 0.05, 0.1, 1.0  # [rad/s per N m] where friction is regularised
 
 
 def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model:
@@ -60,7 +60,9 @@ def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
     return TOLERANCE | wide
 
 
-def base_unknowns(recording: Recording, nominal: Mapping[str, Array]) -> tuple[Unknown, ...]:
+def base_unknowns(
+    recording: Recording, nominal: Mapping[str, Array], sizes: Mapping[str, Scales]
+) -> tuple[Unknown, ...]:
     """Constants that a refit may change, about their `nominal` values, and the joint offsets of each initialisation."""
     joints = range(len(recording.joints))
     constants = [
@@ -70,21 +72,31 @@ def base_unknowns(recording: Recording, nominal: Mapping[str, Array]) -> tuple[U
         if 0.0 < nominal[key][j] < np.inf
     ]
     creeps = [
-        Unknown("constant", "friction_creep", j, 0.0, LARGEST_CREEP, 0.05, spread=CREEP_SPREAD)
-        for j in joints
+        _creep(j, sizes[joint].of("rad/s") / sizes[joint].of("N m"))
+        for j, joint in enumerate(recording.joints)
         if nominal["static_friction"][j] > 0.0
     ]
-    return (*constants, *creeps, *offset_unknowns(recording))
+    return (*constants, *creeps, *offset_unknowns(recording, sizes))
 
 
-def offset_unknowns(recording: Recording) -> tuple[Unknown, ...]:
+def offset_unknowns(recording: Recording, sizes: Mapping[str, Scales]) -> tuple[Unknown, ...]:
     """The joint offsets of each initialisation of a recording."""
     initialisations = sorted({trial.initialisation for trial in recording.trials})
     return tuple(
-        Unknown("posture", "offset", j, -LARGEST_OFFSET, LARGEST_OFFSET, 0.05, initialisation, spread=OFFSET_SPREAD)
+        _offset(j, initialisation, sizes[joint].of("rad"))
         for initialisation in initialisations
-        for j in range(len(recording.joints))
+        for j, joint in enumerate(recording.joints)
     )
+
+
+def _offset(joint: int, initialisation: int, size: float) -> Unknown:
+    most, scale, spread = size * LARGEST_OFFSET, size * OFFSET, size * OFFSET_SPREAD
+    return Unknown("posture", "offset", joint, -most, most, scale, initialisation, spread=spread)
+
+
+def _creep(joint: int, size: float) -> Unknown:
+    most, scale, spread = size * LARGEST_CREEP, size * CREEP, size * CREEP_SPREAD
+    return Unknown("constant", "friction_creep", joint, 0.0, most, scale, spread=spread)
 
 
 def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float) -> Unknown:

@@ -68,6 +68,7 @@ class Unknown:
         initialisation: of a joint offset.
         centre: what is expected beforehand.
         spread: standard deviation of that expectation.
+        neutral: value at which an effect's parameter changes nothing.
     """
 
     kind: Literal["constant", "posture", "effect"]
@@ -79,6 +80,7 @@ class Unknown:
     initialisation: int = 0
     centre: float = 0.0
     spread: float = math.inf
+    neutral: float = 0.0
 
     def of(self, model: Model) -> float:
         """Its value in a model."""

@@ -9,21 +9,24 @@ from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 WEIGHTS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth difference: motion is smooth on this scale, noise is not
-SMALLEST = 1e-6  # [rad]
+SMALLEST = 1e-6  # part of the range of motion
 
 
 def sensor_noise(recording: Recording) -> Array:
     """White part (n,) of the position signals [rad], robust against jumps; at least that of the resolution."""
+    positions = np.concatenate([trial.position for trial in recording.trials])
+    least = SMALLEST * np.ptp(positions, axis=0)
     estimates = [
         [_white(trial.position[trial.valid, j]) for j in range(len(recording.joints))] for trial in recording.trials
     ]
     resolution = recording.description.sensors.position_resolution
-    return np.asarray(np.maximum(np.median(np.array(estimates), axis=0), max(resolution / np.sqrt(12.0), SMALLEST)))
+    white = np.median(np.array(estimates), axis=0)
+    return np.asarray(np.maximum(white, np.maximum(resolution / np.sqrt(12.0), least)))
 
 
 def _white(signal: Array) -> float:
     if len(signal) <= len(WEIGHTS):
         return 0.0
     fast = np.convolve(signal, WEIGHTS, mode="valid") / np.sqrt(np.sum(WEIGHTS**2))
-    calm = np.abs(fast) <= 5.0 * np.median(np.abs(fast)) / 0.6745 + 1e-12
+    calm = np.abs(fast) <= 5.0 * np.median(np.abs(fast)) / 0.6745
     return float(np.sqrt(np.mean(fast[calm] ** 2)))

@@ -13,8 +13,9 @@ from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.stretches import Stretches
 
 Array = NDArray[np.float64]
-START_POSITION = 1e-3  # [rad] how well a segment's start is known beforehand
+START_POSITION = 1e-3  # [rad] of a finger, as all sizes here: how well a segment's start is known beforehand
 START_SPEED, START_SPEED_PER_ACCELERATION = 0.02, 0.01  # [rad/s], [s]
+RUN_AWAY = 1.0  # [rad] as far off as this counts a simulation that ran away
 STEP = 0.2  # finite differences, in units of an unknown's scale
 
 
@@ -31,6 +32,7 @@ class Problem:
         self.weight = stretches.by_segment(stretches.weight)
         self.measured = stretches.by_segment(stretches.measured)
         self.segment_trial = np.repeat(stretches.trial, stretches.segments)
+        self.run_away = np.tile(RUN_AWAY * shooting.per_joint("rad"), stretches.segment)
         self.segment_initialisation = np.repeat(stretches.initialisation, stretches.segments)
         self._starts: Array = np.zeros((*self.weight.shape, 0))
         self._inverse: Array = np.zeros((len(self.weight), 0, 0))
@@ -41,8 +43,9 @@ class Problem:
         raw = self.shooting.start_sensitivity(model, self.stretches)
         columns = np.stack([self.stretches.by_segment(column) for column in raw], axis=-1)
         acceleration = np.abs(self.stretches.acceleration).reshape(len(self.weight), -1)
-        speed = START_SPEED + START_SPEED_PER_ACCELERATION * acceleration
-        spread = np.concatenate([np.full_like(speed, START_POSITION), speed], axis=1)
+        known, sure = START_SPEED * self.shooting.per_joint("rad/s"), START_POSITION * self.shooting.per_joint("rad")
+        speed = known + START_SPEED_PER_ACCELERATION * self.shooting.time * acceleration
+        spread = np.concatenate([np.broadcast_to(sure, speed.shape), speed], axis=1)
         self._starts = np.asarray(columns * self.weight[..., None] * spread[:, None])
         gram = np.swapaxes(self._starts, 1, 2) @ self._starts
         self._inverse = np.asarray(np.linalg.inv(gram + np.eye(gram.shape[-1])), dtype=np.float64)
@@ -61,7 +64,12 @@ class Problem:
 
     def residual(self, prediction: Array) -> Array:
         """Weighted measured - predicted (G, R); a simulation that ran away counts as far off."""
-        return np.clip(np.nan_to_num(self.measured - prediction, nan=1.0), -1.0, 1.0) * self.weight
+        return self.limited(self.measured - prediction) * self.weight
+
+    def limited(self, change: Array) -> Array:
+        """Differences of positions (G, R), none larger than that of a simulation that ran away."""
+        known = np.where(np.isnan(change), self.run_away, change)
+        return np.asarray(np.clip(known, -self.run_away, self.run_away))
 
     def cost(self, residual: Array) -> Array:
         """Marginal squared error of each segment (G,), in units of the sensor's variance."""
@@ -73,7 +81,7 @@ class Problem:
         all_predictions = self.predictions([model, *(one for one, _ in moved)])
         base = all_predictions[0]
         found = {
-            _key(unknown): (np.clip(p - base, -1.0, 1.0) / step * self.weight)
+            _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / step * self.weight)
             for unknown, p, (_, step) in zip(_simulated(unknowns), all_predictions[1:], moved, strict=True)
         }
         columns = [self._masked(found[_key(unknown)], unknown) for unknown in unknowns]

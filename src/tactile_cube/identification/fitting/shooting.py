@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION
-from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
 from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.fitting.stretches import Stretches, steps_per_row
+from tactile_cube.identification.fitting.stretches import SMOOTHING, Stretches, steps_per_row
+from tactile_cube.identification.joint_scales import joint_scales, rigid_body
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.jump_ratio import gaps, jump_ratio
 from tactile_cube.measurement.replay.known_force import force_torque
@@ -23,7 +23,7 @@ from tactile_cube.measurement.replay.read_out import free_way
 from tactile_cube.measurement.replay.rig_replay import CLAMPED
 
 Array = NDArray[np.float64]
-POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] finite differences of a segment's start
+POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] of a finger: finite differences of a segment's start
 
 
 class Shooting:
@@ -36,12 +36,22 @@ class Shooting:
             recording: rig, controller and sampling step.
             effects: classes that a model may use.
         """
-        coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
         self.recording = recording
-        self.tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
-        dt = recording.step / steps_per_row(recording)
+        self.tree = rigid_body(recording)
+        self.scales = joint_scales(recording)
+        self.sizes = dict(zip(recording.joints, self.scales, strict=True))
+        dt = recording.step / steps_per_row(recording, self.time)
         self.plant = Plant([self.tree], dt=dt, effects=tuple(effects), joint_names=recording.joints)
         self.workers = min(4, len(os.sched_getaffinity(0)))
+
+    @property
+    def time(self) -> float:
+        """What a second of a finger stands for [s]."""
+        return self.scales[0].time
+
+    def per_joint(self, unit: str) -> Array:
+        """How many times larger numbers of a unit are than at a finger, (n,)."""
+        return np.array([scales.of(unit) for scales in self.scales])
 
     def positions(self, models: Sequence[Model], stretches: Stretches) -> Array:
         """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
@@ -59,11 +69,12 @@ class Shooting:
     def start_sensitivity(self, model: Model, stretches: Stretches) -> Array:
         """D position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
         joints = len(self.recording.joints)
-        nudge = np.diag([POSITION_NUDGE] * joints + [SPEED_NUDGE] * joints)
+        nudge = np.diag([*(POSITION_NUDGE * self.per_joint("rad")), *(SPEED_NUDGE * self.per_joint("rad/s"))])
         count = 2 * joints + 1
         moved = self._simulate([model] * count, [stretches] * count, np.vstack([nudge, np.zeros(2 * joints)]))
         # a simulation that ran away has no slope; it would swamp those of all others
-        change = np.clip(np.nan_to_num(moved[:-1] - moved[-1], nan=0.0), -1.0, 1.0)
+        most = self.per_joint("rad")
+        change = np.clip(np.nan_to_num(moved[:-1] - moved[-1], nan=0.0), -most, most)
         return np.asarray(change / nudge.max(axis=1)[:, None, None, None])
 
     def _simulate(self, models: Sequence[Model], stretches: Sequence[Stretches], nudges: Array | None = None) -> Array:
@@ -125,6 +136,7 @@ class Shooting:
         self.plant.view(memory, "angle_offset")[:] = posture
         self.plant.reset(memory, self._links(model, stretches), stretches.speed[:, 0])
         self.plant.view(memory, "step")[:, 0] = stretches.time / self.plant.dt
+        self.plant.view(memory, "unsure")[:] = SMOOTHING * self.time
         for k, key in enumerate(("kp", "kd", "torque_limit")):
             self.plant.view(memory, key)[:] *= stretches.gains[:, k]
         self.plant.view(memory, "brake")[stretches.clamped] = CLAMPED

@@ -22,7 +22,7 @@ SEGMENT = (
 STRETCH = 11  # segments simulated without a break, so that effects with a memory keep it
 LEAD = 1  # segments at the beginning of a stretch that only wake such memories, unless a trial begins there
 HISTORY = 8.0  # [s] of commands before a stretch at most, for effects that remember them, such as a rate limit
-LONGEST_STEP = 0.0021  # [s] of the simulation
+LONGEST_STEP = 0.0021  # [s] of the simulation; of a finger, as all times here
 FEWEST = 4  # samples that a stretch needs
 ROWS = (
     "commands",
@@ -120,7 +120,11 @@ class Stretches:
 
 
 def cut(
-    recording: Recording, noise: Array, trials: Sequence[Trial] | None = None, segment: int | None = None
+    recording: Recording,
+    noise: Array,
+    trials: Sequence[Trial] | None = None,
+    segment: int | None = None,
+    time: float = 1.0,
 ) -> Stretches:
     """The trials of a recording as stretches.
 
@@ -129,17 +133,18 @@ def cut(
         noise: (n,) standard deviation of the position sensor of each joint [rad].
         trials: all of the recording's by default.
         segment: rows of a segment; as short as identification likes it by default.
+        time: what a second of a finger stands for [s].
     """
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
-    segment = min(segment or max(8, round(SEGMENT / recording.step)), longest)
+    segment = min(segment or max(8, round(SEGMENT * time / recording.step)), longest)
     rows = segment * min(STRETCH, -(-longest // segment))
     forward = max(rows - LEAD * segment, segment)  # from the start of a stretch to that of the next one
-    history = min(round(HISTORY / recording.step), (longest - 1) // forward * forward)
+    history = min(round(HISTORY * time / recording.step), (longest - 1) // forward * forward)
     pieces = [
         piece
         for k, trial in enumerate(trials)
-        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise)
+        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time)
     ]
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces = tuple(piece["force"] for piece in pieces)
@@ -148,16 +153,24 @@ def cut(
         forces=forces,  # type: ignore[arg-type]
         history=history,
         segment=segment,
-        substeps=steps_per_row(recording),
+        substeps=steps_per_row(recording, time),
         read_after=recording.read == "after",
     )
 
 
 def _pieces(
-    recording: Recording, trial: Trial, index: int, rows: int, forward: int, segment: int, history: int, noise: Array
+    recording: Recording,
+    trial: Trial,
+    index: int,
+    rows: int,
+    forward: int,
+    segment: int,
+    history: int,
+    noise: Array,
+    time: float,
 ) -> Iterator[dict[str, object]]:
     command = trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
-    substeps = steps_per_row(recording)
+    substeps = steps_per_row(recording, time)
     fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
     jump = _half_jump(command, recording.read)
     drive = _drive(recording, trial)
@@ -169,7 +182,7 @@ def _pieces(
         if np.count_nonzero(present) < FEWEST:
             continue
         starts = np.minimum(span[::segment], len(trial.time) - 1)
-        position, speed, acceleration = _states(trial, command, jump, drive, starts)
+        position, speed, acceleration = _states(trial, command, jump, drive, starts, SMOOTHING * time)
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": trial.position[usable],
@@ -197,9 +210,9 @@ def _rows(fine: Array, first: int, last: int) -> Array:
     return chosen
 
 
-def steps_per_row(recording: Recording) -> int:
+def steps_per_row(recording: Recording, time: float = 1.0) -> int:
     """Simulation steps between two samples."""
-    return max(1, int(np.ceil(recording.step / LONGEST_STEP - 1e-6)))
+    return max(1, int(np.ceil(recording.step / (LONGEST_STEP * time) - 1e-6)))
 
 
 def _gains(recording: Recording, trial: Trial) -> Array:
@@ -254,7 +267,9 @@ def _half_jump(command: Array, reading: str) -> Array:
     return 0.5 * (after - before) if reading == "after" else 0.5 * (before - after)
 
 
-def _states(trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows) -> tuple[Array, Array, Array]:
+def _states(
+    trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows, smoothing: float = SMOOTHING
+) -> tuple[Array, Array, Array]:
     """Position of the sensor, speed and acceleration of the link (K, n) at some rows.
 
     The sensor follows every kink of the command, for the drive deflects with its torque; the link does not. So speed
@@ -264,7 +279,7 @@ def _states(trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows)
     """
     torque = np.clip(drive.kp * (command - trial.position), -drive.limit, drive.limit)
     link = trial.position - drive.compliance * torque  # behind by compliance * kd * speed
-    half = max(2, round(SMOOTHING / trial.step))
+    half = max(2, round(smoothing / trial.step))
     found = []
     for row in rows:
         near = slice(max(0, row - half), min(len(trial.time), row + half + 1))

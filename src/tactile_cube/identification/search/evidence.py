@@ -47,7 +47,7 @@ class Judgement:
 
 def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
     """Error of a model on held-out segments; only the joint offsets of unseen initialisations are fitted there."""
-    fitted = fit(problem, model, offset_unknowns(held_out), iterations=3)
+    fitted = fit(problem, model, offset_unknowns(held_out, problem.shooting.sizes), iterations=3)
     samples = np.count_nonzero(problem.weight, axis=1)
     costs = problem.cost(fitted.residual)
     return Judgement(fitted.model, costs, samples, fitted.residual, _joint_errors(problem, fitted.residual))

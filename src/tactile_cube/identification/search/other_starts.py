@@ -24,7 +24,6 @@ def other_starts(candidate: Candidate, model: Model) -> list[Model]:
     names = tuple(candidate.form)
     if len(names) not in FACTORS or "harmonic" in names:
         return []
-    known = {p.name: p for p in candidate.effect.parameters}
     first = len(model.terms) - len(candidate.joints)
     models = []
     for factors in product(FACTORS[len(names)], repeat=len(names)):
@@ -32,7 +31,7 @@ def other_starts(candidate: Candidate, model: Model) -> list[Model]:
             continue
         terms = list(model.terms)
         for place in range(first, len(terms)):
-            old = terms[place].values
+            old, known = terms[place].values, candidate.parameters(terms[place].joint)
             new = {n: min(max(f * old[n], known[n].low), known[n].high) for n, f in zip(names, factors, strict=True)}
             terms[place] = replace(terms[place], values={**old, **new})
         models.append(replace(model, terms=tuple(terms)))

@@ -9,32 +9,39 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.candidates import Candidate, Sizes, forms
 from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position
-LOWEST, HIGHEST = 2.5, 160.0  # [1/rad]
+LOWEST, HIGHEST = 2.5, 160.0  # [1/rad] of a finger
 RESOLUTION = 0.8  # grid step times the range of motion: finer than half a peak
+NARROWEST = 0.05  # [rad] range that is told apart by harmonics at all
 PEAKS = 2
 MOST_SAMPLES = 8000
 
 
 def periodic_candidates(
-    missing_torques: Sequence[Missing], recording: Recording, model: Model, effects: Sequence[type[Effect]]
+    missing_torques: Sequence[Missing],
+    recording: Recording,
+    model: Model,
+    effects: Sequence[type[Effect]],
+    sizes: Sizes,
 ) -> list[Candidate]:
     """Candidates at the strongest harmonics of what is missing, for every effect that has one."""
     periodic = [effect for effect in effects if any(HARMONIC in form for form in forms(effect))]
     found = []
     for missing in missing_torques:
         damping = float(model.constants["kd"][recording.joints.index(missing.joint)])
+        scales = sizes[missing.joint]
         for effect in periodic:
             moving = effect.stage is Stage.POSITION_SENSOR
             found += [
-                Candidate(effect, (missing.joint,), start)
-                for form in forms(effect)
-                for start in _starts(missing, form, damping if moving else None)
+                Candidate(effect, (missing.joint,), start, sizes)
+                for form in effect.forms_at(scales)
+                if HARMONIC in form
+                for start in _starts(missing, form, damping if moving else None, scales.of("1/rad"))
             ]
     return found
 
@@ -45,7 +52,9 @@ def waves_of(form: Mapping[str, float]) -> tuple[str, str]:
     return first, second
 
 
-def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) -> list[Mapping[str, float]]:
+def _starts(
+    missing: Missing, form: Mapping[str, float], damping: float | None, size: float
+) -> list[Mapping[str, float]]:
     """The form at each strong harmonic, with the phase that the missing torque has there.
 
     A torque that repeats with the position is seen as it is; an error of the position sensor through its slope over
@@ -58,28 +67,28 @@ def _starts(missing: Missing, form: Mapping[str, float], damping: float | None) 
     weight = np.ones_like(position) if damping is None else speed
     starts: list[Mapping[str, float]] = []
     first, second = waves_of(form)
-    for harmonic, sine, cosine in peaks(position, missing.torque, weight, missing.initialisation):
+    for harmonic, sine, cosine in peaks(position, missing.torque, weight, missing.initialisation, size):
         if damping is not None:  # damping * d/dt (a sin + b cos) = damping * n v (a cos - b sin)
             sine, cosine = cosine / (damping * harmonic), -sine / (damping * harmonic)
-        size = max(abs(form[first]), 1e-9)
-        known = max(np.hypot(sine, cosine), 0.1 * size)
+        known = max(np.hypot(sine, cosine), 0.1 * abs(form[first]))
         angle = np.arctan2(cosine, sine)
         starts.append({**form, first: known * np.cos(angle), second: known * np.sin(angle), HARMONIC: harmonic})
     return starts
 
 
 def peaks(
-    position: Array, torque: Array, weight: Array, initialisation: NDArray[np.int64]
+    position: Array, torque: Array, weight: Array, initialisation: NDArray[np.int64], size: float = 1.0
 ) -> list[tuple[float, float, float]]:
     """Strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first.
 
     Each robot initialisation brings joint offsets that are not known well, so phases are compared within one only.
+    Harmonics go up to `size` times a finger's.
     """
     every = max(1, len(position) // MOST_SAMPLES)
     q, t, w, group = position[::every], torque[::every], weight[::every], initialisation[::every]
-    slow = np.vander((q - q.mean()) / max(np.ptp(q), 1e-9), 4)
+    slow = np.vander((q - q.mean()) / max(np.ptp(q), 1e-9 / size), 4)
     t = t - slow @ np.linalg.lstsq(slow, t, rcond=None)[0]
-    grid = np.arange(LOWEST, HIGHEST, RESOLUTION / max(np.ptp(q), 0.05))
+    grid = np.arange(LOWEST * size, HIGHEST * size, RESOLUTION / max(np.ptp(q), NARROWEST / size))
     parts = [group == k for k in np.unique(group)]
     spectrum = np.array([[np.dot((w * t)[part], np.exp(1j * n * q[part])) for part in parts] for n in grid])
     power = np.sum(np.abs(spectrum) ** 2, axis=1)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, ROWS
-from tactile_cube.identification.search.candidates import Candidate, forms, position_range
+from tactile_cube.identification.search.candidates import Candidate, Sizes
 from tactile_cube.identification.search.residual_shape import Missing
-from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 PROFILE = "torque_0"  # first of the control torques by which an effect says that it is a profile over the position
@@ -20,30 +20,28 @@ SMOOTH = 1e-3  # weight of the squared third differences of the control torques,
 
 
 def profile_candidates(
-    missing_torques: Sequence[Missing], recording: Recording, effects: Sequence[type[Effect]]
+    missing_torques: Sequence[Missing], sizes: Sizes, effects: Sequence[type[Effect]]
 ) -> list[Candidate]:
     """A candidate at every joint for every effect with a profile, started at the mean torque that is missing there."""
     return [
-        Candidate(effect, (missing.joint,), start_of(effect, form, missing, recording))
+        Candidate(effect, (missing.joint,), start_of(effect, form, missing, sizes[missing.joint]), sizes)
         for effect in effects
-        for form in forms(effect)
-        if PROFILE in form
         for missing in missing_torques
+        for form in effect.forms_at(sizes[missing.joint])
+        if PROFILE in form
     ]
 
 
-def start_of(
-    effect: type[Effect], form: Mapping[str, float], missing: Missing, recording: Recording
-) -> Mapping[str, float]:
+def start_of(effect: type[Effect], form: Mapping[str, float], missing: Missing, scales: Scales) -> Mapping[str, float]:
     """Control torques [N m] whose profile is nearest to the missing torque's mean over the position."""
-    low, high = position_range(recording, missing.joint)
+    low, high = scales.low, scales.high
     position = missing.signals[f"position of {missing.joint} [rad]"]
     edges = np.linspace(low, high, BINS + 1)
     place = np.clip(np.searchsorted(edges, position) - 1, 0, BINS - 1)
     count = np.bincount(place, minlength=BINS)
     mean = np.bincount(place, missing.torque, minlength=BINS) / np.maximum(count, 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
-    basis = np.array([profile_of(effect, {name: 1.0, "first": low, "last": high}, middles) for name in form]).T
+    basis = np.array([profile_of(effect, effect.placed_at(scales) | {name: 1.0}, middles) for name in form]).T
     weight = count / max(count.sum(), 1)
     bend = np.diff(np.eye(len(form)), n=3, axis=0)
     normal = basis.T @ (weight[:, None] * basis) + SMOOTH / len(form) * bend.T @ bend

@@ -16,6 +16,7 @@ BINS = 24
 MANY = 10 * BINS  # samples that a curve needs
 FEATURES = 300  # random cosine features of the black box
 RIDGE = 1e-2
+PARABOLA = 0.015  # [s] of a finger: half width of the parabola that reads slope and curvature
 APART = 0.1  # share that curves for motion up and down have to explain beyond one curve for both
 TOLD_APART = 0.6  # share of the segments on which the black box learns
 
@@ -71,11 +72,11 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
     fine = problem.stretches.substeps
     commands = problem.stretches.commands[:, problem.stretches.history * fine :: fine].reshape(weight.shape)
     step = recording.step
-    position, velocity, acceleration = _derivatives(measured, step)
+    position, velocity, acceleration = _derivatives(measured, step, problem.shooting.time)
     constants = model.constants
     soft = 1.0 + constants["kp"] / constants["stiffness"]
     inertia = _inertia(problem, model, measured)
-    r, dr, ddr = _derivatives(error, step)
+    r, dr, ddr = _derivatives(error, step, problem.shooting.time)
     torque = inertia * ddr + constants["kd"] / soft * dr + constants["kp"] / soft * r
     drive = constants["kp"] * (commands - position) - constants["kd"] * velocity
     first = np.tile(problem.stretches.time[:, None], (1, problem.stretches.segments)).ravel()
@@ -163,9 +164,9 @@ def _shape(missing: Missing, name: str) -> Shape:
     return Shape(missing.joint, name, centres, mean, spread, float(max(0.0, explained - 0.1 * min(chance, 1.0))))
 
 
-def _derivatives(x: Array, step: float) -> tuple[Array, Array, Array]:
-    """Value, slope and curvature of (G, segment, n) by sliding parabolas of about 30 ms."""
-    half = max(2, min(round(0.015 / step), x.shape[1] // 4))
+def _derivatives(x: Array, step: float, time: float) -> tuple[Array, Array, Array]:
+    """Value, slope and curvature of (G, segment, n) by sliding parabolas."""
+    half = max(2, min(round(PARABOLA * time / step), x.shape[1] // 4))
     lever = np.arange(-half, half + 1) * step
     weights = np.linalg.pinv(np.stack([np.ones_like(lever), lever, 0.5 * lever**2], axis=1))
     padded = np.pad(x, ((0, 0), (half, half), (0, 0)), mode="reflect", reflect_type="odd")

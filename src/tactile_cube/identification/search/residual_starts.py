@@ -26,5 +26,6 @@ def residual_candidates(
         effects: classes to try.
     """
     missing = missing_torques(problem, recording, fitted.model, fitted.residual)
-    periodic = periodic_candidates(missing, recording, fitted.model, effects)
-    return [*periodic, *profile_candidates(missing, recording, effects)]
+    sizes = problem.shooting.sizes
+    periodic = periodic_candidates(missing, recording, fitted.model, effects, sizes)
+    return [*periodic, *profile_candidates(missing, sizes, effects)]

@@ -49,8 +49,7 @@ class Screen:
 
     def column(self, prediction: Array) -> Array:
         """Change of the weighted prediction (G, R) that an effect makes."""
-        change = np.clip(np.nan_to_num(prediction - self.prediction, nan=1.0), -1.0, 1.0)
-        return np.asarray(change * self.problem.weight)
+        return np.asarray(self.problem.limited(prediction - self.prediction) * self.problem.weight)
 
     def terms(self, column: Array) -> tuple[float, float, Array]:
         """Pull on a column, its own size, and its products with the base columns (P,)."""
@@ -59,16 +58,13 @@ class Screen:
         return float(np.sum(column * self.residual)), float(np.sum(column * freed)), cross
 
 
-def screen(
-    problem: Problem, base: Fit, wanted: Sequence[Candidate], values: Sequence[dict[str, float]], batch: int = 24
-) -> list[Score]:
+def screen(problem: Problem, base: Fit, wanted: Sequence[Candidate], batch: int = 24) -> list[Score]:
     """Scores of candidates, best first.
 
     Args:
         problem: stretches to look at.
         base: fit whose residual is to be explained.
         wanted: candidates at their starts.
-        values: further values of each candidate.
         batch: candidates simulated at once, which bounds the memory.
     """
     view = Screen(problem, base)
@@ -76,7 +72,7 @@ def screen(
     scores = []
     for first in range(0, len(wanted), batch):
         part = list(wanted[first : first + batch])
-        models = [c.added_to(base.model, v)[0] for c, v in zip(part, values[first : first + batch], strict=True)]
+        models = [candidate.added_to(base.model)[0] for candidate in part]
         for candidate, model, prediction in zip(part, models, problem.predictions(models), strict=True):
             pull, size, cross = view.terms(view.column(prediction))
             left = size - float(cross @ np.linalg.solve(view.information, cross))

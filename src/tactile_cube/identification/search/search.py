@@ -16,7 +16,7 @@ from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.stretches import Stretches, cut
-from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns, placed
+from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, judge, p_value, worse
 from tactile_cube.identification.search.explanation import FLOOR, NEARLY, Explanation
 from tactile_cube.identification.search.other_starts import other_starts
@@ -88,11 +88,11 @@ class Search:
         self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
         effects = tuple(dict.fromkeys([*effects, *(term.effect for term in self.start.terms)]))
         self.shooting = Shooting(fitted, effects)
-        self.all_stretches = cut(fitted, noise)
+        self.all_stretches = cut(fitted, noise, time=self.shooting.time)
         self.problem = Problem(self.shooting, some(self.all_stretches, SEGMENTS))
-        self.judges = Problem(self.shooting, some(cut(held_out, noise), SEGMENTS))
+        self.judges = Problem(self.shooting, some(cut(held_out, noise, time=self.shooting.time), SEGMENTS))
         self.effects = effects
-        self.candidates = candidates(fitted, effects)
+        self.candidates = candidates(self.shooting.sizes, effects)
         self.postures = dict(self.start_held_out.posture)
         self.last_scores: list[Score] = []
         self.last_behind: list[tuple[Candidate, Fit]] = []
@@ -123,8 +123,9 @@ class Search:
             )
         if levels and min(e.error for level in levels for e in level) > FAR_FROM_FLOOR:
             levels += [level] if (level := self.second_thoughts(base)) else []
-        if not levels and base.error <= FLOOR and (shared := shared_offset(base, self.fitted, self.effects)):
-            levels.append((shared,))
+        if not levels and base.error <= FLOOR:
+            shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
+            levels += [(shared,)] if shared else []
         return Findings(base, nominal, tuple(levels), scores, tuple(doubtful))
 
     def second_thoughts(self, base: Explanation) -> tuple[Explanation, ...]:
@@ -154,7 +155,8 @@ class Search:
 
     def unknowns(self, model: Model) -> tuple[Unknown, ...]:
         """Everything that a refit of the model may change."""
-        return (*base_unknowns(self.fitted, self.start.constants), *model_unknowns(model))
+        sizes = self.shooting.sizes
+        return (*base_unknowns(self.fitted, self.start.constants, sizes), *model_unknowns(model, sizes))
 
     def with_postures(self, model: Model) -> Model:
         """The model with joint offsets for the held-out initialisations too."""
@@ -164,7 +166,7 @@ class Search:
         """The best ways to add one effect to an explanation."""
         frozen = self.frozen(parent.fit)
         wanted = self.new([*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)])
-        self.last_scores = screen(self.problem, frozen, wanted, [placed(c, self.fitted) for c in wanted])
+        self.last_scores = screen(self.problem, frozen, wanted)
         chosen = with_groups(self.last_scores, least_gain(parent, base) * frozen.cost)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
         raced = of_each(self.race(frozen, chosen), FINALISTS)
@@ -240,7 +242,7 @@ class Search:
         self, frozen: Fit, candidate: Candidate, iterations: int = 6, model: Model | None = None
     ) -> tuple[Candidate, Fit]:
         """Fit a candidate's numbers beside the frozen columns of its parent, started from `model` or the parent's."""
-        model, unknowns = candidate.added_to(model or frozen.model, placed(candidate, self.fitted))
+        model, unknowns = candidate.added_to(model or frozen.model)
         return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
 
     def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit, judged: int) -> Explanation:

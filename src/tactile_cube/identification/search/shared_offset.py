@@ -11,15 +11,14 @@ from scipy.stats import t as student_t
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.fitting.model import Model, Term
-from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.search.candidates import Candidate, Sizes
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
-EFFECT = "position_offset"
-LEAST = 0.012  # [rad] joint offsets below this are ordinary
+LEAST = 0.012  # [rad] of a finger: joint offsets below this are ordinary
 UNLIKELY = 0.001  # probability, over all joints, of such offsets by initialising alone at which they are still ordinary
-STRIKING, DOUBTFUL = 0.03, 0.1  # [rad], and probability from which on they are worth a word, though no evidence
+STRIKING, DOUBTFUL = 0.03, 0.1  # [rad] of a finger, and probability from which on they are worth a word
 
 
 @dataclass(frozen=True)
@@ -39,30 +38,34 @@ class CommonOffset:
     by_chance: float
 
 
-def shared_offset(base: Explanation, fitted: Recording, effects: Sequence[type[Effect]]) -> Explanation | None:
+def shared_offset(
+    base: Explanation, fitted: Recording, effects: Sequence[type[Effect]], sizes: Sizes
+) -> Explanation | None:
     """The base model with the offsets that all initialisations share as an effect; None if there are none.
 
     A joint offset that differs between initialisations is what initialising does, and no error of the model. Two or
     three initialisations whose offsets happen to be alike are no evidence either: Student's t decides.
     """
-    effect = next((effect for effect in effects if effect.name == EFFECT), None)
+    effect = next((effect for effect in effects if effect.constant_reading), None)
     if effect is None or len(base.judgement.model.posture) < 2:
         return None
     mean, by_chance = _mean_and_chance(base)
-    shared = (np.abs(mean) > LEAST) & (by_chance < UNLIKELY)
+    least = LEAST * np.array([sizes[joint].of("rad") for joint in fitted.joints])
+    shared = (np.abs(mean) > least) & (by_chance < UNLIKELY)
     if not shared.any():
         return None
     places = np.flatnonzero(shared)
     joints = tuple(fitted.joints[j] for j in places)
-    terms = tuple(Term(effect, fitted.joints[j], {"offset": float(mean[j])}, ("offset",)) for j in places)
+    name = effect.constant_reading
+    terms = tuple(Term(effect, fitted.joints[j], {name: float(mean[j])}, (name,)) for j in places)
     posture = {key: value + np.where(shared, mean, 0.0) for key, value in base.fit.model.posture.items()}
     model = Model(base.fit.model.constants, (*base.fit.model.terms, *terms), posture)
-    candidate = Candidate(effect, joints, {"offset": float(np.abs(mean[shared]).max())})
+    candidate = Candidate(effect, joints, {name: float(np.abs(mean[shared]).max())}, sizes)
     fit = replace(base.fit, model=model)
     return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=float(by_chance[shared].max()))
 
 
-def common_offsets(base: Explanation, joints: Sequence[str]) -> tuple[CommonOffset, ...]:
+def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
     """Large offsets that every initialisation has and that two or three of them do not prove to be the encoder's."""
     count = len(base.judgement.model.posture)
     if count < 2:
@@ -70,8 +73,8 @@ def common_offsets(base: Explanation, joints: Sequence[str]) -> tuple[CommonOffs
     mean, by_chance = _mean_and_chance(base)
     return tuple(
         CommonOffset(joint, float(mean[j]), count, float(by_chance[j]))
-        for j, joint in enumerate(joints)
-        if abs(mean[j]) > STRIKING and UNLIKELY <= by_chance[j] < DOUBTFUL
+        for j, (joint, scales) in enumerate(sizes.items())
+        if abs(mean[j]) > STRIKING * scales.of("rad") and UNLIKELY <= by_chance[j] < DOUBTFUL
     )
 
 

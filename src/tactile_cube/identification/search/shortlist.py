@@ -33,7 +33,7 @@ def with_groups(scores: Sequence[Score], needed: float) -> list[Candidate]:
         if len(useful) > 1 and sum(m.gain for m in useful) > 1.3 * max(m.gain for m in useful):
             first = useful[0].candidate
             joints = tuple(m.candidate.joints[0] for m in useful)
-            ranked.append((sum(m.gain for m in useful), Candidate(first.effect, joints, first.form)))
+            ranked.append((sum(m.gain for m in useful), replace(first, joints=joints)))
     ranked.sort(key=lambda pair: -pair[0])
     most = ranked[0][0] if ranked else 0.0
     if UNDERRATED * most < needed:
@@ -44,7 +44,7 @@ def with_groups(scores: Sequence[Score], needed: float) -> list[Candidate]:
 def resized(score: Score) -> Candidate:
     """The candidate with its start as large as the first look says, where a single number makes the effect's size."""
     (name, start), *more = score.candidate.form.items()
-    known = {p.name: p for p in score.candidate.effect.parameters}[name]
+    known = score.candidate.parameters(score.candidate.joints[0])[name]
     if more or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
         return score.candidate
     return replace(score.candidate, form={name: min(max(score.factor * start, known.low), known.high)})

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
+from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.identification.fitting.model import Term
-from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.periodicity import HARMONIC, LOWEST, waves_of
 from tactile_cube.identification.search.position_profile import PROFILE, profile_of
 
@@ -38,7 +39,7 @@ def special_candidates(candidate: Candidate, term: Term, effects: Sequence[type[
     spacing = (angles[-1] - angles[0]) / (len(candidate.form) - 1)
     found = []
     for effect in effects:
-        for form in forms(effect):
+        for form in effect.forms_at(candidate.sizes.get(candidate.joints[0], FINGER)):
             if HARMONIC in form and effect.stage is not Stage.POSITION_SENSOR:
                 starts = _ripples(angles, torques, form, FINEST * np.pi / spacing)
             elif "stiffness" in form and ("upper" in form or "lower" in form):
@@ -47,7 +48,7 @@ def special_candidates(candidate: Candidate, term: Term, effects: Sequence[type[
                 starts = _levels(torques)
             else:
                 continue
-            found += [Candidate(effect, candidate.joints, start) for start in starts]
+            found += [Candidate(effect, candidate.joints, start, candidate.sizes) for start in starts]
     return found
 
 

@@ -1,0 +1,109 @@
+"""How large things are at a joint: bounds, usual sizes and starts of an effect's numbers follow from it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+UNITS = re.compile(r"(N m|N|rad|kg|m|s|Hz)(?:\^(\d))?")
+MORE_PERIODS = 3.0  # of screws and magnets in the range of a joint that slides than of gears in that of one that turns
+FINGER_RANGE = 1.2  # [rad] of a finger's joint: what the range of a joint that slides stands for
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Sizes of one joint; of a joint that slides in m, N, kg in place of rad, N m, kg m^2.
+
+    Attributes:
+        torque: usual torque of the drive, exceeded in a tenth of the samples [N m].
+        often: torque exceeded in half of the samples [N m].
+        seldom: torque hardly exceeded [N m].
+        low: lowest position but for a few samples [rad].
+        high: highest [rad].
+        speed: hardly exceeded by the joint [rad/s].
+        command_speed: hardly exceeded by the command [rad/s].
+        inertia: at the mean posture, rotor included [kg m^2].
+        mass: of all links that the joint moves [kg].
+        lever: radius of gyration of these links about the joint [m].
+        time: what a second of a finger stands for, in whole decades [s].
+        slides: a prismatic joint.
+        neighbours: other joints of the rig.
+        leads: another joint is coupled to this one.
+    """
+
+    torque: float
+    often: float
+    seldom: float
+    low: float
+    high: float
+    speed: float
+    command_speed: float
+    inertia: float
+    mass: float
+    lever: float
+    time: float
+    slides: bool = False
+    neighbours: int = 0
+    leads: bool = False
+
+    @property
+    def span(self) -> float:
+        """Range of motion [rad]."""
+        return self.high - self.low
+
+    @property
+    def position(self) -> float:
+        """What 1 rad of a finger's joint stands for: an angle has no size of its own, a path is part of the range."""
+        return self.span / FINGER_RANGE if self.slides else 1.0
+
+    def of(self, unit: str) -> float:
+        """How many times larger a number of this unit is at this joint than at a finger's.
+
+        Torques, positions and speeds are measured in those of the recording; what is left of time, and inertia, mass
+        and lengths, in those of the rig. Delays and windows of time go by whole decades: within a decade they are the
+        same for joints of any kind. Units that are none of these (K, V) have no scale.
+
+        Args:
+            unit: as a parameter states it, `N m s/rad`.
+        """
+        plain = {"kg m^2": self.inertia / FINGER.inertia, "kg": self.mass / FINGER.mass, "s": self.time / FINGER.time}
+        plain |= {"m": self.lever / FINGER.lever, "1": 1.0}
+        if unit in plain:
+            return plain[unit]
+        if unit == "1/rad" and self.slides:
+            return MORE_PERIODS / self.position
+        speed = self.speed / FINGER.speed
+        sizes = {"N m": self.torque / FINGER.torque, "rad": self.position, "s": self.position / speed}
+        sizes |= {"N": sizes["N m"], "m": sizes["rad"], "kg": self.mass / FINGER.mass, "Hz": 1.0 / plain["s"]}
+        above, _, below = unit.partition("/")
+        factor = 1.0
+        for text, sign in ((above, 1), (below, -1)):
+            for name, power in UNITS.findall(text):
+                factor *= sizes[name] ** (sign * int(power or 1))
+        return factor
+
+
+FINGER = Scales(
+    torque=0.15,
+    often=0.06,
+    seldom=0.7,
+    low=0.0,
+    high=FINGER_RANGE,
+    speed=5.0,
+    command_speed=7.0,
+    inertia=0.005,
+    mass=0.18,
+    lever=0.08,
+    time=1.0,
+    neighbours=2,
+)
+"""Of the joints that the catalogue's numbers are stated for: small geared joints of 0.02 to 1 N m."""
+
+
+def unit_at(unit: str, slides: bool) -> str:
+    """A unit as it reads at a joint: `N m s/rad` is `N s/m` at one that slides."""
+    if not slides:
+        return unit
+    for turning, sliding in (("kg m^2", "kg"), ("N m", "N"), ("rad", "m")):
+        unit = unit.replace(turning, sliding)
+    return unit

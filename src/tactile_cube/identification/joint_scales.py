@@ -1,0 +1,95 @@
+"""The sizes of a recording's joints: what every bound, usual size and start of a number follows from."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects.scales import FINGER, Scales
+from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.measurement.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+OFTEN, USUAL, SELDOM = 0.5, 0.9, 0.999  # quantiles of the torques that a recording asks for
+OUTSIDE = 0.002  # share of the positions beyond either end of the range
+FAST = 0.995  # quantile of the speeds
+CROSSING = 0.2  # [s] in which the usual torque moves a finger's joint through its range
+VELOCITY_WINDOW = 0.03  # [s] of a finger
+SMALL = 1e-9  # part of another size that stands for nothing at all
+
+
+def joint_scales(recording: Recording) -> tuple[Scales, ...]:
+    """The scales of each joint of a recording."""
+    tree = rigid_body(recording)
+    positions = np.concatenate([trial.position for trial in recording.trials])
+    low, high = np.quantile(positions, [OUTSIDE, 1.0 - OUTSIDE], axis=0)
+    spans = np.maximum(high - low, SMALL * np.maximum(np.abs(high), 1.0))
+    links = tree.actuated_mass_matrix(positions.mean(axis=0)).diagonal()
+    inertia = links + recording.nominal.get("reflected_inertia", np.zeros(len(spans)))
+    time = unit_of_time(_torques(recording, 0.0), inertia, spans)
+    speeds = _quantile([np.abs(trial.velocity(VELOCITY_WINDOW * time)) for trial in recording.trials], FAST)
+    speeds = np.maximum(speeds, SMALL * spans / time)
+    torques = _torques(recording, VELOCITY_WINDOW * time)
+    accelerating = inertia * speeds**2 / spans  # where the drive does nothing and somebody else moves the joint
+    often, usual, seldom = (np.maximum(_quantile(torques, q), SMALL * accelerating) for q in (OFTEN, USUAL, SELDOM))
+    commanded = [np.abs(np.diff(trial.command, axis=0)) / trial.step for trial in recording.trials]
+    command_speed = speeds if recording.torque_controlled else _quantile(commanded, FAST)
+    masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.coupled.values()}
+    slides = tree.prismatic[[tree.dof_names.index(name) for name in tree.joint_names]]
+    return tuple(
+        Scales(
+            torque=float(max(usual[j], SMALL * accelerating[j])),
+            often=float(often[j]),
+            seldom=float(seldom[j]),
+            low=float(low[j]),
+            high=float(low[j] + spans[j]),
+            speed=float(speeds[j]),
+            command_speed=float(command_speed[j]),
+            inertia=float(inertia[j]),
+            mass=float(masses[j]),
+            lever=float(spans[j] if slides[j] else np.sqrt(links[j] / masses[j])),
+            time=time,
+            slides=bool(slides[j]),
+            neighbours=len(spans) - 1,
+            leads=joint in leaders,
+        )
+        for j, joint in enumerate(recording.joints)
+    )
+
+
+def rigid_body(recording: Recording) -> RigidBodyTree:
+    """The mechanism of a recording."""
+    coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
+    return RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
+
+
+def unit_of_time(torques: list[Array], inertia: Array, spans: Array) -> float:
+    """What a second of a finger stands for [s], a whole decade: the fastest joint's time to cross its range."""
+    usual = np.maximum(_quantile(torques, USUAL), SMALL)
+    crossing = float(np.sqrt(inertia * spans / usual).min())
+    return float(10.0 ** np.round(np.log10(max(crossing, SMALL) / CROSSING))) * FINGER.time
+
+
+def _quantile(rows: list[Array], share: float) -> Array:
+    return np.asarray(np.quantile(np.concatenate(rows), share, axis=0))
+
+
+def _torques(recording: Recording, window: float) -> list[Array]:
+    """Size of the torques that the controller asks for (T, n) in each trial; a window of zero leaves damping out."""
+    if recording.torque_controlled:
+        return [np.abs(trial.command) for trial in recording.trials]
+    kp, kd, limit = recording.gains.kp, recording.gains.kd, recording.gains.torque_limit
+    return [
+        np.minimum(np.abs(kp * (t.command - t.position) - (kd * t.velocity(window) if window else 0.0)), limit)
+        for t in recording.trials
+    ]
+
+
+def _moved_masses(tree: RigidBodyTree) -> Array:
+    """Mass (n,) of all links beyond each actuated joint [kg]."""
+    beyond = tree.mass.copy()
+    for link in range(tree.dofs - 1, -1, -1):
+        if tree.parent[link] >= 0:
+            beyond[tree.parent[link]] += beyond[link]
+    own = [tree.dof_names.index(name) for name in tree.joint_names]
+    return np.maximum(beyond[own], SMALL * max(float(tree.mass.sum()), SMALL))
