@@ -14,6 +14,7 @@ OFTEN, USUAL, SELDOM = 0.5, 0.9, 0.999  # quantiles of the torques that a record
 OUTSIDE = 0.002  # share of the positions beyond either end of the range
 FAST = 0.995  # quantile of the speeds
 CROSSING = 0.2  # [s] in which the usual torque moves a finger's joint through its range
+COARSE, FASTER = 10, 3.0  # rows between which a motion is no noise; its usual speed over the mean one
 VELOCITY_WINDOW = 0.03  # [s] of a finger
 SMALL = 1e-9  # part of another size that stands for nothing at all
 
@@ -26,7 +27,7 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     spans = np.maximum(high - low, SMALL * np.maximum(np.abs(high), 1.0))
     links = tree.actuated_mass_matrix(positions.mean(axis=0)).diagonal()
     inertia = links + recording.nominal.get("reflected_inertia", np.zeros(len(spans)))
-    time = unit_of_time(_torques(recording, 0.0), inertia, spans)
+    time = unit_of_time(recording, inertia, spans)
     speeds = _quantile([np.abs(trial.velocity(VELOCITY_WINDOW * time)) for trial in recording.trials], FAST)
     speeds = np.maximum(speeds, SMALL * spans / time)
     torques = _torques(recording, VELOCITY_WINDOW * time)
@@ -63,11 +64,17 @@ def rigid_body(recording: Recording) -> RigidBodyTree:
     return RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
 
 
-def unit_of_time(torques: list[Array], inertia: Array, spans: Array) -> float:
-    """What a second of a finger stands for [s], a whole decade: the fastest joint's time to cross its range."""
-    usual = np.maximum(_quantile(torques, USUAL), SMALL)
+def unit_of_time(recording: Recording, inertia: Array, spans: Array) -> float:
+    """What a second of a finger stands for [s], a whole decade.
+
+    It goes by the time in which the fastest joint would cross its range, pushed by its usual torque or as fast as it
+    mostly moves.
+    """
+    moved = np.concatenate([np.abs(np.diff(trial.position[::COARSE], axis=0)) for trial in recording.trials])
+    coasting = spans / np.maximum(FASTER * moved.mean(axis=0) / (COARSE * recording.step), SMALL * spans)
+    usual = np.maximum(_quantile(_torques(recording, 0.0), USUAL), inertia * spans / coasting**2)
     crossing = float(np.sqrt(inertia * spans / usual).min())
-    return float(10.0 ** np.round(np.log10(max(crossing, SMALL) / CROSSING))) * FINGER.time
+    return float(10.0 ** np.round(np.log10(crossing / CROSSING))) * FINGER.time
 
 
 def _quantile(rows: list[Array], share: float) -> Array:
