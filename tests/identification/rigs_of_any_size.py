@@ -22,6 +22,7 @@ iyz="0"/></inertial></link><joint name="a" type="{kind}"><parent link="base"/><c
 <limit lower="{lower:.12g}" upper="{upper:.12g}" effort="1e9" velocity="1e9"/></joint></robot>"""
 NAMES = ("coulomb_friction", "viscous_friction", "nonlinear_drag", "backlash", "actuator_lag", "payload")
 EFFECTS = tuple(find_effect(name) for name in NAMES)
+NOISE = 2e-4  # [rad]
 SAMPLES, STEP = 1500, 0.002
 STATED = {"kp": 4.0, "kd": 0.2, "torque_limit": 4.0, "stiffness": 40.0, "static_friction": 0.02}
 
@@ -86,7 +87,7 @@ def simulated(
     played = shooting.positions([model], stretches)[0]
     rng = np.random.default_rng(1)
     for entry, trial, ideal in zip(trials, planned.trials, played, strict=True):
-        position = ideal[:, 0] + noise * size.position * rng.normal(size=SAMPLES)
+        position = ideal[:, 0] + NOISE * size.position * rng.normal(size=SAMPLES)
         columns = {"time": trial.time, "a.command": trial.command[:, 0], "a.position": position}
         polars.DataFrame(columns).write_parquet(folder / str(entry["file"]))
     return read_recording(folder)
