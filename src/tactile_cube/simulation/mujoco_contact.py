@@ -24,6 +24,9 @@ IMPRATIO = 100.0
 """Regularisation of the normal force over that of friction."""
 HARD = 2e-5
 """Compliance of surfaces that are called hard [m/N]: 3 N sink in by 60 um."""
+HARD_RELAXATION = 2e-2
+"""Damping over stiffness of hard surfaces [s]. A body overlaps by up to its way in one step before it is met, which the
+spring gives back as speed unless that takes much longer than a step."""
 CONDIM = 4
 """Normal force, two of lateral friction and a torque against spinning, under one elliptic cone."""
 LEAST_IMPEDANCE, MOST_IMPEDANCE = 1e-4, 0.9999
@@ -37,7 +40,7 @@ def friction(pair: Surface) -> list[float]:
 def spring_and_damper(compliance: float, dt: float) -> tuple[float, float, float]:
     """R [1/kg], k [1/s^2] and b [1/s] of a contact with this compliance [m/N]."""
     stiffness = 1.0 / max(compliance, HARD)
-    damping = SKIN_RELAXATION * stiffness
+    damping = stiffness * (SKIN_RELAXATION if compliance > HARD else HARD_RELAXATION)
     regularisation = 1.0 / (stiffness * dt**2 + damping * dt)
     return regularisation, stiffness * regularisation, (damping + stiffness * dt) * regularisation
 

@@ -84,19 +84,28 @@ class World:
         self._disturbance = Disturbance(constants)
         self._drive.reset(constants, start)
         self._engine.place(constants, start, _all_joints(start.angles), _all_joints(start.velocities))
-        self._set_weight(constants.gravity_scale if constants.gravity_onset == 0 else 0.0)
+        self.set_weight(constants.gravity_scale if constants.gravity_onset == 0 else 0.0)
         self._drive.sense(self._engine.q.ravel(), self._engine.v.ravel())
         self._cube = self._engine.cube_state()
 
     def step(self, q_n: Array) -> None:
         """One policy step: `options.substeps` physics steps with the desired joint angles q_n (12,) [rad]."""
         if self.steps == self.constants.gravity_onset:
-            self._set_weight(self.constants.gravity_scale)
+            self.set_weight(self.constants.gravity_scale)
         self._drive.view("goal")[:] = q_n - self.constants.joint_offset
         self._run()
         self.steps += 1
         self._cube = self._engine.cube_state()
         self.fault = self.fault or find_fault(self._engine.q, self._engine.v, self._cube, self._engine.gaps())
+
+    def set_weight(self, scale: float) -> None:
+        """Gives the cube a share of its weight until changed or reset: the engine's gravity.
+
+        The control step keeps the fingers' whole.
+        """
+        acceleration = scale * self.constants.gravity * self.constants.down
+        self._engine.set_gravity(acceleration)
+        self._drive.set_engine_gravity(acceleration)
 
     def push_cube(self, force: Array, torque: Array) -> None:
         """Pushes the cube's centre of mass with force [N] and torque [N m] in the world until changed or reset."""
@@ -193,12 +202,6 @@ class World:
         return self._engine.contacts()
 
     # --- parts of reset and step ---------------------------------------------------------------------------------
-
-    def _set_weight(self, scale: float) -> None:
-        """Gives the cube a share of its weight: the engine's gravity; the control step keeps the fingers' whole."""
-        acceleration = scale * self.constants.gravity * self.constants.down
-        self._engine.set_gravity(acceleration)
-        self._drive.set_engine_gravity(acceleration)
 
     def _run(self) -> None:
         """The physics steps of one policy step, with a trace where wanted."""

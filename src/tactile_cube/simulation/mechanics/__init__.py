@@ -1,0 +1,18 @@
+"""Cases of contact with an answer from mechanics: how far each engine is from it at each accuracy setting."""
+
+from tactile_cube.simulation.mechanics.case import Answer, Case
+from tactile_cube.simulation.mechanics.creep import creep
+from tactile_cube.simulation.mechanics.impact import impact
+from tactile_cube.simulation.mechanics.lever import slide_and_spin, twist
+from tactile_cube.simulation.mechanics.pendulum import pendulum
+
+CASES: dict[str, Case] = {
+    "creep": creep,
+    "twist": twist,
+    "slide and spin": slide_and_spin,
+    "hanging": pendulum,
+    "impact": impact,
+}
+"""All cases by name, in the order of the table."""
+
+__all__ = ["CASES", "Answer", "Case"]
