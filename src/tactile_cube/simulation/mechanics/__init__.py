@@ -9,7 +9,7 @@ from tactile_cube.simulation.mechanics.pendulum import pendulum
 CASES: dict[str, Case] = {
     "creep": creep,
     "twist": twist,
-    "slide and spin": slide_and_spin,
+    "slide_and_spin": slide_and_spin,
     "hanging": pendulum,
     "impact": impact,
 }

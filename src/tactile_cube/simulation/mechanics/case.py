@@ -29,5 +29,9 @@ class Answer:
         """Relative deviation; infinite where mechanics says zero."""
         return self.measured / self.expected - 1.0 if self.expected else float("inf")
 
+    def __str__(self) -> str:
+        """The deviation, or what was measured where mechanics says zero."""
+        return f"{self.deviation:+.1%}" if self.expected else f"{self.measured:.3f} {self.unit}"
+
 
 Case = Callable[[SimulationOptions], Answer]

@@ -30,7 +30,7 @@ _TAKING_PART = np.array([False, True, False, True])
 
 
 def _with_round_tips(hand: HandModel) -> HandModel:
-    """The hand with spheres for fingertips: a capsule along a face touches at two points, which bear a twist together."""
+    """The hand with spheres for fingertips: a capsule along a face touches at two points, which bear more than one."""
     *others, distal = hand.links
     sphere = Capsule(hand.tip_radius, hand.tip_reach[2] - 1e-4, hand.tip_reach[2])
     return replace(hand, links=(*others, replace(distal, capsule=sphere)))

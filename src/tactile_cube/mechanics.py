@@ -1,0 +1,30 @@
+"""Measure cases of contact that have an answer from mechanics, in each engine at each accuracy setting."""
+
+from __future__ import annotations
+
+from omegaconf import DictConfig
+
+from tactile_cube.cli import verb
+
+
+@verb("mechanics")
+def main(config: DictConfig) -> None:
+    """Run the cases and write the page."""
+    import shlex
+    import sys
+    from pathlib import Path
+
+    from tactile_cube.simulation.mechanics.page import mechanics_page
+    from tactile_cube.simulation.mechanics.settings import chosen, measure
+
+    settings = chosen(config.engines, config.accuracy, config.cases)
+    found = measure(*settings, say=print)
+    command = shlex.join(["python", "-m", "tactile_cube.mechanics", *sys.argv[1:]])
+    page = Path(config.page)
+    page.parent.mkdir(parents=True, exist_ok=True)
+    page.write_text(mechanics_page(found, command), encoding="utf-8")
+    print(f"page: {page}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,42 @@
+"""What each engine does with a contact that has an answer from mechanics."""
+
+import pytest
+
+from tactile_cube.errors import InputError
+from tactile_cube.simulation import SimulationOptions
+from tactile_cube.simulation.mechanics import CASES, Answer
+from tactile_cube.simulation.mechanics.page import mechanics_page
+from tactile_cube.simulation.mechanics.settings import Setting, chosen
+
+ENGINES = ("bullet", "mujoco")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("case", ["twist", "hanging", "impact"])
+def test_the_fast_setting_is_within_5_percent_of_mechanics(case: str, engine: str) -> None:
+    assert abs(CASES[case](SimulationOptions.fast(engine)).deviation) < 0.05  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_held_cube_creeps_less_than_a_quarter_of_a_millimetre_in_5_s(engine: str) -> None:
+    assert CASES["creep"](SimulationOptions.fast(engine)).measured < 0.25  # type: ignore[arg-type]
+
+
+def test_sliding_and_spinning_share_one_limit_surface_in_mujoco_but_not_in_bullet() -> None:
+    assert abs(CASES["slide_and_spin"](SimulationOptions.fast("mujoco")).deviation) < 0.05
+    # bounded each on its own, a contact bears up to sqrt(2) as much
+    assert 0.2 < CASES["slide_and_spin"](SimulationOptions.fast("bullet")).deviation < 0.42
+
+
+def test_unknown_names_are_refused_with_the_known_ones() -> None:
+    with pytest.raises(InputError, match="cases=spin: no such one; choose among creep, twist"):
+        chosen(["bullet"], ["fast"], ["spin"])
+    with pytest.raises(InputError, match="accuracy=best"):
+        chosen(["bullet"], ["best"], ["twist"])
+
+
+def test_the_page_has_a_column_for_each_setting_and_says_where_mechanics_says_zero() -> None:
+    answers = {"twist": Answer("weight", "N", 2.0, 2.1), "creep": Answer("way", "mm", 0.0, 0.2)}
+    page = mechanics_page([Setting("mujoco fast", answers, 0.02)], "python -m x")
+    assert "| twist: weight | 2 N | +5.0% |" in page
+    assert "| creep: way | 0 mm | 0.200 mm |" in page
