@@ -261,6 +261,7 @@ def draw(
             "rig": rig,
             "poor_excitation": poor,
             "visible": bool(weakest >= VISIBLE),
+            "drawn": attempt + 1,
             "effects": effects,
             "bench": dataclasses.asdict(bench),
             "sensor_floor": floor,

@@ -4,7 +4,8 @@
 
 Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped, and
 `--draws 0` only sums up what is there. identification.md, .json and .png (the confusion matrix) beside it sum the
-lines up. What counts as right stands in scoring.py.
+lines up. What counts as right stands in scoring.py. A round to be published runs on a clean commit, with seeds that no
+round before it used; its line in docs/results/rounds.md is printed at the end.
 """
 
 import argparse
@@ -22,13 +23,23 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from generator import write
+from generator import VISIBLE, write
 from matplotlib.figure import Figure
 from scoring import score
 
 FIRST_SEED = 10_000
+RULES = "[tests/blind/scoring.py](../../tests/blind/scoring.py)"
+GENERATOR = "[generator](../../tests/blind/generator.py)"
+ROUNDS = "[rounds.md](rounds.md)"
 GOAL = 1.3
 """Error on unseen trials in units of the floor that is aimed at."""
+
+
+def commit() -> str:
+    """The commit that is checked out, `-dirty` if a tracked file differs from it; `not recorded` outside a checkout."""
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+    found = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    return found.stdout.strip() or "not recorded"
 
 
 def run_verb(verb: str, out: Path, *words: str) -> dict[str, Any] | None:
@@ -61,6 +72,7 @@ def judge(seed: int, folder: Path, seconds: float | None, keep: bool, engine: st
     )
     wall = time.perf_counter() - started
     line: dict[str, Any] = {"seed": seed, "truth": truth, "diagnosis": diagnosis, "wall_seconds": round(wall, 1)}
+    line["commit"] = commit()
     if diagnosis is None:
         return line
     model = place / "diagnose" / "model.yaml"
@@ -132,6 +144,9 @@ def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
         "confidently_wrong": sum(x["score"]["confident"] for x in lines),
         "false_alarms": [sum(x["score"]["outcome"] == "wrong" for x in none), len(none)],
         "ambiguous_set_sizes": sets,
+        "commits": sorted({x.get("commit", "not recorded") for x in lines}),
+        "drawn_again": sum(x["truth"].get("drawn", 1) > 1 for x in lines),
+        "below_visible": sum(not x["truth"].get("visible", True) for x in lines),
         "reasons": dict(Counter(f"{x['score']['outcome']}: {x['score']['why']}" for x in lines)),
         "confusion": {k: dict(v) for k, v in matrix.items()},
         "unseen_error_over_sensor_noise": _spread([x["noise_ratio"] for x in known]),
@@ -195,6 +210,20 @@ def picture(summary: dict[str, Any], path: Path) -> None:
     canvas.savefig(path, dpi=110)
 
 
+def _drawn(summary: dict[str, Any]) -> str:
+    """What the generator did to make effects visible: without it more draws would end in `invisible`."""
+    return (
+        f"- in {summary['drawn_again']} of {summary['draws']} draws the {GENERATOR} drew the world anew, up to three "
+        f"times and at full strength, because the effect moved its joint by less than {VISIBLE:g} times the sensor noise; "
+        f"{summary['below_visible']} stayed below that"
+    )
+
+
+def _left_open(summary: dict[str, Any]) -> str:
+    sizes = ", ".join(map(str, summary["ambiguous_set_sizes"])) or "-"
+    return f"- ambiguous answers: {len(summary['ambiguous_set_sizes'])}; candidates that each leaves open: {sizes}"
+
+
 def markdown(lines: list[dict[str, Any]], command: str) -> str:
     """The summary as a page."""
     s = summarise(lines)
@@ -202,13 +231,15 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
     page = [
         "# Blind diagnosis of hidden effects",
         "",
-        f"Command: `{command}`. Definitions of right, acceptable and wrong: tests/blind/scoring.py.",
+        f"Command: `{command}`, on commit {', '.join(s['commits']) or 'not recorded'}. Right, acceptable and wrong are "
+        f"defined in {RULES}; all rounds ever run stand in {ROUNDS}.",
         "",
         f"- {s['draws']} draws: {s['right']} right, {s['acceptable']} acceptable, {s['wrong']} wrong "
         f"({s['confidently_wrong']} of them confidently); right or acceptable {100 * share:.0f} %",
         f"- false alarms where nothing is hidden: {s['false_alarms'][0]} of {s['false_alarms'][1]}",
         *(_sentence(s, key, words) for key, words in FLOORS.items()),
-        f"- candidates left open by an ambiguous answer: {', '.join(map(str, s['ambiguous_set_sizes'])) or '-'}",
+        _left_open(s),
+        _drawn(s),
         f"- median time of a diagnosis: {s['median_seconds']} s",
         "",
         "![confusion matrix](identification.png)",
@@ -227,6 +258,22 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     return "\n".join([*page, *(_cell(x) for x in sorted(lines, key=lambda x: x["seed"])), ""])
+
+
+def round_row(summary: dict[str, Any], command: str) -> str:
+    """The round's line in docs/results/rounds.md, but for what changed since the round before."""
+    words = command.split()
+    options = dict(zip(words[2::2], words[3::2], strict=True))
+    first = options.pop("--first-seed", str(FIRST_SEED))
+    outcomes = ", ".join(str(summary[key]) for key in ("right", "acceptable", "wrong"))
+    cells = [
+        ", ".join([first, options.pop("--draws"), *options.values()]),
+        ", ".join(f"`{one}`" for one in summary["commits"]),
+        f"{outcomes} ({summary['confidently_wrong']})",
+        "{} of {}".format(*summary["false_alarms"]),
+        ", ".join(map(str, summary["ambiguous_set_sizes"])) or "-",
+    ]
+    return f"| {' | '.join(cells)} | ... |"
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
@@ -263,10 +310,8 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     done = {x["seed"] for x in read_lines(args.out / "verdicts.jsonl")}
     wanted = [s for s in range(args.first_seed, args.first_seed + args.draws) if s not in done]
-    command = f"python tests/blind/judge.py --draws {args.draws or len(done)}"
-    command += f" --first-seed {args.first_seed}" * (args.first_seed != FIRST_SEED) + (
-        f" --seconds {args.seconds:g}" if args.seconds else ""
-    )
+    command = f"python tests/blind/judge.py --draws {args.draws or len(done)} --first-seed {args.first_seed}"
+    command += f" --seconds {args.seconds:g}" if args.seconds else ""
     command += f" --engine {args.engine}" * (args.engine != "own")
     with ThreadPoolExecutor(args.jobs) as pool:
         submitted = [pool.submit(judge, s, args.out, args.seconds, args.keep, args.engine) for s in wanted]
@@ -280,7 +325,9 @@ def main() -> None:
                 flush=True,
             )
             report(args.out, command)
-    print(json.dumps({k: v for k, v in report(args.out, command).items() if k != "draws_judged"}, indent=1))
+    summary = report(args.out, command)
+    print(json.dumps({k: v for k, v in summary.items() if k != "draws_judged"}, indent=1))
+    print(f"line for docs/results/rounds.md:\n{round_row(summary, command)}")
 
 
 if __name__ == "__main__":

@@ -13,12 +13,15 @@ Exceptions, each counted apart and never as right by name:
 - `invisible`: `adequate` for any other effect is acceptable when the recommended model is at the floor on unseen
   trials: the effect then changes nothing that this bench can measure.
 - Effects of the whole mechanism (payload, coupling) may be named at any joint.
-- A confidently wrong answer (`missing_effect` with other effects than the truth) is wrong however small its error is.
+- A confidently wrong answer is `missing_effect` with other effects than the truth, wrong however small its error is, or
+  `adequate` above the floor: either way nobody looks further.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
+CONFIDENT = ("missing_effect", "adequate")
+"""Verdicts after which nobody looks further."""
 AT_FLOOR = 1.2
 """Error on unseen trials, in units of the true sensor noise, below which nothing measurable is missing."""
 
@@ -107,4 +110,4 @@ def score(truth: dict[str, Any], diagnosis: dict[str, Any], ratio: float | None)
     told = _label([(e["name"], e["joints"]) for e in _merged(diagnosis)])
     answer = verdict if verdict in ("adequate", "unknown_effect") else f"{verdict}: {told}"
     hidden = _label([(e["name"], e["joints"]) for e in effects])
-    return Score(outcome, why, hidden, answer, outcome == "wrong" and verdict == "missing_effect")
+    return Score(outcome, why, hidden, answer, outcome == "wrong" and verdict in CONFIDENT)

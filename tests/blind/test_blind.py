@@ -152,6 +152,41 @@ def test_the_judge(truth: dict[str, Any], answer: dict[str, Any], ratio: float, 
     assert score(truth, answer, ratio).outcome == outcome
 
 
+@pytest.mark.parametrize(
+    ("answer", "ratio", "confident"),
+    [
+        (_answer("adequate"), 1.5, True),
+        (_answer("adequate"), 1.05, False),
+        (_answer("missing_effect", COGS), 1.0, True),
+        (_answer("unknown_effect"), 1.5, False),
+        (_answer("ambiguous", COGS), 1.5, False),
+    ],
+)
+def test_an_answer_after_which_nobody_looks_further_is_confidently_wrong(
+    answer: dict[str, Any], ratio: float, confident: bool
+) -> None:
+    assert score(_truth(PLAY), answer, ratio).confident == confident
+
+
+def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
+    truth = {**_truth(PLAY), "seed": 7, "drawn": 2, "visible": False}
+    line = {
+        "seed": 7,
+        "truth": truth,
+        "diagnosis": _answer("ambiguous", PLAY, rivals=("cogging",)),
+        "wall_seconds": 1.0,
+    }
+    command = "python tests/blind/judge.py --draws 1 --first-seed 7"
+    judged = [judge.judged({**line, "commit": "abc"})]
+    page = judge.markdown(judged, command)
+    assert f"Command: `{command}`, on commit abc." in page
+    assert "in 1 of 1 draws" in page
+    assert "1 stayed below that" in page
+    assert "ambiguous answers: 1; candidates that each leaves open: 2" in page
+    row = judge.round_row(judge.summarise(judged), command)
+    assert row == "| 7, 1 | `abc` | 0, 1, 0 (0) | 0 of 0 | 2 | ... |"
+
+
 def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     judged: list[int] = []
 
