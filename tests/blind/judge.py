@@ -214,8 +214,8 @@ def _drawn(summary: dict[str, Any]) -> str:
     """What the generator did to make effects visible: without it more draws would end in `invisible`."""
     return (
         f"- in {summary['drawn_again']} of {summary['draws']} draws the {GENERATOR} drew the world anew, up to three "
-        f"times and at full strength, because the effect moved its joint by less than {VISIBLE:g} times the sensor noise; "
-        f"{summary['below_visible']} stayed below that"
+        f"times and at full strength, because the effect moved its joint by less than {VISIBLE:g} times the sensor "
+        f"noise; {summary['below_visible']} stayed below that"
     )
 
 

@@ -65,6 +65,29 @@ def test_baselines_do_not_pass_for_a_trained_policy() -> None:
     assert "best 2.0, mean 1.0 rad; 8/10 kept" in line(page, "hand-crafted")
 
 
+def test_another_start_fills_a_row_of_its_own() -> None:
+    straight = results("paper", angle=9.0) | {"command": "python -m tactile_cube.evaluate protocol=paper start=paper"}
+    page = paper_page([results("paper", angle=12.0), straight], [])
+    assert "12.0 rad" in line(page, "best of these runs")
+    assert "9/10 (95 %: 60 to 98 %), 8.0 +- 0.5 rad, 2 dropped" in line(page, "the same from the published start")
+
+
+def test_a_replay_does_not_pass_for_the_policy() -> None:
+    page = paper_page([results("standard", "replay of episode0.npz", angle=3.0)], [])
+    assert "best 3.0, mean 2.0 rad; 8/10 kept" in line(page, "the replay in other worlds")
+    assert "not run" in line(page, "the policy in the same worlds")
+
+
+def test_a_row_names_the_commit_of_its_results() -> None:
+    row = line(paper_page([results("paper") | {"commit": "abc123"}], []), "best of these runs")
+    assert row.endswith("`python -m tactile_cube.evaluate protocol=paper` | abc123 |")
+
+
+@pytest.mark.parametrize("fact", ["acts in 30 %", "target's rate", "13 mm", "Spinning friction", "43 degrees"])
+def test_the_page_says_what_is_not_as_in_the_paper(fact: str) -> None:
+    assert fact in paper_page([], [])
+
+
 def test_a_cube_on_a_table_does_not_pass_for_one_in_the_air() -> None:
     assert "not run" in line(paper_page([results("paper", table=True)], []), "10 runs of 40 s")
 
@@ -105,9 +128,12 @@ def test_what_breaks_the_policy_is_named_the_worst_first() -> None:
 
 
 def test_what_training_cost_is_read_from_the_shipped_card() -> None:
-    card = read_card(SHIPPED / "default.md")["CPU hours"]
-    assert float(card.split()[0]) > 0
-    assert f"| 600 | {card} | default, 0 |" in line(paper_page([results("paper", "default")], []), "CPU hours")
+    card = read_card(SHIPPED / "default.md")
+    assert float(card["CPU hours"].split()[0]) > 0
+    cost = f"{card['CPU hours']}; teacher: {card['teacher']}"
+    assert f"| 600, without a teacher | {cost} | default, 0 |" in line(
+        paper_page([results("paper", "default")], []), "CPU hours"
+    )
 
 
 def test_a_finger_in_free_space_stands_beside_figure_4(tmp_path: Path) -> None:

@@ -3,44 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from tactile_cube.agent.policy_file import PolicyInfo
-from tactile_cube.errors import InputError
+from tactile_cube.evaluation.ancestry import Ancestor, ancestry_table
 
 Results = dict[str, Any]
 
 
-def read_costs(folder: Path) -> dict[str, float]:
-    """Read the environment steps of a run and its hours from its ledger.
-
-    Args:
-        folder: of the training run.
-
-    Raises:
-        InputError: there is none, or it cannot be read.
-    """
-    path = folder / "ledger.json"
-    try:
-        ledger = json.loads(path.read_text(encoding="utf-8"))
-        hours = {name: float(ledger[f"{name}_hours"]) for name in ("simulating", "learning", "wall")}
-        return {"steps": int(ledger["steps"]), **hours}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: not the ledger of a training run ({type(error).__name__}: {error})") from error
-
-
-def model_card(
-    name: str, info: PolicyInfo, runs: Mapping[str, Mapping[str, float]], results: Sequence[Results], limits: str
-) -> str:
+def model_card(name: str, info: PolicyInfo, runs: Sequence[Ancestor], results: Sequence[Results], limits: str) -> str:
     """Return the card as Markdown.
 
     Args:
         name: of the policy.
         info: what its file says.
-        runs: costs of the training runs by name, each begun from the one before: "steps", hours of CPU time
-            "simulating" and "learning", and of "wall" time.
+        runs: that it comes from, the first one first, its own the last.
         results: results files of evaluations of this policy.
         limits: what it cannot do, in the author's words.
     """
@@ -48,12 +27,12 @@ def model_card(
     filter_time, gravity = task.get("filter_time", "?"), task.get("gravity_scale", "?")
     made = {
         "task": f"{task.get('name', '?')}, T_s {filter_time} s, gravity {gravity}",
-        "environment steps": ", then ".join(
-            f"{costs['steps']:,} ({run})".replace(",", " ") for run, costs in runs.items()
-        ),
+        "environment steps": ", then ".join(f"{run.steps:,} ({run.name})".replace(",", " ") for run in runs),
         "seed": info.seed,
         "commit": info.commit,
-        "CPU hours": f"{_total(runs, 'simulating', 'learning'):.2f} ({_total(runs, 'wall'):.2f} h on the clock)",
+        "teacher": "; ".join(f"{run.teacher} ({run.name})" for run in runs if run.teacher != "none") or "none",
+        "CPU hours": f"{sum(run.cpu_hours for run in runs):.2f} ({sum(run.hours['wall'] for run in runs):.2f} h on the "
+        "clock)",
         "network": f"{info.observation_size} -> {' -> '.join(map(str, info.hidden))} -> {info.action_size}",
     }
     lines = [
@@ -63,6 +42,7 @@ def model_card(
         "",
     ]
     lines += ["| | |", "|---|---|", *(f"| {key} | {value} |" for key, value in made.items())]
+    lines += ["", "## Where it comes from", "", *ancestry_table(runs)]
     lines += ["", "## Measured", "", *(_measured(results) or ["Not evaluated yet."])]
     lines += ["", "## Limits", "", limits or "Trained and measured in simulation only; never run on a hand.", ""]
     lines += ["## Configuration", "", "```json", json.dumps(info.config, indent=1), "```", ""]
@@ -75,10 +55,6 @@ def read_card(path: Path) -> dict[str, str]:
         line.strip("| ").split(" | ") for line in path.read_text(encoding="utf-8").splitlines() if line[:2] == "| "
     ]
     return {row[0]: row[1] for row in cells if len(row) == 2}
-
-
-def _total(runs: Mapping[str, Mapping[str, float]], *names: str) -> float:
-    return sum(costs[name] for costs in runs.values() for name in names)
 
 
 def _measured(results: Sequence[Results]) -> list[str]:

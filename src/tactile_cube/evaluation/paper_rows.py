@@ -16,7 +16,7 @@ from tactile_cube.evaluation.policy_path import SHIPPED
 Results = dict[str, Any]
 EVALUATE = "python -m tactile_cube.evaluate"
 TRAIN = "python -m tactile_cube.train +experiment=curriculum`, then `+experiment=finetune"
-SCRIPTED = "scripted"
+SCRIPTED, REPLAY = "scripted", "replay"
 FINGER = "outputs/finger"
 FREE_FINGER = f"python -m tactile_cube.record out={FINGER}` and `python -m tactile_cube.compare recording={FINGER}"
 
@@ -30,7 +30,9 @@ class Row:
         paper: the paper's number. Source: paper, section IV and the authors' website.
         protocol: of conf/protocol that repeats it.
         ours: our number from the results.
-        policy: "scripted" for the hand-crafted trajectory; "" for any trained policy.
+        policy: "scripted" for the hand-crafted trajectory, "replay" for the targets of a recorded episode, "" for any
+            trained policy.
+        start: of conf/start, where it is not the one the policy was trained with.
         made_by: the command, where it is not the evaluation.
     """
 
@@ -39,6 +41,7 @@ class Row:
     protocol: str
     ours: Callable[[Results], str]
     policy: str = ""
+    start: str = ""
     made_by: str = ""
 
     @property
@@ -46,17 +49,25 @@ class Row:
         """The command that fills the row."""
         if self.made_by:
             return self.made_by
-        policy = f"policy={self.policy} " if self.policy else ""
-        return f"{EVALUATE} {policy}protocol={self.protocol}"
+        name = "replay:EPISODE.npz" if self.policy == REPLAY else self.policy
+        policy = f"policy={name} " if name else ""
+        start = f" start={self.start}" if self.start else ""
+        return f"{EVALUATE} {policy}protocol={self.protocol}{start}"
 
     def fits(self, results: Results) -> bool:
         """Whether results fill this row: the cube at full weight in the air, as in the paper."""
         task = results["task"]
         if task["table"] or task["gravity_scale"] < 1.0:
             return False
-        label = results["policy"]["label"]
-        fits_policy = label == SCRIPTED if self.policy else label not in ("hold", "random", SCRIPTED)
-        return bool(results["protocol"] == self.protocol) and fits_policy
+        kind = str(results["policy"]["label"]).partition(" of ")[0]
+        fits_policy = kind == self.policy if self.policy else kind not in ("hold", "random", SCRIPTED, REPLAY)
+        return bool(results["protocol"] == self.protocol) and fits_policy and _start(results) == self.start
+
+
+def _start(results: Results) -> str:
+    """The start that the command chose; empty: the one in training."""
+    chosen = (word.removeprefix("start=") for word in str(results["command"]).split() if word.startswith("start="))
+    return next(chosen, "")
 
 
 def paper_rows(results: Sequence[Results], free_finger: Mapping[str, Any] | None) -> str:
@@ -66,15 +77,17 @@ def paper_rows(results: Sequence[Results], free_finger: Mapping[str, Any] | None
         results: what `read_results` gave, the newest last.
         free_finger: from `read_comparison`.
     """
-    lines = ["| experiment | paper | here | policy, seed | CPU hours | command |", "|---|---|---|---|---|---|"]
+    head = ["experiment", "paper", "here", "policy, seed", "CPU hours", "command", "commit"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for row in ROWS:
         found = newest(results, row.fits)
         if found is None:
-            lines.append(f"| {row.what} | {row.paper} | not run | | | `{row.command}` |")
+            lines.append(f"| {row.what} | {row.paper} | not run | | | `{row.command}` | |")
             continue
         cost = "" if row.made_by else f"{found['cpu_hours']:.2f}"
         made = f"{found['policy']['label']}, {found['seed']} | {cost} | `{row.made_by or found['command']}`"
-        lines.append(f"| {row.what} | {row.paper} | {row.ours(found)} | {made} |")
+        commit = found["policy"].get("commit") if row.made_by else found.get("commit")
+        lines.append(f"| {row.what} | {row.paper} | {row.ours(found)} | {made} | {commit or 'not recorded'} |")
     lines.append(_free_finger_row(free_finger))
     return "\n".join(lines)
 
@@ -84,14 +97,15 @@ def _free_finger_row(comparison: Mapping[str, Any] | None) -> str:
     what = "one finger in free space, open loop (figure 4)"
     paper = "15 recordings of 3 initialisations lie among 50 randomised simulations"
     if comparison is None:
-        return f"| {what} | {paper} | not run | | | `{FREE_FINGER}` |"
+        return f"| {what} | {paper} | not run | | | `{FREE_FINGER}` | |"
     band, trials = comparison["band"], comparison["trials"]
     starts = len({trial["initialisation"] for trial in trials})
     ours = (
         f"{100 * band['inside']:.0f} % of the samples of {len(trials)} recordings of {starts} initialisations of a "
         f"simulated finger lie among {band['simulations']}"
     )
-    return f"| {what} | {paper} | {ours} | | {comparison['seconds'] / 3600:.2f} | `{FREE_FINGER}` |"
+    cost, commit = f"{comparison['seconds'] / 3600:.2f}", comparison.get("commit", "not recorded")
+    return f"| {what} | {paper} | {ours} | | {cost} | `{FREE_FINGER}` | {commit} |"
 
 
 def newest(results: Sequence[Results], fits: Callable[[Results], bool]) -> Results | None:
@@ -124,6 +138,12 @@ def _successes(results: Results) -> str:
     summary = summary_of(results)
     low, high = (round(100 * summary[key]) for key in ("success_low", "success_high"))
     return f"{summary['successes']}/{summary['episodes']} (95 %: {low} to {high} %)"
+
+
+def _kept_going(results: Results) -> str:
+    summary = summary_of(results)
+    dropped = summary["episodes"] - summary["kept"]
+    return f"{_successes(results)}, {summary['mean_angle']:.1f} +- {summary['std_angle']:.1f} rad, {dropped} dropped"
 
 
 def _best(results: Results) -> str:
@@ -170,18 +190,24 @@ def _along(axis: str) -> Callable[[Results], str]:
 
 
 def _training_cost(results: Results) -> str:
-    """What the policy's card says, where it comes with the package."""
-    card = SHIPPED / f"{results['policy']['label']}.md"
-    return read_card(card)["CPU hours"] if card.is_file() else "see the ledger of its run"
+    """Hours and teacher of the policy's card, where it comes with the package."""
+    file = SHIPPED / f"{results['policy']['label']}.md"
+    if not file.is_file():
+        return "see the ledger of its run"
+    card = read_card(file)
+    return f"{card['CPU hours']}; teacher: {card['teacher']}"
 
 
 ROWS = (
-    Row("CPU hours of training", "600", "paper", _training_cost, made_by=TRAIN),
+    Row("CPU hours of training", "600, without a teacher", "paper", _training_cost, made_by=TRAIN),
     Row("10 runs of 40 s, at least 80 % of the best run", "robot 8/10, simulation 9/10", "paper", _successes),
+    Row("the same from the published start", "robot 8/10, simulation 9/10", "paper", _kept_going, start="paper"),
     Row("best of these runs", "15 rad", "paper", _best),
     Row("the same, 100 runs", "-", "many", _successes),
     Row("endurance, at most 16 min", "289 rad, 46 turns, stopped by hand", "endurance", _longest),
     Row("open-loop replay of a successful run", "fails after pi/2", "replay", _replayed),
+    Row("the replay in other worlds", "fails after pi/2", "standard", _with_endings, REPLAY),
+    Row("the policy in the same worlds", "-", "standard", _with_endings, start="paper"),
     Row("hand-crafted trajectory", "11 rad, then drops", "paper", _with_endings, SCRIPTED),
     Row("failure (a): stuck with twisted fingers", "until q1 was penalised", "many", _verdicts("stuck_twisted")),
     Row("failure (c): turns on and drops it", "seen", "many", _verdicts("spun_and_dropped")),

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tactile_cube.evaluation.paper_differences import differences
 from tactile_cube.evaluation.paper_rows import EVALUATE, newest, paper_rows, summary_of
 from tactile_cube.evaluation.results_file import read_results
 from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1, sweep_table
@@ -33,6 +34,7 @@ def paper_page(
         free_finger: the comparison.json of a finger in free space, the paper's figure 4.
     """
     parts = ["# The paper's results beside ours", INTRODUCTION, paper_rows(results, free_finger)]
+    parts += ["## What is not as in the paper", differences()]
     parts += _variant_section("Robustness", "perturbations", results)
     parts += [ROBUSTNESS_MAP] if any(one["protocol"] == "perturbations" for one in results) else []
     parts += [*_variant_section("Other simulations", "sim_to_sim", results), *_what_breaks(results)]
@@ -60,7 +62,8 @@ def _variant_section(title: str, protocol: str, results: Sequence[Results]) -> l
     found = newest(results, lambda one: bool(one["protocol"] == protocol))
     if found is None:
         return [f"## {title}", f"Not run: `{EVALUATE} protocol={protocol}`"]
-    head = f"`{found['command']}`, {found['cpu_hours']:.2f} CPU hours, policy {found['policy']['label']}."
+    head = f"`{found['command']}`, {found['cpu_hours']:.2f} CPU hours, policy {found['policy']['label']}, commit "
+    head += f"{found.get('commit', 'not recorded')}."
     lines = ["| condition | mean angle [rad] | best | kept the cube | verdicts |", "|---|---|---|---|---|"]
     for variant in found["variants"]:
         summary = variant["summary"]
@@ -89,8 +92,8 @@ def _table1_section(table1: Mapping[str, Mapping[int, Curve]]) -> list[str]:
     head = (
         f"`{TABLE_1}`, which goes on where it was when it is called again. Steps until the mean angle of the last 50 "
         "training episodes exceeds 3 rad; with `>`: not until then. A gait shows here how to regrasp and is imitated "
-        "where it pays (docs/results/curriculum); the paper's runs find out by themselves. Machines, and runs beside "
-        "these: docs/results/table1."
+        "where it pays ([curriculum](curriculum/README.md)); the paper's runs find out by themselves. Machines, and "
+        "runs beside these: [table1](table1/README.md)."
     )
     return ["## Table I: steps until regrasping", head, sweep_table(table1, tuple(PAPER_TABLE_1))]
 
