@@ -22,7 +22,9 @@ def test_steps_a_second_on_two_cores_are_those_of_the_benchmark(
 
 def test_where_bfloat16_goes_by_float32_it_saves_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expected_time, "MULTIPLIES_BF16", False)
-    times = {expected_seconds(1000, AgentSettings(precision=p), BESIDE, TrainingSettings()) for p in ("bf16", "fp32")}
+    times = {
+        expected_seconds(1000, AgentSettings(precision=p), BESIDE, TrainingSettings()) for p in ("bf16", "fp32", "auto")
+    }
     assert len(times) == 1
 
 

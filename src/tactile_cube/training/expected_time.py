@@ -2,13 +2,15 @@
 
 import itertools
 
+import torch
+
 from tactile_cube.agent.flat_perceptron import MULTIPLIES_BF16
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 
 SIMULATING = 1 / 457
 """Seconds of a worker process for an environment step."""
-LEARNING = {"bf16": 8.6e-3, "fp32": 28.3e-3}
+LEARNING = {torch.bfloat16: 8.6e-3, torch.float32: 28.3e-3}
 """Seconds of an update of `LARGE` weights and samples, by the precision of its products."""
 LARGE = 512 * 512 * 256
 """Weights of the middle layer times samples of a batch, in the published agent. Source: docs/results/benchmark.md."""
@@ -28,7 +30,7 @@ def expected_seconds(
     block = collector.worlds * training.steps_per_iteration
     layers = [*agent.hidden, agent.hidden[-1]]
     size = max(a * b for a, b in itertools.pairwise(layers)) * agent.batch_size / LARGE
-    precision = agent.precision if MULTIPLIES_BF16 else "fp32"
+    precision = agent.product_dtype if MULTIPLIES_BF16 else torch.float32
     learning = LEARNING[precision] * size * training.updates_per_iteration
     if collector.kind == "single":
         return steps / block * (block * SIMULATING + learning)
