@@ -69,7 +69,7 @@ def test_another_start_fills_a_row_of_its_own() -> None:
     straight = results("paper", angle=9.0) | {"command": "python -m tactile_cube.evaluate protocol=paper start=paper"}
     page = paper_page([results("paper", angle=12.0), straight], [])
     assert "12.0 rad" in line(page, "best of these runs")
-    assert "9/10 (95 %: 60 to 98 %), 8.0 +- 0.5 rad, 2 dropped" in line(page, "the same from the published start")
+    assert "9/10 (95 %: 60 to 98 %), 8.0 +- 0.5 rad, 2 dropped" in line(page, "10 runs from the published start")
 
 
 def test_a_replay_does_not_pass_for_the_policy() -> None:
