@@ -231,7 +231,7 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
     page = [
         "# Blind diagnosis of hidden effects",
         "",
-        f"Command: `{command}`, on commit {', '.join(s['commits']) or 'not recorded'}. Right, acceptable and wrong are "
+        f"Command: `{command}`; commit: {', '.join(s['commits'])}. Right, acceptable and wrong are "
         f"defined in {RULES}; all rounds ever run stand in {ROUNDS}.",
         "",
         f"- {s['draws']} draws: {s['right']} right, {s['acceptable']} acceptable, {s['wrong']} wrong "

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from judge import commit
 
 from tactile_cube.simulation.contact_effects import contact_catalogue
 
@@ -111,6 +112,7 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
     """The page."""
     lines = sorted(lines, key=lambda line: line["seed"])
     outcomes = Counter(score(line)[0] for line in lines)
+    commits = sorted({line.get("commit", "not recorded") for line in lines})
     inside = [one for line in lines if line["values"] for one in covered(line)]
     empty = sum(
         _says_nothing(line["name"], key, one) for line in lines for key, one in line.get("estimate", {}).items()
@@ -118,7 +120,8 @@ def markdown(lines: list[dict[str, Any]], command: str) -> str:
     page = [
         "# Blind identification of contact effects",
         "",
-        f"Command: `{command}`. What is right, acceptable and wrong stands at the top of that file.",
+        f"Command: `{command}`; commit: {', '.join(commits)}. What is right, acceptable and wrong stands at the top "
+        "of that file; all rounds stand in [rounds.md](rounds.md).",
         "",
         f"- {len(lines)} draws: {outcomes['right']} right, {outcomes['acceptable']} acceptable, "
         f"{outcomes['wrong']} wrong",
@@ -166,7 +169,7 @@ def main() -> None:
     wanted = range(args.first_seed, args.first_seed + args.draws)
     command = f"python tests/blind/judge_contact.py --draws {args.draws} --first-seed {args.first_seed}"
     for seed in [seed for seed in wanted if seed not in {line["seed"] for line in lines}]:
-        lines.append(judge(seed, args.out))
+        lines.append({**judge(seed, args.out), "commit": commit()})
         with file.open("a") as all_lines:
             all_lines.write(json.dumps(lines[-1]) + "\n")
         print(_row(lines[-1]), flush=True)

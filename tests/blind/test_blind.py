@@ -179,7 +179,7 @@ def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
     command = "python tests/blind/judge.py --draws 1 --first-seed 7"
     judged = [judge.judged({**line, "commit": "abc"})]
     page = judge.markdown(judged, command)
-    assert f"Command: `{command}`, on commit abc." in page
+    assert f"Command: `{command}`; commit: abc." in page
     assert "in 1 of 1 draws" in page
     assert "1 stayed below that" in page
     assert "ambiguous answers: 1; candidates that each leaves open: 2" in page
