@@ -58,7 +58,7 @@ def train(*settings: str, model: PathLike | None = None, folder: PathLike | None
 
     Raises:
         InputError: a value that cannot be used, or the folder is in use.
-        CollectionError: a worker process died; the same call goes on from the last checkpoint.
+        CollectionError: worker processes failed again and again; the same call goes on from the last checkpoint.
 
     Example:
         >>> result = tactile_cube.train("+experiment=table", "training.steps=60000")
@@ -69,14 +69,12 @@ def train(*settings: str, model: PathLike | None = None, folder: PathLike | None
 
 
 def run_training(job: Job) -> TrainingResult:
-    """Build the run of a job, train, and say how it went."""
-    run = training_run(job)
-    try:
-        run.announce()
-        reason = run.train()
-    finally:
-        run.close()
-    run.conclude(reason)
+    """Build the run of a job, train through faults of the workers, and say how it went."""
+    from functools import partial
+
+    from tactile_cube.training.recovery import train_on
+
+    run, reason = train_on(partial(training_run, job))
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 

@@ -4,7 +4,9 @@ Both give the same numbers for the same seed and division of worlds: everything 
 generator and the worlds' own, and `restart` sets both.
 """
 
+import contextlib
 import copy
+import multiprocessing
 import os
 import signal
 import time
@@ -152,6 +154,7 @@ class MultiSyncCollection:
         self._block: Future[TensorDictBase] | None = None
         self._final_cpu: float | None = None
         self._processes: list[Any] = []
+        self._others = set(multiprocessing.active_children())
         per_process = worlds // processes
         build = partial(self._build, make_env, per_process, processes, worlds * steps, start_method)
         self._collector, self._blocks = self._wait(self._thread.submit(build), "start")
@@ -173,7 +176,7 @@ class MultiSyncCollection:
             num_sub_threads=1,
             trust_policy=True,
             auto_register_policy_transforms=False,
-            init_fn=_prepare_worker,
+            init_fn=partial(_prepare_worker, None if start_method == "forkserver" else os.getpid()),
         )
         torch.set_num_threads(threads)
         return collector, iter(collector)
@@ -215,13 +218,12 @@ class MultiSyncCollection:
         return sum(_process_cpu_seconds(process.pid) for process in self._processes)
 
     def close(self) -> None:
-        """End the workers; kill those that do not listen."""
+        """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
         self._final_cpu = self.cpu_seconds()
-        closing = self._thread.submit(partial(self._collector.shutdown, timeout=5.0, raise_on_error=False))
-        try:
-            closing.result(timeout=8.0)
-        except Exception:  # a worker that cannot be asked is killed below
-            self._kill()
+        self._kill()
+        closing = self._thread.submit(partial(self._collector.shutdown, timeout=1.0, raise_on_error=False))
+        with contextlib.suppress(Exception):  # the thread is daemonic: it may stay where it is
+            closing.result(timeout=3.0)
         self._thread.close()
 
     def _wait(self, future: "Future[Any]", doing: str) -> Any:
@@ -243,22 +245,24 @@ class MultiSyncCollection:
                 raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
 
     def _kill(self) -> None:
-        for process in self._processes:
-            try:
-                process.kill()
-            except (ValueError, AttributeError):  # already closed
-                continue
+        # also those of a start that did not come to its end: they would be waited for when the program ends
+        for process in set(multiprocessing.active_children()) - self._others:
+            process.kill()
+            process.join(1.0)
 
 
-def _prepare_worker() -> None:
-    """Leave Ctrl-C to the main process, and end with it even if it is killed."""
+def _prepare_worker(parent: int | None) -> None:
+    """Leave Ctrl-C to the main process `parent`, and end with it even if it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     torch.set_num_threads(1)
     if os.uname().sysname == "Linux":
         import ctypes
 
         pr_set_pdeathsig = 1
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)  # SIGTERM would not reach a stopped process
+        if parent is not None and os.getppid() != parent:  # it ended before
+            os._exit(1)
 
 
 def _process_cpu_seconds(pid: int) -> float:

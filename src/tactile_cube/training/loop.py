@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 import torch
+from tensordict import TensorDictBase
 from torch import Tensor
 
 from tactile_cube.agent.interface import Agent
-from tactile_cube.training.collection import Collection
+from tactile_cube.training.collection import Collection, CollectionError
 from tactile_cube.training.episodes import EpisodeStatistics
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.settings import TrainingSettings
@@ -73,6 +74,7 @@ class Learner:
         if self.steps >= self.settings.learning_starts:
             self._learn()
         block = self.collection.take()
+        _require_finite(block)
         self._store(self.assembler.add(block))
         self.episodes.add(block)
         self.steps += block.numel()
@@ -115,6 +117,17 @@ class Learner:
         torch.set_rng_state(state["random_state"])
         if torch.cuda.is_available() and state["cuda_random_state"]:
             torch.cuda.set_rng_state_all(state["cuda_random_state"])
+
+
+def _require_finite(block: TensorDictBase) -> None:
+    """Refuse what would poison replay and networks for good; steps marked as faulty never get there."""
+    following = block["next"]
+    sound = ~following["faulty"].squeeze(-1)
+    for entries in (block, following):
+        for key in ("observation", "privileged", "action", "reward_terms"):
+            value = entries.get(key, None)
+            if value is not None and not torch.isfinite(value[sound]).all():
+                raise CollectionError(f"simulation worker sent values of {key!r} that are not finite")
 
 
 def barrier_seed(seed: int, iteration: int) -> int:

@@ -32,6 +32,7 @@ class Run:
         ledger: what it costs.
         lock: keeps other processes out of the folder.
         checkpoints: where its state goes.
+        saved_at: environment steps at the last checkpoint.
         expected_seconds: on the clock until all steps are done, on two idle cores.
     """
 
@@ -49,7 +50,7 @@ class Run:
         self.line = ProgressLine(self.learner.settings.steps, self.learner.steps, self.learner.updates)
         self.best_angle = 0.0
         self.commit = current_commit()
-        self._saved_at = self.learner.steps
+        self.saved_at = self.learner.steps
         self._interruption = Interruption(self._seconds_to_barrier, self.line.say)
         self._iteration_ended = time.perf_counter()
         self._iteration_seconds: float | None = None
@@ -93,8 +94,8 @@ class Run:
         steps, angle = self.learner.steps, self.learner.episodes.mean_angle
         self.line.say(f"{reason}: {steps} steps, mean final angle {angle:.2f} rad, {cpu_hours:.2f} CPU-hours")
         if reason == INTERRUPTED:
-            again = f"; the {steps - self._saved_at} steps since then are done again" if steps > self._saved_at else ""
-            self.line.say(f"saved at {self._saved_at} steps: the same command goes on from there{again}")
+            again = f"; the {steps - self.saved_at} steps since then are done again" if steps > self.saved_at else ""
+            self.line.say(f"saved at {self.saved_at} steps: the same command goes on from there{again}")
         self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}")
 
     def close(self) -> None:
@@ -103,7 +104,7 @@ class Run:
             stack.callback(self.lock.release)
             stack.callback(self.loggers.close)
             stack.callback(self.learner.collection.close)
-            self.ledger.write(self._saved_at)  # first: the workers take their CPU time with them
+            self.ledger.write(self.saved_at)  # first: the workers take their CPU time with them
 
     def _seconds_to_barrier(self) -> float | None:
         if self._iteration_seconds is None:
@@ -148,10 +149,10 @@ class Run:
             self._save_policy(BEST_POLICY)
         self._save_policy(POLICY)
         every = learner.settings.policy_every
-        if every and learner.steps // every > self._saved_at // every:
+        if every and learner.steps // every > self.saved_at // every:
             self._save_policy(f"policy_{learner.steps}.safetensors")
         self.checkpoints.save({"learner": learner.state_dict(), "best_angle": self.best_angle, "config": self.config})
-        self._saved_at = learner.steps
+        self.saved_at = learner.steps
         self.ledger.write(learner.steps)
 
     def _save_policy(self, name: str) -> None:

@@ -1,0 +1,125 @@
+"""Workers that fail are replaced, and the run ends with the bits of an undisturbed one."""
+
+import multiprocessing
+import os
+import signal
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from tactile_cube.training.collection import CollectionError
+from tactile_cube.training.recovery import train_on
+from tactile_cube.training.run import Run
+from tests.training.test_loop import finish, weights
+from tests.training.tiny_env import TinyEnv, tiny_environment
+from tests.training.tiny_run import tiny_run
+
+COLLECTOR = {"kind": "multi_sync", "processes": 2, "timeout": 15.0}
+
+
+class FaultyEnv(TinyEnv):
+    """Raises, or gives NaN, as long as a file asks for it; asks no more when it has."""
+
+    def __init__(self, worlds: int, seed: int, asks: Path, again: bool = False):
+        super().__init__(worlds, seed)
+        self._asks, self._again = asks, again
+
+    def _step(self, tensordict):  # type: ignore[no-untyped-def]
+        result = super()._step(tensordict)
+        if not self._asks.exists():
+            return result
+        wish = self._asks.read_text()
+        if not self._again:
+            self._asks.unlink(missing_ok=True)
+        if wish == "nan":
+            result["observation"][0, 0] = torch.nan
+            return result
+        raise ValueError("tiny world broke")
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> torch.Tensor:
+    return finish(tiny_run(tmp_path_factory.mktemp("reference"), collector=COLLECTOR))
+
+
+def disturbed(folder: Path, at: int, disturb: Any, environment: Any = None) -> Run:
+    """A run that is disturbed once, before iteration `at`; learns on through it."""
+    done = []
+
+    def build() -> Run:
+        run = tiny_run(folder, collector=COLLECTOR, environment=environment)
+        run.learner.collection._timeout = 3.0  # type: ignore[attr-defined]
+        iterate = run.learner.iterate
+
+        def disturbed_iterate() -> None:
+            if run.learner.iteration == at and not done:
+                done.append(at)
+                disturb(run)
+            iterate()
+
+        run.learner.iterate = disturbed_iterate  # type: ignore[method-assign]
+        return run
+
+    run, reason = train_on(build)
+    assert done
+    assert reason == "all 160 steps done"
+    return run
+
+
+def send(number: int, run: Run) -> None:
+    os.kill(run.learner.collection._processes[1].pid, number)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("at", [1, 6])
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_killed_or_stopped_worker_is_replaced(
+    tmp_path: Path, reference: torch.Tensor, number: int, at: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    began = time.perf_counter()
+    run = disturbed(tmp_path, at, partial(send, number))
+    assert time.perf_counter() - began < 60.0
+    assert torch.equal(weights(run), reference)
+    assert "going back to the last barrier with new workers" in capsys.readouterr().out
+    assert (tmp_path / "metrics.csv").read_text().count("\n") == 1 + 160 // 20
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("wish", ["nan", "raise"])
+def test_a_world_that_fails_once_is_replaced(tmp_path: Path, reference: torch.Tensor, wish: str) -> None:
+    asks = tmp_path / "asks"
+    environment = tiny_environment()
+    environment = type(environment)(
+        partial(FaultyEnv, asks=asks), environment.sizes, environment.reward_terms, environment.reward_weights
+    )
+    run = disturbed(tmp_path / "run", 6, lambda _: asks.write_text(wish), environment)
+    assert torch.equal(weights(run), reference)
+
+
+def test_a_fault_that_comes_again_ends_the_run_with_its_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    environment = tiny_environment(fail_at=2)
+    with pytest.raises(CollectionError, match=r"worker.*3 times in a row without a barrier in between"):
+        train_on(lambda: tiny_run(tmp_path, collector=COLLECTOR, environment=environment))
+    assert capsys.readouterr().out.count("going back to the last barrier") == 2
+    assert not multiprocessing.active_children()
+
+
+def test_a_worker_stopped_while_it_starts_is_given_up_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    def stopped(worlds: int, seed: int) -> TinyEnv:
+        if not (tmp_path / "once").exists():
+            (tmp_path / "once").touch()
+            os.kill(os.getpid(), signal.SIGSTOP)
+        return TinyEnv(worlds, seed)
+
+    environment = tiny_environment()
+    environment = type(environment)(stopped, environment.sizes, environment.reward_terms, environment.reward_weights)
+    began = time.perf_counter()
+    with pytest.raises(CollectionError, match=r"no simulation worker answered within collector\.timeout=5 s"):
+        tiny_run(tmp_path / "run", collector=COLLECTOR | {"timeout": 5.0, "processes": 1}, environment=environment)
+    assert time.perf_counter() - began < 25.0
+    assert not multiprocessing.active_children()
