@@ -8,8 +8,10 @@ import ast
 import contextlib
 import errno
 import functools
+import hashlib
 import os
 import re
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,6 +20,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import yaml
 
 from tactile_cube.completion import install_script, prepare_query
+from tactile_cube.console_log import console_kept_in
+from tactile_cube.did_you_mean import did_you_mean
 from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,7 +38,9 @@ RECIPE = {"train": "curriculum"}
 
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
 USAGE_ERROR = 2
-FULL = (errno.ENOSPC, errno.EDQUOT)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+LONGEST = 180
+"""Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
 INTERRUPTED = 130
 
 
@@ -90,10 +96,17 @@ def _run(name: str, function: Callable[["DictConfig"], None]) -> None:
 
     @functools.wraps(function)
     def guarded(config: "DictConfig") -> None:
-        # inside Hydra, which otherwise adds lines of its own
-        with _errors_in_one_line(wants_traceback):
+        from hydra.core.hydra_config import HydraConfig
+
+        folder = Path(HydraConfig.get().runtime.output_dir)
+        # errors inside Hydra, which otherwise adds lines of its own
+        log = folder / f"{name}.log"
+        with _nothing_left_if_refused(folder, name), console_kept_in(log), _errors_in_one_line(wants_traceback):
             function(config)
 
+    from omegaconf import OmegaConf
+
+    OmegaConf.register_new_resolver("sweep_folder", sweep_folder, replace=True)
     with _errors_in_one_line(wants_traceback):
         hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(guarded)()
 
@@ -112,6 +125,31 @@ def _errors_in_one_line(wants_traceback: bool) -> Iterator[None]:
         fail(message)
 
 
+@contextlib.contextmanager
+def _nothing_left_if_refused(folder: Path, name: str) -> Iterator[None]:
+    """Delete the folder of a command that was refused before it wrote anything."""
+    try:
+        yield
+    except SystemExit as refusal:
+        written = {path.name for path in folder.iterdir()} - {".hydra", ".lock", f"{name}.log"}
+        if refusal.code == USAGE_ERROR and not written and folder.resolve() != Path.cwd():
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def sweep_folder(overrides: str, seed: int) -> str:
+    """Folder of one run of a sweep: what it overrides beside the seed, and the seed.
+
+    Example:
+        >>> sweep_folder("task=table-agent.gamma=0.9", 1), sweep_folder("", 1)
+        ('task=table-agent.gamma=0.9-seed1', 'seed1')
+    """
+    setting = overrides.replace("/", "_")  # no folders within folders where a value is a path
+    if len(setting) > LONGEST:
+        setting = f"{setting[:LONGEST]}~{hashlib.sha256(setting.encode()).hexdigest()[:8]}"
+    return f"{setting}-seed{seed}" if setting else f"seed{seed}"
+
+
 def usage_error(error: BaseException) -> str | None:
     """What the user did wrong, in one line; None if the error is none of the user's."""
     from hydra.errors import HydraException
@@ -121,7 +159,8 @@ def usage_error(error: BaseException) -> str | None:
     for kinds in (InputError, ValidationError, (HydraException, OmegaConfBaseException)):
         cause = _find(error, kinds)
         if cause is not None:
-            return _one_line(cause)
+            message = _one_line(cause)
+            return message + did_you_mean(message, CONFIG)
     full = _find(error, OSError)
     if isinstance(full, OSError) and full.errno in FULL:
         return (

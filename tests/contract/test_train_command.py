@@ -99,7 +99,7 @@ def test_fine_tuning_goes_on_from_the_shipped_policy(tmp_path: Path) -> None:
     [
         (["training.init_from=nobody"], "training.init_from=nobody: no such file"),
         (["task=unknown"], "task/unknown"),
-        (["agent.gama=0.9"], "agent.gama"),
+        (["agent.gama=0.9"], "did you mean agent.gamma?"),
         (["+experiment=nope"], "experiment/nope"),
         (["task"], "missing EQUAL"),
     ],
@@ -116,6 +116,7 @@ def test_wrong_value_ends_with_one_line_and_exit_code_2(tmp_path: Path) -> None:
     run = train("+experiment=smoke", "collector.worlds=0", folder=tmp_path)
     assert run.returncode == 2
     assert run.stderr == "error: collector.worlds=0: Input should be greater than 0\n"
+    assert not (tmp_path / "outputs/train/smoke-seed0").exists()
 
 
 def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
@@ -130,5 +131,9 @@ def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
     second = train(*short, "training.steps=400", folder=tmp_path)
     assert second.returncode == 0, second.stderr
     assert "goes on at 200 steps" in second.stdout
+    log = (folder / "train.log").read_text()
+    for line in [*first.stdout.splitlines(), *second.stdout.splitlines()]:
+        assert line in log
+    assert any((folder / "tensorboard").iterdir())
     steps = [int(line.split(",")[0]) for line in (folder / "metrics.csv").read_text().splitlines()[1:]]
     assert steps == list(range(40, 401, 40))

@@ -14,6 +14,7 @@ from tactile_cube.deployment.network import Network
 from tactile_cube.errors import InputError
 
 OPSET = 17
+FORMATS = ("npz", "onnx")
 METADATA = "tactile_cube.contract"
 """Key of the contract in the metadata of an ONNX file."""
 Contract = dict[str, Any]

@@ -19,7 +19,7 @@ PAPER_TABLE_1 = {
     "task=full, T_s 0.1 s": "5.1, 1.7, 6.0, 3.9",
 }
 """Million steps until regrasping of four runs; -: not within 6.5. Source: paper, Table I."""
-_RUN = re.compile(r"(?P<setting>.+)-seed(?P<seed>\d+)$")
+_RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
 _FILTER_TIME = re.compile(r"task\.filter_time=(?P<time>[\d.]+)-(?P<task>task=\w+)$")
 
 
@@ -27,17 +27,17 @@ def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
     """Read the runs of a multirun: setting -> seed -> learning curve.
 
     Args:
-        folder: holds `<setting>-seed<N>` run folders, or copies of their metrics.csv named `<setting>-seed<N>.csv`.
+        folder: holds run folders `<setting>-seed<N>` or `seed<N>`, or copies of their metrics.csv named like them.
 
     Raises:
         InputError: there is no such run in the folder.
     """
     runs: dict[str, dict[int, Curve]] = {}
-    for path in sorted(folder.glob("*-seed*")):
+    for path in sorted(folder.glob("*seed*")):
         name = path.stem if path.suffix == ".csv" else path.name
         match = _RUN.match(name)
         if match and (path.suffix == ".csv" or (path / "metrics.csv").is_file()):
-            setting = _FILTER_TIME.sub(r"\g<task>, T_s \g<time> s", match["setting"])
+            setting = _FILTER_TIME.sub(r"\g<task>, T_s \g<time> s", match["setting"] or folder.name)
             runs.setdefault(setting, {})[int(match["seed"])] = read_curve(path, name)
     if not runs:
         raise InputError(f"{folder}: no run <setting>-seed<N> with a metrics.csv; give the folder of a multirun")

@@ -1,0 +1,58 @@
+"""What a mistyped key or option of the command line may have meant."""
+
+import difflib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+_OPTION = re.compile(r"Could not find '(?P<group>[\w/]+)/(?P<option>[^'/]+)'")
+_KEY = re.compile(r"Could not override '(?P<key>[^']+)'|^(?P<setting>[\w.]+): no such setting")
+
+
+def did_you_mean(message: str, tree: Path) -> str:
+    """The end of an error message: "; did you mean ...?", or nothing.
+
+    Args:
+        message: of Hydra or of our settings.
+        tree: folder of the configuration.
+
+    Example:
+        >>> did_you_mean("Could not override 'agent.gama'.", CONFIG)
+        '; did you mean agent.gamma?'
+    """
+    option = _OPTION.search(message)
+    if option:
+        options = [path.stem for path in (tree / option["group"]).glob("*.yaml")]
+        near = [f"{option['group']}={name}" for name in difflib.get_close_matches(option["option"], options, 1)]
+    else:
+        key = _KEY.search(message)
+        near = _nearest(key["key"] or key["setting"], sorted(_keys(tree))) if key else []
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _nearest(key: str, keys: list[str]) -> list[str]:
+    name = key.rpartition(".")[2]
+    same_name = [known for known in keys if known.rpartition(".")[2] == name]
+    return difflib.get_close_matches(key, keys, 1, 0.8) or difflib.get_close_matches(key, same_name, 1, 0.0)
+
+
+def _keys(tree: Path) -> set[str]:
+    """Dotted keys and groups of the configuration, as far as its files name them."""
+    keys = {str(folder.relative_to(tree)) for folder in tree.iterdir() if folder.is_dir()}
+    for path in tree.rglob("*.yaml"):
+        text = path.read_text(encoding="utf-8")
+        groups = () if "@package _global_" in text else path.relative_to(tree).parent.parts
+        keys.update(_dotted(yaml.safe_load(text), ".".join(groups)))
+    return keys
+
+
+def _dotted(value: Any, prefix: str) -> Iterator[str]:
+    if prefix:
+        yield prefix
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if key not in ("defaults", "_target_", "hydra"):
+                yield from _dotted(inner, f"{prefix}.{key}" if prefix else str(key))
