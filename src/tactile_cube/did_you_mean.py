@@ -36,7 +36,7 @@ def did_you_mean(message: str, tree: Path) -> str:
 def _nearest(key: str, keys: list[str]) -> list[str]:
     name = key.rpartition(".")[2]
     same_name = [known for known in keys if known.rpartition(".")[2] == name]
-    return difflib.get_close_matches(key, keys, 1, 0.8) or difflib.get_close_matches(key, same_name, 1, 0.0)
+    return difflib.get_close_matches(key, keys, 1, 0.75) or difflib.get_close_matches(key, same_name, 1, 0.0)
 
 
 def _keys(tree: Path) -> set[str]:
