@@ -44,11 +44,14 @@ LONGEST = 180
 INTERRUPTED = 130
 
 
-def verb(name: str) -> Callable[[Callable[["DictConfig"], None]], Callable[[], None]]:
+def verb(
+    name: str, after_sweep: Callable[[list[Path]], None] = lambda folders: None
+) -> Callable[[Callable[["DictConfig"], None]], Callable[[], None]]:
     """Make a function of a configuration a command line of its own.
 
     Args:
         name: of the verb; its configuration is conf/<name>.yaml.
+        after_sweep: says what came of a sweep, given its folders.
 
     Example:
         >>> @verb("train")
@@ -67,7 +70,7 @@ def verb(name: str) -> Callable[[Callable[["DictConfig"], None]], Callable[[], N
                 return
             prepare_query()
             sys.argv = with_recipe(name, sys.argv)
-            _run(name, function)
+            _run(name, function, after_sweep)
 
         return command
 
@@ -88,27 +91,44 @@ def with_recipe(name: str, words: list[str]) -> list[str]:
     return [*words[:first], f"+experiment={RECIPE[name]}", *words[first:]]
 
 
-def _run(name: str, function: Callable[["DictConfig"], None]) -> None:
+def _run(name: str, function: Callable[["DictConfig"], None], after_sweep: Callable[[list[Path]], None]) -> None:
     import hydra
 
     wants_traceback = os.environ.get("HYDRA_FULL_ERROR", "0") != "0"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # else Hydra prints errors in its own way and exits with status 1
 
+    swept: dict[Path, bool] = {}
+
     @functools.wraps(function)
     def guarded(config: "DictConfig") -> None:
         from hydra.core.hydra_config import HydraConfig
+        from hydra.types import RunMode
 
         folder = Path(HydraConfig.get().runtime.output_dir)
         # errors inside Hydra, which otherwise adds lines of its own
         log = folder / f"{name}.log"
-        with _nothing_left_if_refused(folder, name), console_kept_in(log), _errors_in_one_line(wants_traceback):
-            function(config)
+        try:
+            with _nothing_left_if_refused(folder, name), console_kept_in(log), _errors_in_one_line(wants_traceback):
+                function(config)
+        except SystemExit as end:
+            if HydraConfig.get().mode != RunMode.MULTIRUN or end.code == INTERRUPTED:
+                raise
+            swept[folder] = False  # one run that fails does not keep the others from running
+        else:
+            if HydraConfig.get().mode == RunMode.MULTIRUN:
+                swept[folder] = True
 
     from omegaconf import OmegaConf
 
     OmegaConf.register_new_resolver("sweep_folder", sweep_folder, replace=True)
     with _errors_in_one_line(wants_traceback):
         hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(guarded)()
+        if swept:
+            after_sweep([folder for folder, good in swept.items() if good])
+        failed = [str(folder) for folder, good in swept.items() if not good]
+        if failed:
+            print(f"{len(failed)} of {len(swept)} runs failed: {', '.join(failed)}", file=sys.stderr)
+            sys.exit(1)
 
 
 @contextlib.contextmanager

@@ -18,6 +18,9 @@ def main(config: DictConfig) -> None:
     from tactile_cube.evaluation.training_curve import read_curve
     from tactile_cube.visualization.curves import write_learning_curves
 
+    if config.sweep is not None:
+        print(f"{config.sweep}\n\n{sweep_table(read_sweep(Path(config.sweep)))}")
+        return
     for sweep in config.sweeps:
         print(f"{sweep}\n\n{sweep_table(read_sweep(Path(sweep)))}\n")
     curves = [read_curve(Path(run), label=Path(run).stem) for run in config.curves]

@@ -4,6 +4,7 @@ What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors
 checkpoint.pt (to go on from), ledger.json (CPU-hours) and .hydra/ (configuration).
 """
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tactile_cube.cli import verb
@@ -12,7 +13,16 @@ if TYPE_CHECKING:
     from omegaconf import DictConfig
 
 
-@verb("train")
+def sweep_summary(folders: list[Path]) -> None:
+    """Say what came of the runs of a sweep."""
+    from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
+
+    for sweep in dict.fromkeys(folder.parent for folder in folders):
+        print(f"\n{sweep}\n\n{sweep_table(read_sweep(sweep))}\n")
+        print(f"this table again: python -m tactile_cube.results sweep={sweep}")
+
+
+@verb("train", after_sweep=sweep_summary)
 def main(config: "DictConfig") -> None:
     """Train, and end with a status that a script or a sweep understands."""
     import sys

@@ -137,3 +137,25 @@ def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
     assert any((folder / "tensorboard").iterdir())
     steps = [int(line.split(",")[0]) for line in (folder / "metrics.csv").read_text().splitlines()[1:]]
     assert steps == list(range(40, 401, 40))
+
+
+def test_a_sweep_goes_past_a_run_that_fails_says_what_came_of_it_and_is_given_again_for_the_rest(
+    tmp_path: Path,
+) -> None:
+    short = ["+experiment=smoke", "collector=single", "collector.worlds=4", "training.steps=80", "logger=csv"]
+    first = train("-m", *short, "seed=0,-1", folder=tmp_path)
+    assert first.returncode == 1
+    assert "error: seed=-1" in first.stderr
+    assert "1 of 2 runs failed: " in first.stderr
+    sweep = tmp_path / "outputs/train/smoke"
+    setting = "collector.worlds=4-collector=single-logger=csv"
+    assert {path.name for path in sweep.iterdir()} == {f"{setting}-seed0"}
+    assert f"| {setting} | > 0.000 (at" in first.stdout
+    checkpoint = sweep / f"{setting}-seed0/checkpoint.pt"
+    written = checkpoint.stat().st_mtime_ns
+    second = train("-m", *short, "seed=0,1", folder=tmp_path)
+    assert second.returncode == 0, second.stderr
+    assert "finished before (all 80 steps done)" in second.stdout
+    assert checkpoint.stat().st_mtime_ns == written
+    assert (sweep / f"{setting}-seed1/finished.json").is_file()
+    assert second.stdout.count(f"| {setting} |") == 1

@@ -72,8 +72,13 @@ def run_training(job: Job) -> TrainingResult:
     """Build the run of a job, train through faults of the workers, and say how it went."""
     from functools import partial
 
+    from tactile_cube.training.finished import Finished
     from tactile_cube.training.recovery import train_on
 
+    before = Finished.of(job.folder, _plain(job))
+    if before is not None:
+        print(f"{job.folder}: finished before ({before.reason}); training.resume=never starts over")
+        return TrainingResult(job.folder, before.reason, before.steps, before.final_angle)
     run, reason = train_on(partial(training_run, job))
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
@@ -81,18 +86,13 @@ def run_training(job: Job) -> TrainingResult:
 def training_run(job: Job) -> Run:
     """The run that a job describes: new, or where its checkpoint says."""
     from hydra.utils import instantiate
-    from omegaconf import OmegaConf
 
-    from tactile_cube.drivetrain.model_file import read_model
     from tactile_cube.evaluation.policy_path import networks_path
     from tactile_cube.training.build import build_run
     from tactile_cube.training.environment import as_environment
     from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
-    config = job.config
-    plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
-    if config.model is not None:  # its contents, so that the policy file needs no other file
-        plain["env"]["model"] = read_model(config.model).model_dump()
+    config, plain = job.config, _plain(job)
     return build_run(
         folder=job.folder,
         seed=RunSettings(name=config.name, seed=config.seed).seed,
@@ -103,3 +103,15 @@ def training_run(job: Job) -> Run:
         loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
         config=plain,
     )
+
+
+def _plain(job: Job) -> dict[str, Any]:
+    """The resolved configuration, a model's contents in the place of its file, so that a policy needs no other file."""
+    from omegaconf import OmegaConf
+
+    from tactile_cube.drivetrain.model_file import read_model
+
+    plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
+    if job.config.model is not None:
+        plain["env"]["model"] = read_model(job.config.model).model_dump()
+    return plain

@@ -10,6 +10,7 @@ from filelock import BaseFileLock
 
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
 from tactile_cube.training.checkpoint import Checkpoints
+from tactile_cube.training.finished import Finished
 from tactile_cube.training.interruption import Interruption
 from tactile_cube.training.ledger import Ledger
 from tactile_cube.training.loggers import Loggers
@@ -88,12 +89,14 @@ class Run:
             self.line.say(f"approximation: {approximation}")
 
     def conclude(self, reason: str) -> None:
-        """Say how it ended and where the result lies."""
+        """Say how it ended and where the result lies, and keep it."""
         costs = self.ledger.costs()
         cpu_hours = (costs.simulating + costs.learning) / 3600
         steps, angle = self.learner.steps, self.learner.episodes.mean_angle
         self.line.say(f"{reason}: {steps} steps, mean final angle {angle:.2f} rad, {cpu_hours:.2f} CPU-hours")
-        if reason == INTERRUPTED:
+        if reason != INTERRUPTED:
+            Finished(reason, steps, angle, self.config).write(self.folder)
+        else:
             again = f"; the {steps - self.saved_at} steps since then are done again" if steps > self.saved_at else ""
             self.line.say(f"saved at {self.saved_at} steps: the same command goes on from there{again}")
         self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}")
