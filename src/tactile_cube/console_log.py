@@ -53,7 +53,7 @@ def console_kept_in(path: Path) -> Iterator[None]:
         file.flush()  # worker processes inherit what is not written yet
         streams = sys.stdout, sys.stderr
         kept = [KeptStream(stream, file) for stream in streams]
-        sys.stdout, sys.stderr = kept  # type: ignore[assignment]
+        sys.stdout, sys.stderr = kept
         try:
             yield
         finally:
