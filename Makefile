@@ -4,7 +4,7 @@ BIN := .venv/bin
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help train test check show example benchmark clean
+.PHONY: docs help train test check show example benchmark clean
 
 help: ## print these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 20
@@ -37,6 +37,11 @@ example: .venv/installed ## find a hidden effect in a hand and win the lost succ
 
 benchmark: .venv/installed ## measure the speed of everything on this machine
 	$(BIN)/python -m tactile_cube.benchmark $(ARGS)
+
+docs: .venv/installed ## the documentation as a site in outputs/site
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/python docs/generate.py
+	$(BIN)/python -m mkdocs build --quiet
 
 clean: ## remove the environment and the caches, keep outputs/
 	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache build src/*.egg-info

@@ -17,6 +17,7 @@ def quiet(line: str) -> None:
     """Takes progress."""
 
 
+@pytest.mark.timeout(900)
 def test_the_loop_turns_the_cube_with_jitter_and_lost_messages_too() -> None:
     done = tactile_cube.deploy(None, "seconds=3", "robot.link.lost=0.2", "robot.link.jitter=0.05", say=quiet)
     assert done.runs[0].reason == "time is over"
@@ -25,6 +26,7 @@ def test_the_loop_turns_the_cube_with_jitter_and_lost_messages_too() -> None:
     assert "cube turned" in done.text
 
 
+@pytest.mark.timeout(900)
 def test_the_log_of_a_dry_run_is_a_recording_that_the_model_follows_down_to_the_noise(tmp_path: Path) -> None:
     settings = ["seconds=2.5", "runs=2", "robot.cube=false", "motion=multisine", "filter_time=0.1", "reach=0.12"]
     done = tactile_cube.deploy(None, *settings, say=quiet)

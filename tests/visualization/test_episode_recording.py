@@ -1,32 +1,47 @@
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
+from scipy.spatial.transform import Rotation
 
+from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.visualization.episode_recording import write_recording
 from tests.evaluation.synthetic import episode
 
 
+def moving() -> EpisodeRecord:
+    """An episode whose joints read something else at every physics step."""
+    record, rng = episode(steps=20), np.random.default_rng(0)
+    signals = {name: rng.normal(size=(1000, 12)) for name in ("q_m", "q_f")}
+    return replace(record, trace=record.trace | signals)
+
+
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rerun") / "episode.rrd"
-    write_recording(episode(steps=20), path, summary="# holding")
+    write_recording(moving(), path, summary="# holding")
     return path
 
 
 def rows(path: Path, entity: str, column: str) -> np.ndarray:
+    """All values of a column of an entity as an array."""
+    return np.array(listed(path, entity, column))
+
+
+def listed(path: Path, entity: str, column: str) -> list[Any]:
     """All values of a column of an entity, in the order of the file."""
-    values = [
+    return [
         value
         for chunk in RrdReader(path).stream()
         if chunk.entity_path == entity and column in chunk.to_record_batch().schema.names
         for value in chunk.to_record_batch().column(column).to_pylist()
     ]
-    return np.array(values)
 
 
 def test_the_file_is_sound(recording: Path) -> None:
@@ -60,6 +75,25 @@ def test_contacts_are_arrows(recording: Path) -> None:
     vectors = rows(recording, "/contacts", "Arrows3D:vectors")
     assert vectors.shape == (21, 4, 3)
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=2), 0.03, rtol=1e-5)
+
+
+def test_what_the_policy_gets_comes_back_at_10_hz(recording: Path) -> None:
+    trace = moving().trace
+    for place, finger in enumerate(("ring", "middle", "fore", "thumb")):
+        mine = slice(3 * place, 3 * place + 3)
+        q_m, e_q = (rows(recording, f"/policy/{finger}/{name}", "Scalars:scalars") for name in ("q_m", "e_q"))
+        np.testing.assert_allclose(q_m[1:], trace["q_m"][49:950:50, mine])
+        np.testing.assert_allclose(e_q[1:], (trace["q_f"] - trace["q_m"])[49:950:50, mine])
+    for signal, length in (("q_f", 1000), ("q_n", 20)):
+        assert rows(recording, f"/joints/ring/{signal}", "Scalars:scalars").shape == (length, 3)
+
+
+def test_the_trail_follows_a_corner_of_the_cube(recording: Path) -> None:
+    strips = listed(recording, "/trail", "LineStrips3D:strips")
+    record = episode(steps=20)
+    assert len(strips) == 21
+    corner = record.cube_position[-1] + Rotation.from_quat(record.cube_quaternion[-1]).apply(record.cube_size / 2)
+    np.testing.assert_allclose(strips[-1][0][-1], corner, atol=1e-6)
 
 
 def test_the_blueprint_is_inside(recording: Path) -> None:

@@ -17,7 +17,7 @@ def episode_blueprint() -> rrb.Blueprint:
     hand = rrb.Spatial3DView(
         name="Hand and cube",
         origin="/",
-        contents=["/hand/**", COLLISION_SHAPES, "/cube/**", "/contacts/**", "/support/**"],
+        contents=["/hand/**", COLLISION_SHAPES, "/cube/**", "/contacts/**", "/trail", "/support/**"],
         eye_controls=rrb.EyeControls3D(position=(0.30, -0.34, -0.10), look_target=(0.0, 0.0, 0.04), eye_up=(0, 0, 1)),
         line_grid=False,
     )
@@ -45,5 +45,19 @@ def _finger_view(finger: str) -> rrb.Container:
         origin=f"/joints/{finger}",
         contents=["$origin/q", "$origin/q_m", "$origin/q_d"],
     )
+    action = rrb.TimeSeriesView(
+        name=f"{finger}: action q_n, filtered q_f, limited q_d [rad]",
+        origin=f"/joints/{finger}",
+        contents=["$origin/q_n", "$origin/q_f", "$origin/q_d"],
+    )
     torques = rrb.TimeSeriesView(name=f"{finger}: torque [N m]", origin=f"/joints/{finger}/torque")
-    return rrb.Vertical(angles, torques, name=finger)
+    drive = rrb.Vertical(angles, torques, name="drive")
+    return rrb.Tabs(drive, action, _reading_view(finger), name=finger)
+
+
+def _reading_view(finger: str) -> rrb.Container:
+    views = (
+        rrb.TimeSeriesView(name=f"{finger}: {name} as the policy gets it [rad]", origin=f"/policy/{finger}/{name}")
+        for name in ("q_m", "e_q")
+    )
+    return rrb.Vertical(*views, name="what the policy gets")

@@ -23,8 +23,10 @@ ARROW_LENGTH = 0.03
 POSE_RATE = 50.0
 """Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
 FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215))
-SIGNALS = {"q": 1.0, "q_m": 0.75, "q_d": 0.45, "torque": 1.0}
+SIGNALS = {"q": 1.0, "q_m": 0.75, "q_f": 0.6, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
+TRAIL = 50
+"""Policy steps for which the way of the cube's corner stays visible: 5 s."""
 JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255))
 
 
@@ -41,9 +43,11 @@ def write_recording(record: EpisodeRecord, path: Path, hand: HandModel = DLR_HAN
     stream.save(path, default_blueprint=episode_blueprint())
     _log_hand(stream, record, hand)
     _log_cube(stream, record)
+    _log_trail(stream, record)
     _log_contacts(stream, record)
     _log_task(stream, record)
     _log_joints(stream, record)
+    _log_readings(stream, record)
     stream.log(
         "episode", rr.TextDocument(summary or f"ended: {record.ending}", media_type="text/markdown"), static=True
     )
@@ -109,6 +113,16 @@ def _log_cube(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     stream.send_columns("cube", _at(time), rr.Transform3D.columns(translation=position, quaternion=quaternion))
 
 
+def _log_trail(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
+    """Log the way of one upper corner of the cube: its turning about the vertical and its creeping show in one line."""
+    corners = record.cube_position + Rotation.from_quat(record.cube_quaternion).apply(0.5 * record.cube_size)
+    for sample, time in enumerate(record.time.tolist()):
+        stream.set_time(TIMELINE, duration=time)
+        way = corners[max(0, sample - TRAIL) : sample + 1]
+        stream.log("trail", rr.LineStrips3D([way], colors=[(250, 220, 80)], radii=0.0008))
+    stream.reset_time()
+
+
 def _log_contacts(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     """Log the contact forces on the cube as arrows, all fingers in their colour, at the policy's rate."""
     table = record.contacts
@@ -151,6 +165,22 @@ def _log_joints(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
                 time, values = record.trace["time"], record.trace[signal][:, mine]
                 _send(stream, f"{entity}/{signal}", time, values, _joint_labels(signal), colours)
         _send(stream, f"{entity}/q_n", record.time[:-1], record.target[:, mine], _joint_labels("q_n"))
+
+
+def _log_readings(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
+    """Send what the policy gets of each finger, q_m and e_q = q_f - q_m at 10 Hz, before the sensors' noise."""
+    if not {"q_m", "q_f"} <= set(record.trace):
+        return
+    time = record.trace["time"]
+    stride = len(time) // record.steps
+    last = np.maximum(stride * np.arange(record.steps) - 1, 0)  # the physics step that ends where the policy is asked
+    q_m = record.trace["q_m"][last]
+    e_q = record.trace["q_f"][last] - q_m
+    for index, finger in enumerate(FINGERS):
+        mine = slice(3 * index, 3 * index + 3)
+        for name, values in (("q_m", q_m), ("e_q", e_q)):
+            entity = f"policy/{finger}/{name}"
+            _send(stream, entity, record.time[:-1], values[:, mine], _joint_labels(name), JOINT_COLOURS)
 
 
 def _joint_labels(signal: str) -> list[str]:

@@ -1,0 +1,180 @@
+"""Write the pages of the documentation that the code knows better: every effect, every configuration group.
+
+python docs/generate.py            # docs/effects.md and docs/configuration.md
+python docs/generate.py --pictures # also docs/images/effects/*.png, each effect's signature (some minutes)
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from pathlib import Path
+
+import yaml
+
+from tactile_cube.cli import CONFIG, commands
+from tactile_cube.drivetrain.effects import Effect, catalogue
+
+DOCS = Path(__file__).parent
+PICTURES = DOCS / "images" / "effects"
+JOINT = "q2"
+STAGES = {
+    "COMMAND": "command",
+    "VELOCITY_SENSOR": "measured velocity",
+    "MOTOR_TORQUE": "motor torque",
+    "DEFLECTION": "transmission",
+    "POSITION_SENSOR": "position sensor",
+    "JOINT_TORQUE": "joint torque",
+    "FRICTION": "friction",
+    "MECHANISM": "mechanism",
+}
+
+
+def main() -> None:
+    """Write the pages, and the pictures if they are asked for."""
+    (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
+    (DOCS / "configuration.md").write_text(configuration_page(), encoding="utf-8")
+    if "--pictures" in sys.argv:
+        write_pictures()
+
+
+def effects_page() -> str:
+    """The glossary: what each effect is, where it acts, its parameters, its picture."""
+    lines = [
+        "# Effects of the catalogue",
+        "",
+        "Every effect is one class, used in training, in simulation and in the search for what a model lacks.",
+        "The pictures show what a measurement looks like beside a model that lacks the effect: the simulated finger of",
+        f"the hand with the effect at its typical size on {JOINT}, measured minus simulated angle there, during",
+        "ramps (slow strokes and reversals) and a multisine (0.2 to 6 Hz). They are noise-free, so that the shape is",
+        "seen; grey is the command, scales differ. `python docs/generate.py --pictures` draws them anew.",
+        "",
+        "Name one as `NAME@JOINT` in `effects=[...]` of [identify](match.md), or a class of your own by its path",
+        "([own effect](own_effect.md)).",
+        "",
+        "| effect | acts on | in a line |",
+        "|---|---|---|",
+    ]
+    lines += [f"| [{name}](#{name}) | {_stage(kind)} | {_summary(kind)} |" for name, kind in catalogue().items()]
+    for name, kind in catalogue().items():
+        lines += ["", f"## {name}", "", _text(kind), ""]
+        lines += ["| parameter | unit | neutral | typical | range searched | source |", "|---|---|---|---|---|---|"]
+        for p in kind.parameters:
+            lines.append(
+                f"| {p.name} | {p.unit} | {p.neutral:g} | {p.typical:g} | {p.low:g} to {p.high:g} | {p.source} |"
+            )
+        if (PICTURES / f"{name}.png").is_file():
+            lines += ["", f"![signature of {name}](images/effects/{name}.png)"]
+    return "\n".join(lines) + "\n"
+
+
+def _stage(kind: type[Effect]) -> str:
+    return STAGES[kind.stage.name]
+
+
+def _text(kind: type[Effect]) -> str:
+    text = inspect.getdoc(kind) or ""
+    return re.split(r"\n\s*\n?(?:Attributes|Example|Args|Source):", text)[0].strip()
+
+
+def _summary(kind: type[Effect]) -> str:
+    return " ".join(_text(kind).split("\n\n")[0].split()).replace("|", "\\|")
+
+
+def configuration_page() -> str:
+    """Every command's file and every group's options, as they stand in conf/."""
+    lines = [
+        "# Configuration",
+        "",
+        "Everything that can be chosen stands in a small file in `conf/`: `group=option` chooses a file, `key=value` a",
+        "value in it, `--cfg job` shows the result. This page is made from those files by `python docs/generate.py`.",
+        "",
+        "## Commands",
+    ]
+    for name, summary in commands().items():
+        lines += ["", f"### {name}", "", summary, "", *_listing(CONFIG / f"{name}.yaml")]
+    lines += ["", "## Groups"]
+    for group in sorted(path for path in CONFIG.iterdir() if path.is_dir() and path.name != "hydra"):
+        lines += ["", f"### {group.name}"]
+        for file in sorted(group.glob("*.yaml")):
+            lines += ["", f"`{group.name}={file.stem}`", "", *_listing(file)]
+    return "\n".join(lines) + "\n"
+
+
+def _listing(file: Path) -> list[str]:
+    text = file.read_text(encoding="utf-8")
+    yaml.safe_load(text)
+    return ["```yaml", *text.rstrip().splitlines(), "```"]
+
+
+def write_pictures() -> None:
+    """Simulate the finger with and without each effect, and draw the difference."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    motions = ("ramps", "multisine")
+    for name, rows in signatures(motions).items():
+        figure, axes = pyplot.subplots(1, 2, figsize=(7.2, 2.1), layout="constrained")
+        for axis, motion, (time, command, residual) in zip(axes, motions, rows, strict=True):
+            axis.plot(time, residual, color="#1f5fa8", linewidth=0.9)
+            axis.set(title=motion, xlabel="time [s]", ylabel="difference [mrad]")
+            axis.title.set_fontsize(9)
+            beside = axis.twinx()
+            beside.plot(time, command, color="#bbbbbb", linewidth=0.8, zorder=0)
+            beside.set_yticks([])
+        figure.savefig(PICTURES / f"{name}.png", dpi=80)
+        pyplot.close(figure)
+        print(PICTURES / f"{name}.png", flush=True)
+
+
+def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object, object]]]:
+    """Effect -> for each motion time [s], command [rad] and residual [mrad] of `JOINT`."""
+    import numpy as np
+
+    from tactile_cube.api.job import called_job
+    from tactile_cube.measurement.recordings.description import TrialEntry
+    from tactile_cube.measurement.replay.parameters import Parameters
+    from tactile_cube.measurement.replay.rig_replay import Replay
+    from tactile_cube.measurement.sources import session
+    from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
+
+    config = called_job("record", ("source=finger", "out=unused")).config.source
+    source = SimulatedRig(controller=config.controller, nominal=config.nominal, duration=6.0, reach=0.5)
+    rig = source._rig()
+    description = source._description(rig)
+    constants = session.true_constants(
+        dict(config.controller) | dict(config.nominal), tuple(description.joints), 0.0, np.random.default_rng(0)
+    )
+    empty = session.unmeasured(description, rig, constants)
+    place = description.joints.index(JOINT)
+    rng, trials = np.random.default_rng(3), []
+    for motion in motions:
+        command = session.free_command(motion, rig, description.joints, 0.5, 6.0, source.rate, rng)
+        entry = TrialEntry(file=f"{motion}.parquet", kind=motion)
+        trials.append(session._silent_trial(command, empty, entry))
+    found: dict[str, list[tuple[object, object, object]]] = {}
+    still = np.zeros(len(description.joints))
+    for name, kind in catalogue().items():
+        label = f"{name}@{JOINT}"
+        replay = Replay(empty, [label], 0.001)
+        plain = {p.name: p.neutral for p in kind.parameters}
+        typical = (kind.forms[0] if kind.forms else {}) or {p.name: p.typical for p in kind.parameters}
+        without, with_effect = (
+            replay.simulate(trials, Parameters(constants, ((label, values),), still))
+            for values in (plain, plain | typical)
+        )
+        replay.close()
+        found[name] = [
+            (trial.time, trial.command[:, place], 1e3 * (b.position - a.position)[:, place])
+            for trial, a, b in zip(trials, without, with_effect, strict=True)
+        ]
+        print(name, flush=True)
+    return found
+
+
+if __name__ == "__main__":
+    main()

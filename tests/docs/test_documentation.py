@@ -1,0 +1,108 @@
+"""What README and docs tell people to type is accepted, and where they point to is there."""
+
+import ast
+import importlib.util
+import re
+import shlex
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+import yaml
+
+import tactile_cube
+from tactile_cube.cli import CONFIG, commands, with_recipe
+from tactile_cube.composition import composed
+from tactile_cube.drivetrain.effects import catalogue
+
+ROOT = Path(__file__).parents[2]
+GENERATED = {"effects.md", "configuration.md"}
+PAGES = [ROOT / "README.md", *(ROOT / name for name in ("CONTRIBUTING.md",) if (ROOT / name).is_file())]
+PAGES += sorted(
+    path
+    for path in (ROOT / "docs").rglob("*.md")
+    if path.parent.parent != ROOT / "docs" / "results" and path.name not in GENERATED
+)
+COMMAND = re.compile(r"(?:python -m tactile_cube[. ]|tactile-cube )(\w+)((?:[^\n`#|]|#(?! ))*)")
+
+
+def typed_commands(text: str) -> list[tuple[str, list[str]]]:
+    """Name and words of every command in a page, in fences and in running text."""
+    whole = re.sub(r"\\\n\s*", " ", text)
+    found = []
+    for name, rest in COMMAND.findall(whole):
+        if name in commands() and ".md" not in rest:
+            found.append((name, shlex.split(rest.split("  #")[0])))
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_command_that_a_page_shows_is_one_that_composes(page: Path) -> None:
+    for name, words in typed_commands(page.read_text(encoding="utf-8")):
+        settings = [word for word in words if "=" in word and not word.startswith("-")]
+        if "-m" in words or "--multirun" in words:  # of a sweep the first choice of each
+            settings = [word if "[" in word else word.split(",")[0] for word in settings]
+        composed(name, with_recipe(name, settings), with_hydra=True)
+
+
+def test_the_commands_of_the_quickstarts_are_found_at_all() -> None:
+    found = typed_commands((ROOT / "docs" / "match.md").read_text(encoding="utf-8"))
+    assert [name for name, _ in found] == ["record", "compare", "diagnose", "identify", "compare", "train", "evaluate"]
+    assert ["recording=outputs/bench", "effects=[backlash@q2]"] in [words for _, words in found]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_relative_link_resolves(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        path = target.partition("#")[0]
+        if path and "://" not in target and Path(path).name not in GENERATED:
+            assert (page.parent / path).exists(), f"{page}: {target}"
+
+
+def test_every_page_in_the_table_of_contents_is_there() -> None:
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").replace("!!python/name:", "")
+    entries = re.findall(r"[\w/]+\.md", yaml.safe_dump(yaml.safe_load(text)["nav"]))
+    for entry in entries:
+        assert entry in GENERATED or (ROOT / "docs" / entry).is_file(), entry
+
+
+def test_python_in_the_docs_parses_and_uses_names_that_exist() -> None:
+    used = set()
+    for page in PAGES:
+        for block in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
+            tree = ast.parse(block)
+            used |= {
+                node.attr
+                for node in ast.walk(tree)
+                if isinstance(node, ast.Attribute)
+                and isinstance(node.value, ast.Name)
+                and node.value.id == "tactile_cube"
+            }
+    assert {"train", "compare", "recording_from_arrays", "make_env"} <= used <= set(tactile_cube.__all__)
+
+
+@pytest.fixture(scope="module")
+def generator() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_glossary_names_every_effect_with_its_parameters_and_its_picture(generator: ModuleType) -> None:
+    page = generator.effects_page()
+    for name, kind in catalogue().items():
+        section = page.split(f"\n## {name}\n")[1].split("\n## ")[0]
+        assert all(f"| {parameter.name} |" in section for parameter in kind.parameters)
+        assert f"images/effects/{name}.png" in section
+    rows = [line for line in page.splitlines() if line.startswith("| [")]
+    assert all(re.sub(r"\\\|", "", row).count("|") == 4 for row in rows)
+
+
+def test_the_configuration_page_shows_every_file(generator: ModuleType) -> None:
+    page = generator.configuration_page()
+    for file in CONFIG.glob("*/*.yaml"):
+        if file.parent.name != "hydra":
+            assert f"`{file.parent.name}={file.stem}`" in page
