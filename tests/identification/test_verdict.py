@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.diagnosis import Unexplained, follows_signals
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.model import Model, Term
@@ -13,8 +14,8 @@ from tactile_cube.identification.search.candidates import Candidate, forms, term
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings
-from tactile_cube.identification.search.worth import FEW_SEGMENTS, SMALLEST_GAIN, least_gain, unproven, worthwhile
-from tactile_cube.identification.verdict import decide, unexplained_joints
+from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
+from tactile_cube.identification.verdict import Questions, decide, unexplained_joints
 
 MODEL = Model({}, (), {})
 NOTHING = np.zeros((0, 0))
@@ -29,6 +30,22 @@ def judged(error: float, seed: int = 0) -> Judgement:
 
 
 JOINTS = ("q1", "q2")
+
+
+class Answers(Questions):
+    """What simulations would say, made up."""
+
+    def __init__(self, repeats: bool = False, follows: bool = False, alike: bool = False) -> None:
+        self.repeats, self.follows, self.same = repeats, follows, alike
+
+    def as_repeats(self, one: Explanation) -> bool:
+        return self.repeats
+
+    def follows_signals(self, one: Explanation) -> bool:
+        return self.follows
+
+    def alike(self, one: Explanation, other: Explanation) -> bool:
+        return self.same
 
 
 def explanation(name: str, error: float, base: float = 20.0, seed: int = 0) -> Explanation:
@@ -118,8 +135,8 @@ def test_an_effect_that_leaves_twice_the_noise_is_named_only_if_it_explains_near
 def test_an_effect_that_leaves_no_more_than_repeats_differ_is_named_if_it_explains_nearly_all() -> None:
     tipping = findings(100.0, explanation("torque_saturation", 4.5, 100.0))
     assert decide(tipping).kind == "unknown_effect"
-    assert decide(tipping, as_repeats=True).kind == "missing_effect"
-    assert decide(findings(20.0, explanation("backlash", 9.0)), as_repeats=True).kind == "unknown_effect"
+    assert decide(tipping, Answers(repeats=True)).kind == "missing_effect"
+    assert decide(findings(20.0, explanation("backlash", 9.0)), Answers(repeats=True)).kind == "unknown_effect"
 
 
 def test_what_a_black_box_still_explains_is_not_noise() -> None:
@@ -226,17 +243,17 @@ def test_one_effect_that_explains_everything_needs_less_significance() -> None:
 def test_a_further_effect_has_to_finish_what_is_nearly_explained() -> None:
     base = Explanation((), FIT, judged(20.0), 1.0, 0.0)
     nearly, far, partly = (explanation("cogging", error) for error in (1.5, 8.0, 3.5))
-    assert least_gain(base, base) == SMALLEST_GAIN
+    assert least_gain(base, base) == STANDARD.least_gain
     # the one joint with error 1.5 down to 1.1, where the other one has 1.0
     assert least_gain(nearly, base) == pytest.approx((1.5**2 - 1.1**2) / (1.5**2 + 1.0))
-    assert least_gain(far, base) == SMALLEST_GAIN, "most of what is left may be anything"
-    assert least_gain(partly, replace(base, judgement=judged(6.0))) == SMALLEST_GAIN, "much is not explained yet"
+    assert least_gain(far, base) == STANDARD.least_gain, "most of what is left may be anything"
+    assert least_gain(partly, replace(base, judgement=judged(6.0))) == STANDARD.least_gain, "much is not explained yet"
 
 
 def test_much_that_few_segments_do_not_tell_from_chance_is_unproven_not_unknown() -> None:
     base = findings(20.0).base
     found = replace(explanation("backlash", 9.0), gain=0.5, p_value=0.02)
-    few = replace(found.judgement, samples=np.where(np.arange(60) < FEW_SEGMENTS - 1, 100, 0))
+    few = replace(found.judgement, samples=np.where(np.arange(60) < STANDARD.few_segments - 1, 100, 0))
     assert unproven(replace(found, judgement=few), base)
     assert not unproven(found, base), "with so many segments chance is no excuse"
     assert not unproven(replace(found, judgement=few, p_value=1e-5), base), "proven"
@@ -258,3 +275,26 @@ def test_an_effect_whose_number_ends_at_the_edge_of_the_plausible_stands_in_for_
     other = explanation("load_dependent_friction", 1.2)
     verdict = decide(findings(20.0, with_waves(one, edge), other))
     assert (verdict.kind, verdict.chosen, verdict.rivals) == ("missing_effect", other, ())
+
+
+def test_what_is_left_and_follows_the_signals_is_decided_in_the_same_place() -> None:
+    found = findings(20.0, explanation("backlash", 1.2))
+    assert decide(found).kind == "missing_effect"
+    assert decide(found, Answers(follows=True)).kind == "unknown_effect"
+
+
+@pytest.mark.parametrize("best", ["presliding_friction", "coulomb_friction"])
+def test_a_law_that_is_the_simpler_one_in_practice_is_no_rival_of_it(best: str) -> None:
+    errors = {"presliding_friction": 1.0, "coulomb_friction": 1.0} | {best: 0.9995}
+    found = findings(20.0, *(explanation(name, error) for name, error in errors.items()))
+    verdict = decide(found, Answers(alike=True))
+    assert verdict.kind == "missing_effect"
+    assert verdict.chosen.effects[0].effect.name == "coulomb_friction"
+    twins = findings(20.0, explanation("torque_gain", 1.0), explanation("payload", 1.0))
+    assert decide(twins, Answers(alike=True)).kind == "ambiguous", "different laws stay rivals however alike"
+
+
+def test_a_criterion_that_is_given_decides() -> None:
+    found = findings(9.0, explanation("backlash", 1.9, 9.0))
+    assert decide(found).kind == "unknown_effect"
+    assert decide(found, criteria=Criteria(tolerated=2.0)).kind == "missing_effect"

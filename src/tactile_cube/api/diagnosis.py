@@ -170,6 +170,7 @@ def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say
 def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
     from tactile_cube.drivetrain.effects import catalogue, find_effect
     from tactile_cube.identification.contact.diagnosis import diagnose_contact, with_contact
+    from tactile_cube.identification.criteria import Criteria
     from tactile_cube.identification.diagnosis import diagnose as diagnose_free
     from tactile_cube.identification.diagnosis_json import as_json
     from tactile_cube.identification.recommended import model_file
@@ -178,7 +179,8 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     config = job.config
     effects = tuple(dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)]))
     moving = without_touches(recording)
-    found = diagnose_free(moving, effects, config.engine, config.step, config.seed, say, known)
+    criteria = Criteria(**config.criteria)
+    found = diagnose_free(moving, effects, config.engine, config.step, config.seed, say, known, criteria)
     model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
     data = as_json(found, None, job.seconds) | {"units": recording.units}
     if known is not None:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
+from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
-from tactile_cube.identification.verdict import Verdict, decide, unexplained_joints
+from tactile_cube.identification.verdict import Questions, Verdict, decide, unexplained_joints
 from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
 from tactile_cube.measurement.recordings.recording import Recording
@@ -26,7 +30,6 @@ from tactile_cube.measurement.replay.rig_replay import Engine
 from tactile_cube.measurement.split import held_out_split
 
 SHOWN_SHAPES = 6
-FOLLOWS_SIGNALS = 0.25  # share of what is left that a black box explains, from which on something else is missing
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,7 @@ def diagnose(
     seed: int = 0,
     say: Callable[[str], None] = print,
     known: ModelFile | None = None,
+    criteria: Criteria = STANDARD,
 ) -> Diagnosis:
     """Find out which effect a recording's nominal model lacks.
 
@@ -100,28 +104,20 @@ def diagnose(
         seed: which trials are held out.
         say: takes progress lines.
         known: the model to begin with, whose effects are no news; None: what the recording's owner states.
+        criteria: what decides.
     """
     fitted_part, held_out = held_out_split(recording, seed=seed)
     noise = sensor_noise(recording)
-    search = Search(fitted_part, held_out, noise, effects, say, known)
-    findings = search.run()
-    verdict, floor = decide(findings), noise_floor(recording)
-    problem = Problem(search.shooting, search.all_stretches)
-    fitted = final_fit(problem, verdict.chosen.fit.model, search.unknowns(verdict.chosen.fit.model))
-    stages = {
-        "nominal": search.start_held_out,
-        "refitted": findings.base.judgement.model,
-        "with_effects": with_offsets(fitted.model, verdict.chosen.judgement.model),
-    }
+    search = Search(fitted_part, held_out, noise, effects, say, known, criteria)
+    findings, floor = search.run(), noise_floor(recording)
+    simulations = Simulations(search, findings.base, floor, engine, step)
+    verdict = decide(findings, simulations, criteria)
+    fitted = simulations.final(verdict.chosen)
+    stages = {"nominal": search.start_held_out, "refitted": findings.base.judgement.model}
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
-    if floor.source == "repeats" and summaries["with_effects"].overall <= floor.overall:
-        verdict = decide(findings, as_repeats=True)
-    unexplained = _unexplained(search, verdict, findings.base)
-    if verdict.kind != "unknown_effect" and follows_signals(unexplained):
-        verdict = replace(verdict, kind="unknown_effect", rivals=())
-        unexplained = _unexplained(search, verdict, findings.base)
+    summaries["with_effects"] = simulations.free_error(verdict.chosen)
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
-    rivals = tuple((one, final_fit(problem, one.fit.model, search.unknowns(one.fit.model))) for one in verdict.rivals)
+    rivals = tuple((one, simulations.final(one)) for one in verdict.rivals)
     experiment = None
     if rivals:
         models = {verdict.chosen.label: fitted.model} | {one.label: fit.model for one, fit in rivals}
@@ -133,7 +129,7 @@ def diagnose(
         rivals=rivals,
         stages=summaries,
         floor=floor,
-        unexplained=unexplained,
+        unexplained=simulations.unexplained(verdict.chosen, beside_base=verdict.kind == "unknown_effect"),
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
         known=tuple(term.label for term in search.start.terms),
@@ -141,9 +137,60 @@ def diagnose(
     )
 
 
-def follows_signals(unexplained: Sequence[Unexplained]) -> bool:
+class Simulations(Questions):
+    """Answers what a decision asks of an explanation, each question once."""
+
+    def __init__(self, search: Search, base: Explanation, floor: NoiseFloor, engine: Engine, step: float) -> None:
+        self.search, self.base, self.floor, self.engine, self.step = search, base, floor, engine, step
+        self.problem = Problem(search.shooting, search.all_stretches)
+        self._final: dict[str, Fitted] = {}
+        self._errors: dict[str, ErrorSummary] = {}
+
+    def as_repeats(self, one: Explanation) -> bool:
+        """See `Questions`."""
+        return self.floor.source == "repeats" and self.free_error(one).overall <= self.floor.overall
+
+    def follows_signals(self, one: Explanation) -> bool:
+        """See `Questions`."""
+        return follows_signals(self.unexplained(one), self.search.criteria)
+
+    def alike(self, one: Explanation, other: Explanation) -> bool:
+        """See `Questions`."""
+        judges = self.search.judges
+        first, second = judges.predictions([one.judgement.model, other.judgement.model])
+        difference = judges.limited(first - second) * judges.weight
+        return bool(np.mean(difference[judges.weight > 0.0] ** 2) < self.search.criteria.alike**2)
+
+    def final(self, one: Explanation) -> Fitted:
+        """An explanation refitted on all fitted trials, with intervals."""
+        if one.label not in self._final:
+            self._final[one.label] = final_fit(self.problem, one.fit.model, self.search.unknowns(one.fit.model))
+        return self._final[one.label]
+
+    def free_error(self, one: Explanation) -> ErrorSummary:
+        """Error of its free run on the held-out trials [rad]."""
+        if one.label not in self._errors:
+            model = with_offsets(self.final(one).model, one.judgement.model)
+            held_out = self.search.held_out
+            simulated = free_run(held_out, model, self.engine, self.step)
+            self._errors[one.label] = free_run_error(held_out, simulated)
+        return self._errors[one.label]
+
+    def unexplained(self, one: Explanation, beside_base: bool = False) -> list[Unexplained]:
+        """What is left at each joint that is not explained; `beside_base`, also beside the base model.
+
+        Effects that help and are not the cause blur the shape of what is missing.
+        """
+        search = self.search
+        joints = unexplained_joints(one, search.fitted.joints, search.criteria)
+        judgements = {"the recommended model": one.judgement}
+        judgements |= {"the model with refitted constants": self.base.judgement} if beside_base else {}
+        return _unexplained(search, joints, judgements) if joints else []
+
+
+def follows_signals(unexplained: Sequence[Unexplained], criteria: Criteria = STANDARD) -> bool:
     """Whether what is left is a function of the signals, and so no noise: what was named is not the whole of it."""
-    return any(one.black_box > FOLLOWS_SIGNALS for one in unexplained)
+    return any(one.black_box > criteria.large_gain for one in unexplained)
 
 
 def with_offsets(model: Model, judged: Model) -> Model:
@@ -151,13 +198,7 @@ def with_offsets(model: Model, judged: Model) -> Model:
     return Model(model.constants, model.terms, {**judged.posture, **model.posture})
 
 
-def _unexplained(search: Search, verdict: Verdict, base: Explanation) -> list[Unexplained]:
-    joints = unexplained_joints(verdict.chosen, search.fitted.joints)
-    if not joints:
-        return []
-    beside = {"the recommended model": verdict.chosen.judgement}
-    if verdict.kind == "unknown_effect":  # effects that help and are not the cause blur its shape
-        beside["the model with refitted constants"] = base.judgement
+def _unexplained(search: Search, joints: Sequence[str], beside: Mapping[str, Judgement]) -> list[Unexplained]:
     missing = {
         name: missing_torques(search.judges, search.held_out, judged.model, judged.residual)
         for name, judged in beside.items()

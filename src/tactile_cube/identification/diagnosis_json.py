@@ -34,6 +34,7 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
     return {
         "verdict": verdict.kind,
         "effects": effects if verdict.kind in ("missing_effect", "ambiguous") else [],
+        "sets": [list(dict.fromkeys(one)) for one in names] if verdict.kind == "ambiguous" else [],
         "unexplained_joints": unexplained_joints(verdict.chosen, tuple(joints)),
         "ranking": ranking(diagnosis),
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},

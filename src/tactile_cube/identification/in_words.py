@@ -7,7 +7,7 @@ from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import Experiment
-from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint
+from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
 
 OPENING = {
     "adequate": "Nothing is missing at this noise: with its constants refitted the model explains the recording.",
@@ -15,6 +15,8 @@ OPENING = {
     "ambiguous": "An effect is missing, but this recording cannot tell these apart:",
     "unknown_effect": "Something is missing that no effect of the catalogue explains.",
 }
+UNRELATED = "The error is above the noise, but what is left goes with none of the logged signals."
+NO_LAW, LEFT = 0.05, 2.0  # share that a black box explains of what follows no law; noise floors worth a word
 UNPROVEN = "Something is missing, and these trials do not suffice to prove what."
 GAIN_OF = {"error": "the held-out error", "offsets": "the joint offsets that the grips need"}
 HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
@@ -25,9 +27,10 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     units = result.get("units", {})
     grasps = result.get("noise_floor_source") == "contact"
     unproven = result.get("unproven_effects")
-    opening = UNPROVEN if unproven else OPENING[result["verdict"]]
-    lines = [HELD if grasps and result["verdict"] == "adequate" else opening]
+    opening = UNPROVEN if unproven else HELD if grasps and result["verdict"] == "adequate" else headline(result)
+    lines = [f"{opening}{left_over(result)}"]
     lines += [_effect(entry, units) for entry in result["effects"]]
+    lines += [f"  That is either {sets_in_words(result['sets'])}."] if result.get("sets") else []
     if known := result.get("known_effects"):
         lines.append(f"  beside what was known: {', '.join(known)}")
     if partial := result.get("partial_effects"):
@@ -46,6 +49,29 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     if experiment is not None:
         lines.append(f"To decide, play {result['next_experiment']}: {expected(experiment, units)}")
     return "\n".join(lines)
+
+
+def headline(result: Mapping[str, Any]) -> str:
+    """The answer in a sentence."""
+    shares = [one.get("black_box", 1.0) for one in result.get("unexplained", [])]
+    if result["verdict"] == "unknown_effect" and shares and max(shares) < NO_LAW:
+        return UNRELATED
+    return OPENING[result["verdict"]]
+
+
+def left_over(result: Mapping[str, Any]) -> str:
+    """What the effects that are named leave, where that is no noise."""
+    error = result["error"]
+    if result["verdict"] not in ("missing_effect", "ambiguous") or not error.get("noise_floor"):
+        return ""
+    floors = error["with_effects"] / error["noise_floor"]
+    left = milli(error["with_effects"], common_unit(result.get("units", {}).values()))
+    return f" ({left} are left, {short(floors, 2)} noise floors)" if floors > LEFT else ""
+
+
+def sets_in_words(sets: Sequence[Sequence[str]]) -> str:
+    """Sets of effects that explain a recording alike: `backlash@q1 and payload@q2, or elasticity@q1`."""
+    return ", or ".join(" and ".join(names) for names in sets)
 
 
 def expected(experiment: Experiment, units: Mapping[str, str]) -> str:
@@ -67,6 +93,11 @@ def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
 
 
 def _unexplained(entry: dict[str, Any]) -> str:
+    if entry["black_box"] < NO_LAW:
+        return (
+            f"  {entry['joint']}: a black box of positions, speeds, torque and time explains nothing of what is left; look "
+            "for what is not logged: pushes, temperature, supply, timing"
+        )
     return (
         f"  {entry['joint']}: the torque that {entry['beside']} lacks goes most with "
         f"{entry['depends_most_on']}; beside the recommended model a black box could explain "

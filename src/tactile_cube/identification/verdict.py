@@ -7,18 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.search.evidence import gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings
 from tactile_cube.identification.search.simplicity import contains, named, simplest
-from tactile_cube.identification.search.worth import SMALLEST_GAIN
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
-TOLERATED = 1.6  # error / sensor noise up to which an explanation is complete
-EXPLAINED, TOLERATED_IF_EXPLAINED = 0.98, 4.0  # share of the excess error, and the error, that a near miss may have
-MOST = 0.9  # share of the excess error that has to be explained unless the error is as good as none
-LIKELY = 0.05  # p-value at which a richer explanation stays in the race
-ADEQUATE = 1.3  # error / sensor noise of a model to which nothing significant can be added
 
 
 @dataclass(frozen=True)
@@ -36,30 +31,53 @@ class Verdict:
     rivals: tuple[Explanation, ...] = ()
 
 
-def decide(findings: Findings, as_repeats: bool = False) -> Verdict:
-    """The answer to what a search has found.
+class Questions:
+    """What a decision may ask of an explanation beside its fit; answered by simulations, so only where it matters."""
 
-    Args:
-        findings: of the search.
-        as_repeats: simulated freely, the recommended explanation is no further from the held-out trials than the
-            machine is from itself in repeats. Where it can tip over, a few segments are far off all the same.
-    """
-    base = findings.base
+    def as_repeats(self, one: Explanation) -> bool:
+        """Whether its free run is no further from the held-out trials than the machine is from itself in repeats.
+
+        Where a machine can tip over, a few segments are far off all the same.
+        """
+        return False
+
+    def follows_signals(self, one: Explanation) -> bool:
+        """Whether what it leaves is a function of the logged signals, and so no noise."""
+        return False
+
+    def alike(self, one: Explanation, other: Explanation) -> bool:
+        """Whether the two predict the held-out trials so much alike that they are one law in practice."""
+        return False
+
+
+def decide(findings: Findings, questions: Questions | None = None, criteria: Criteria = STANDARD) -> Verdict:
+    """The answer to what a search has found."""
+    base, ask = findings.base, questions or Questions()
     if not findings.levels:
-        return Verdict("adequate" if base.error <= ADEQUATE else "unknown_effect", base)
+        return Verdict("adequate" if base.error <= criteria.adequate else "unknown_effect", base)
     found = [one for level in findings.levels for one in level]
-    chosen = simplest(found)
+    plausible, chosen = [one for one in found if not stretched(one)], simplest(found, criteria)
     if stretched(chosen):
-        plausible = [one for one in found if not stretched(one) and not worse(one.judgement, chosen.judgement)]
-        if not plausible:
+        as_good = [one for one in plausible if not worse(one.judgement, chosen.judgement, criteria)]
+        if not as_good:
             return Verdict("unknown_effect", chosen)
-        chosen = simplest(plausible)
-    near = chosen.explained(base) > EXPLAINED and (chosen.error < TOLERATED_IF_EXPLAINED or as_repeats)
-    far = chosen.error > ADEQUATE and chosen.explained(base) < MOST
-    if far or (chosen.error > TOLERATED and not near):
+        chosen = simplest(as_good, criteria)
+    chosen = next((one for one in plausible if contains(chosen, one) and ask.alike(chosen, one)), chosen)
+    if not _explains(chosen, base, ask, criteria) or ask.follows_signals(chosen):
         return Verdict("unknown_effect", chosen)
-    rivals = find_rivals(chosen, [one for one in found if not stretched(one)])
+    rivals = find_rivals(chosen, plausible, criteria)
+    rivals = tuple(one for one in rivals if not (contains(one, chosen) and ask.alike(one, chosen)))
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
+
+
+def _explains(chosen: Explanation, base: Explanation, ask: Questions, criteria: Criteria) -> bool:
+    """Whether an explanation is the whole of it."""
+    share = chosen.explained(base)
+    if chosen.error > criteria.adequate and share < criteria.most:
+        return False
+    if chosen.error <= criteria.tolerated:
+        return True
+    return share > criteria.nearly_whole and (chosen.error < criteria.far or ask.as_repeats(chosen))
 
 
 def stretched(one: Explanation) -> bool:
@@ -76,7 +94,9 @@ def stretched(one: Explanation) -> bool:
     )
 
 
-def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Explanation, ...]:
+def find_rivals(
+    chosen: Explanation, found: Sequence[Explanation], criteria: Criteria = STANDARD
+) -> tuple[Explanation, ...]:
     """Explanations by as many other effects that are as good: with at most a number more, or else clearly better.
 
     Of laws that contain the chosen one only those that are clearly better: they always follow data as well.
@@ -86,18 +106,20 @@ def find_rivals(chosen: Explanation, found: Sequence[Explanation]) -> tuple[Expl
         if len(named(other)) > len(named(chosen)) or named(other) == named(chosen):
             continue
         simple = other.size <= chosen.size + 1 and not contains(other, chosen)
-        if (simple or _richer_earned(other, chosen)) and not worse(other.judgement, chosen.judgement):
+        if (simple or _richer_earned(other, chosen, criteria)) and not worse(
+            other.judgement, chosen.judgement, criteria
+        ):
             rivals.setdefault(named(other), other)
     return tuple(rivals.values())
 
 
-def _richer_earned(other: Explanation, chosen: Explanation) -> bool:
+def _richer_earned(other: Explanation, chosen: Explanation, criteria: Criteria) -> bool:
     """Whether more numbers than the chosen one has pay: a law that contains another always fits a little better."""
-    better = gain(chosen.judgement, other.judgement) > SMALLEST_GAIN
-    return better and p_value(chosen.judgement, other.judgement) < LIKELY
+    better = gain(chosen.judgement, other.judgement) > criteria.least_gain
+    return better and p_value(chosen.judgement, other.judgement) < criteria.likely
 
 
-def unexplained_joints(chosen: Explanation, joints: tuple[str, ...]) -> list[str]:
+def unexplained_joints(chosen: Explanation, joints: tuple[str, ...], criteria: Criteria = STANDARD) -> list[str]:
     """Joints whose held-out error stays above what is tolerated."""
     errors = chosen.judgement.joint_errors
-    return [joint for joint, error in zip(joints, errors, strict=True) if error > TOLERATED]
+    return [joint for joint, error in zip(joints, errors, strict=True) if error > criteria.tolerated]

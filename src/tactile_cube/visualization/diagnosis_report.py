@@ -3,7 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactile_cube.identification.in_words import UNPROVEN, common_offset, unproven_effects
+from tactile_cube.identification.in_words import (
+    UNPROVEN,
+    UNRELATED,
+    common_offset,
+    headline,
+    left_over,
+    sets_in_words,
+    unproven_effects,
+)
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
@@ -57,8 +65,11 @@ def diagnosis_report(
     tone, said = VERDICTS[diagnosis["verdict"]]
     if diagnosis.get("unproven_effects"):
         said = UNPROVEN
+    elif headline(diagnosis) == UNRELATED:
+        said = UNRELATED
     units = before.recording.units
-    names = _names(diagnosis["effects"], " or " if diagnosis["verdict"] == "ambiguous" else " and ")
+    sets = diagnosis.get("sets", [])
+    names = sets_in_words(sets) if sets else _names(diagnosis["effects"], " and ")
     sections = [
         _verdict_section(diagnosis, units),
         staircase_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
@@ -76,7 +87,7 @@ def diagnosis_report(
     ]
     return Report(
         title=f"What is missing? {before.recording.name}",
-        answer=f"{said}: {names}." if names else said,
+        answer=f"{said}: {names}{left_over(diagnosis)}." if names else said,
         tone=tone,
         tiles=_tiles(diagnosis, common_unit(units.values())),
         sections=sections,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import wilcoxon
 
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import fit
 from tactile_cube.identification.fitting.model import Model
@@ -15,10 +16,6 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
-CLEAR = 12.0  # difference of the squared errors in units of the sensor's variance: odds of 400 to 1
-IN_DETAIL = 0.25
-STANDS_OUT = 2.6  # standard deviations
-SIGNIFICANT = 0.01
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ def gain(before: Judgement, after: Judgement) -> float:
     return float(1.0 - after.costs.sum() / before.costs.sum())
 
 
-def worse(other: Judgement, best: Judgement) -> bool:
+def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> bool:
     """Whether the held-out trials speak against `other`.
 
     The difference has to stand out of its scatter from segment to segment, and to be more than a part of what the
@@ -74,10 +71,10 @@ def worse(other: Judgement, best: Judgement) -> bool:
     """
     difference = (other.costs - best.costs)[best.samples > 0]
     unexplained = max(float(best.costs.sum() - best.samples.sum()), 0.0)
-    if difference.sum() <= CLEAR + IN_DETAIL * unexplained:
+    if difference.sum() <= criteria.clear + criteria.large_gain * unexplained:
         return False
     scatter = float(difference.std(ddof=1)) * np.sqrt(len(difference)) if len(difference) > 1 else np.inf
-    return bool(difference.sum() > STANDS_OUT * scatter or p_value(other, best) < SIGNIFICANT)
+    return bool(difference.sum() > criteria.stands_out * scatter or p_value(other, best) < criteria.significant_if_most)
 
 
 def p_value(before: Judgement, after: Judgement) -> float:

@@ -8,7 +8,6 @@ from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.evidence import Judgement
 
-FLOOR = 1.1  # error / sensor noise at which nothing is left to explain
 NEARLY = 1.5  # the same of a fit before everything is free
 
 
@@ -53,8 +52,3 @@ class Explanation:
     def explained(self, base: Explanation) -> float:
         """Share of the base model's excess over the sensor noise that is explained."""
         return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
-
-    @property
-    def complete(self) -> bool:
-        """Whether nothing is left that would be worth a further effect."""
-        return self.error <= FLOOR

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import base_unknowns, nominal_model
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.fitting.model import Model, Unknown
@@ -18,7 +19,7 @@ from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.stretches import Stretches, cut
 from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, judge, p_value, worse
-from tactile_cube.identification.search.explanation import FLOOR, NEARLY, Explanation
+from tactile_cube.identification.search.explanation import NEARLY, Explanation
 from tactile_cube.identification.search.other_starts import other_starts
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.screening import Score, screen
@@ -26,7 +27,7 @@ from tactile_cube.identification.search.shared_offset import shared_offset
 from tactile_cube.identification.search.shortlist import of_each, with_groups
 from tactile_cube.identification.search.simplicity import simplest
 from tactile_cube.identification.search.special_laws import special_candidates
-from tactile_cube.identification.search.worth import FAR_FROM_FLOOR, least_gain, unproven, worthwhile
+from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -72,6 +73,7 @@ class Search:
         effects: Sequence[type[Effect]],
         say: Callable[[str], None],
         known: ModelFile | None = None,
+        criteria: Criteria = STANDARD,
     ) -> None:
         """Prepare the problems.
 
@@ -82,8 +84,9 @@ class Search:
             effects: classes to search.
             say: takes progress lines.
             known: the model to begin with; None: what the recording's owner states.
+            criteria: what decides.
         """
-        self.say = say
+        self.say, self.criteria = say, criteria
         self.fitted, self.held_out = fitted, held_out
         self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
         effects = tuple(dict.fromkeys([*effects, *(term.effect for term in self.start.terms)]))
@@ -106,24 +109,28 @@ class Search:
         scores: tuple[Score, ...] = ()
         doubtful: list[Explanation] = []
         beam: tuple[Explanation, ...] = (base,)
-        while len(levels) < DEEPEST and not any(e.complete for e in beam):
+        while len(levels) < DEEPEST and not any(e.error <= self.criteria.floor for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
             if not scores:
                 scores = tuple(self.last_scores)
                 self.left_behind = list(self.last_behind)
-            better = [e for parent, e in found if worthwhile(e, parent, base, self.fitted.joints)]
+            better = [e for parent, e in found if worthwhile(e, parent, base, self.fitted.joints, self.criteria)]
             if not better:
-                doubtful = sorted((e for parent, e in found if unproven(e, parent)), key=lambda e: e.error)
+                doubtful = sorted(
+                    (e for parent, e in found if unproven(e, parent, self.criteria)), key=lambda e: e.error
+                )
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
             better[0] = self.pruned(better[0])
             levels.append(tuple(better))
             beam = tuple(
-                e for e in pursued(better)[:BEAM] if e.judgement.costs.sum() < CLOSE * better[0].judgement.costs.sum()
+                e
+                for e in pursued(better, self.criteria)[:BEAM]
+                if e.judgement.costs.sum() < CLOSE * better[0].judgement.costs.sum()
             )
-        if levels and min(e.error for level in levels for e in level) > FAR_FROM_FLOOR:
+        if levels and min(e.error for level in levels for e in level) > self.criteria.far:
             levels += [level] if (level := self.second_thoughts(base)) else []
-        if not levels and base.error <= FLOOR:
+        if not levels and base.error <= self.criteria.floor:
             shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
             levels += [(shared,)] if shared else []
         return Findings(base, nominal, tuple(levels), scores, tuple(doubtful))
@@ -133,11 +140,13 @@ class Search:
         found: list[Explanation] = []
         promising = [pair for pair in self.left_behind if pair[1].cost < LEFT * base.fit.cost]
         for candidate, fitted in of_each(promising, RETRIED)[:RETRIED]:
-            if any(e.error < FAR_FROM_FLOOR for e in found):
+            if any(e.error < self.criteria.far for e in found):
                 break
             self.say(f"far from the noise; what if it begins with {candidate.label}?")
             first = self.finish(base, candidate, fitted, RETRIED)
-            pairs = [e for e in self.extend(first, base) if worthwhile(e, first, base, self.fitted.joints)]
+            pairs = [
+                e for e in self.extend(first, base) if worthwhile(e, first, base, self.fitted.joints, self.criteria)
+            ]
             found += [self.pruned(e) for e in sorted(pairs, key=lambda e: e.error)[:1]]
         return tuple(found)
 
@@ -167,7 +176,7 @@ class Search:
         frozen = self.frozen(parent.fit)
         wanted = self.new([*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)])
         self.last_scores = screen(self.problem, frozen, wanted)
-        chosen = with_groups(self.last_scores, least_gain(parent, base) * frozen.cost)[:REFITTED]
+        chosen = with_groups(self.last_scores, least_gain(parent, base, self.criteria) * frozen.cost)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
         raced = of_each(self.race(frozen, chosen), FINALISTS)
         raced = [*(self.restarted(frozen, *pair) for pair in raced[:RESTARTED]), *raced[RESTARTED:]]
@@ -268,16 +277,16 @@ class Search:
         for place in range(len(explanation.effects) if len(explanation.effects) > 1 else 0):
             model = without_effect(explanation, place)
             fitted, judgement = self.settled(model)
-            if not worse(judgement, explanation.judgement):
+            if not worse(judgement, explanation.judgement, self.criteria):
                 left = explanation.effects[:place] + explanation.effects[place + 1 :]
                 self.say(f"  {explanation.effects[place].label} is not needed")
                 return self.pruned(replace(explanation, effects=left, fit=fitted, judgement=judgement))
         return explanation
 
 
-def pursued(better: Sequence[Explanation]) -> list[Explanation]:
+def pursued(better: Sequence[Explanation], criteria: Criteria = STANDARD) -> list[Explanation]:
     """The best, then the simplest that is as good, then the others: what is left may make up for its few numbers."""
-    plain = simplest(better)
+    plain = simplest(better, criteria)
     return [better[0], *([] if plain is better[0] else [plain]), *(e for e in better[1:] if e is not plain)]
 
 

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.evidence import gain, worse
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.worth import SMALLEST_GAIN
-
-DETAIL = 0.002  # of what an effect explains, below which more numbers for it follow something else
 
 
-def simplest(found: Sequence[Explanation]) -> Explanation:
+def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Explanation:
     """The explanation with the fewest effects, then numbers, among those that are as good as the best."""
     best = min(found, key=lambda e: e.judgement.costs.sum())
-    equal = [e for e in found if not worse(e.judgement, best.judgement)]
-    equal += [e for e in found if any(_but_for_a_detail(e, richer) for richer in equal)]
+    equal = [e for e in found if not worse(e.judgement, best.judgement, criteria)]
+    equal += [e for e in found if any(_but_for_a_detail(e, richer, criteria) for richer in equal)]
     return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
 
 
-def _but_for_a_detail(simple: Explanation, richer: Explanation) -> bool:
+def _but_for_a_detail(simple: Explanation, richer: Explanation, criteria: Criteria) -> bool:
     """Whether the last effect is a special case of the richer one's, which explains next to nothing more.
 
     Over many samples the least deviation of anything else in the model is significant.
     """
     if not contains(richer, simple):
         return False
-    small = richer.gain - simple.gain < DETAIL * richer.gain
-    return small and gain(simple.judgement, richer.judgement) < SMALLEST_GAIN
+    small = richer.gain - simple.gain < criteria.detail * richer.gain
+    return small and gain(simple.judgement, richer.judgement) < criteria.least_gain
 
 
 def contains(richer: Explanation, simple: Explanation) -> bool:

@@ -1,0 +1,27 @@
+"""What the answer says in a sentence."""
+
+from typing import Any
+
+import pytest
+
+from tactile_cube.identification.in_words import OPENING, UNRELATED, headline, left_over, sets_in_words
+
+
+def result(verdict: str, with_effects: float = 4.3e-3, black_box: float = 0.0) -> dict[str, Any]:
+    error = {"nominal": 0.02, "refitted": 0.01, "with_effects": with_effects, "noise_floor": 3e-4}
+    return {"verdict": verdict, "error": error, "unexplained": [{"joint": "q1", "black_box": black_box}]}
+
+
+def test_sets_of_effects_are_told_as_sets() -> None:
+    assert sets_in_words([["a@q1", "b@q2"], ["c@q1"]]) == "a@q1 and b@q2, or c@q1"
+
+
+def test_what_is_left_stands_in_the_headline() -> None:
+    assert left_over(result("missing_effect")) == " (4.3 mrad are left, 14 noise floors)"
+    assert left_over(result("missing_effect", 3.3e-4)) == ""
+    assert left_over(result("unknown_effect")) == ""
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.0, UNRELATED), (0.4, OPENING["unknown_effect"])])
+def test_an_unknown_effect_is_claimed_only_where_signals_show_one(share: float, said: str) -> None:
+    assert headline(result("unknown_effect", black_box=share)) == said
