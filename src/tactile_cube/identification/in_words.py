@@ -95,8 +95,8 @@ def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
 def _unexplained(entry: dict[str, Any]) -> str:
     if entry["black_box"] < NO_LAW:
         return (
-            f"  {entry['joint']}: a black box of positions, speeds, torque and time explains nothing of what is left; look "
-            "for what is not logged: pushes, temperature, supply, timing"
+            f"  {entry['joint']}: a black box of positions, speeds, torque and time explains nothing of what is left; "
+            "look for what is not logged: pushes, temperature, supply, timing"
         )
     return (
         f"  {entry['joint']}: the torque that {entry['beside']} lacks goes most with "

@@ -65,6 +65,8 @@ class Findings:
 class Search:
     """A recording with its trials split, and the effects that may be missing."""
 
+    criteria = STANDARD
+
     def __init__(
         self,
         fitted: Recording,
@@ -114,26 +116,25 @@ class Search:
             if not scores:
                 scores = tuple(self.last_scores)
                 self.left_behind = list(self.last_behind)
-            better = [e for parent, e in found if worthwhile(e, parent, base, self.fitted.joints, self.criteria)]
+            better = [e for parent, e in found if self.worthwhile(e, parent, base)]
             if not better:
-                doubtful = sorted(
-                    (e for parent, e in found if unproven(e, parent, self.criteria)), key=lambda e: e.error
-                )
+                doubtful = [e for parent, e in found if unproven(e, parent, self.criteria)]
                 break
             better.sort(key=lambda e: e.judgement.costs.sum())
             better[0] = self.pruned(better[0])
             levels.append(tuple(better))
-            beam = tuple(
-                e
-                for e in pursued(better, self.criteria)[:BEAM]
-                if e.judgement.costs.sum() < CLOSE * better[0].judgement.costs.sum()
-            )
+            least = better[0].judgement.costs.sum()
+            beam = tuple(e for e in pursued(better, self.criteria)[:BEAM] if e.judgement.costs.sum() < CLOSE * least)
         if levels and min(e.error for level in levels for e in level) > self.criteria.far:
             levels += [level] if (level := self.second_thoughts(base)) else []
         if not levels and base.error <= self.criteria.floor:
             shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
             levels += [(shared,)] if shared else []
-        return Findings(base, nominal, tuple(levels), scores, tuple(doubtful))
+        return Findings(base, nominal, tuple(levels), scores, tuple(sorted(doubtful, key=lambda e: e.error)))
+
+    def worthwhile(self, one: Explanation, parent: Explanation, base: Explanation) -> bool:
+        """Whether the last effect of an explanation earns its place."""
+        return worthwhile(one, parent, base, self.fitted.joints, self.criteria)
 
     def second_thoughts(self, base: Explanation) -> tuple[Explanation, ...]:
         """Pairs that begin with an effect which was left behind: alone, each of two may look worse than a third one."""
@@ -144,9 +145,7 @@ class Search:
                 break
             self.say(f"far from the noise; what if it begins with {candidate.label}?")
             first = self.finish(base, candidate, fitted, RETRIED)
-            pairs = [
-                e for e in self.extend(first, base) if worthwhile(e, first, base, self.fitted.joints, self.criteria)
-            ]
+            pairs = [e for e in self.extend(first, base) if self.worthwhile(e, first, base)]
             found += [self.pruned(e) for e in sorted(pairs, key=lambda e: e.error)[:1]]
         return tuple(found)
 
