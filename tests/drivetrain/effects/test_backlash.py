@@ -32,6 +32,20 @@ def test_a_held_joint_feels_only_what_goes_beyond_the_gap(command: float, torque
     assert plant.signal(memory, MOTOR_POSITION)[0] == pytest.approx(lead + torque / STIFFNESS, abs=1e-12)
 
 
+@pytest.mark.parametrize("command", [0.05, -0.03])
+def test_a_smooth_backlash_leads_by_half_of_it_on_either_flank(command: float) -> None:
+    plant, memory = plant_and_memory(friction=1.0, play=0.0, smooth=GAP, softness=0.002)
+    plant.reset(memory, 0.0)
+    readings = []
+    for _ in range(20):
+        plant.kernel.step(np.array([command]), memory)
+        readings.append(plant.signal(memory, MOTOR_POSITION)[0])
+    lead = np.copysign(0.5 * GAP, command)
+    torque = KP * (command - readings[-1])
+    assert readings[-1] == pytest.approx(lead + torque / STIFFNESS, abs=1e-6)
+    assert readings[-1] == pytest.approx(readings[-2], abs=1e-9), "what the torque deflects, the torque feels at once"
+
+
 def test_a_play_keeps_the_reading_until_the_joint_has_moved_through_it() -> None:
     state = np.zeros(Backlash.state_size(DT))
     readings = []

@@ -27,6 +27,7 @@ NAMES = (
     "reflected_inertia",
     "payload",
     "torque_gain",
+    "torque_curve",
     "torque_bias",
     "torque_crosstalk",
     "position_offset",

@@ -1,15 +1,18 @@
 """A gap in the transmission."""
 
+from math import tanh
+
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import DAMPING, GAP, LEAD, MOTOR_POSITION, POSITION
+from tactile_cube.drivetrain.signals import DAMPING, DEFLECTION, GAP, LEAD, MOTOR_POSITION, POSITION, TORQUE
 
 
 class Backlash(Effect):
-    """Play between motor and link, in its two usual descriptions.
+    """Play between motor and link, in its three usual descriptions.
 
     play: the motor encoder keeps its reading until the link has moved through the gap (hysteresis of width
     play). gap: a dead band of the spring. Within it the motor carries no torque and stands where its controller asks
-    for none; on either flank it leads or lags by half a gap.
+    for none; on either flank it leads or lags by half a gap. smooth: the motor leads or lags by half of it as the torque
+    changes its sign, softly over torques of `softness`, as where seals or grease carry the motor through its gap.
     Source: Nordin and Gutman, Controlling mechanical systems with backlash, 2002.
     """
 
@@ -19,11 +22,14 @@ class Backlash(Effect):
     parameters = (
         Parameter("play", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.01, source="0.1-1 deg"),
         Parameter("gap", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.0, source="0.1-1 deg"),
+        Parameter("smooth", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.0, source="0.1-1 deg"),
+        Parameter("softness", unit="N m", neutral=0.01, low=1e-4, high=0.5, typical=0.01, source="torque of a seal"),
     )
 
     forms = (
         {"play": 0.01},
         {"gap": 0.01},
+        {"smooth": 0.01, "softness": 0.01},
     )
 
     @classmethod
@@ -59,4 +65,8 @@ class Backlash(Effect):
             s[0] = min(max(s[0] - (reading - s[2]), -half), half)
             s[2] = reading
             reading += s[0]
+        if p[2] > 0.0:  # a deflection by the torque, which the torque feels without delay
+            lead = 0.5 * p[2] * tanh(x[TORQUE, j] / p[3])
+            x[DEFLECTION, j] += lead
+            reading += lead
         return reading + s[3]

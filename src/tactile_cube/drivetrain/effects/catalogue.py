@@ -18,6 +18,7 @@ CATALOGUE_MODULES = (
     "command_delay",
     "velocity_filter_lag",
     "torque_gain",
+    "torque_curve",
     "torque_bias",
     "torque_crosstalk",
     "cogging",

@@ -5,7 +5,7 @@ from tactile_cube.drivetrain.signals import DAMPING, JOINT_TORQUE, VELOCITY
 
 
 class ViscousFriction(Effect):
-    """Viscous friction on the link side: tau -= damping * v.
+    """Viscous friction on the link side: tau -= (damping + difference / 2 * sgn v) * v.
 
     Unlike the controller's K_D it does not pass through the drive: the torque sensor does not see it.
     Source: Olsson et al., Friction models and friction compensation, 1998.
@@ -23,10 +23,24 @@ class ViscousFriction(Effect):
             typical=0.05,
             source="0.004-0.3 N m s/rad in geared joints",
         ),
+        Parameter(
+            "difference",
+            unit="N m s/rad",
+            neutral=0.0,
+            low=-1.0,
+            high=1.0,
+            typical=0.0,
+            source="5-30 % between the directions: screws, worn gears, seals",
+        ),
+    )
+    forms = (
+        {"damping": 0.05},
+        {"damping": 0.05, "difference": 0.02},
     )
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
-        x[DAMPING, j] += p[0]
-        return x[JOINT_TORQUE, j] - p[0] * x[VELOCITY, j]
+        damping = p[0] + (0.5 * p[1] if x[VELOCITY, j] > 0.0 else -0.5 * p[1])
+        x[DAMPING, j] += damping
+        return x[JOINT_TORQUE, j] - damping * x[VELOCITY, j]

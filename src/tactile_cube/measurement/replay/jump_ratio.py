@@ -11,7 +11,7 @@ from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION, TORQU
 from tactile_cube.measurement.replay.read_out import free_way
 
 Array = NDArray[np.float64]
-PROBE = 0.05  # [rad] beyond every dead zone, below the torque limits
+PROBE, SAFE = 0.05, 0.25  # [rad] beyond every dead zone; part of the torque limit that it asks for at most
 
 
 def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Array]:
@@ -28,16 +28,17 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
         command: (n,) [rad].
     """
     seen = []
-    for jump in (0.0, PROBE):
+    kp, compliance = plant.view(memory, "kp"), plant.view(memory, "compliance")
+    probe = np.minimum(PROBE, SAFE * plant.view(memory, "torque_limit") / np.maximum(kp, np.finfo(float).tiny))
+    for jump in (0.0, probe):
         copy = memory.copy()
         plant.kernel.step(command, copy)
         plant.kernel.step(command + jump, copy)
         seen.append([plant.signal(copy, row).copy() for row in (MOTOR_POSITION, TORQUE, COMMAND, LEAD)])
     position, torque, acted, _ = np.array(seen[1]) - np.array(seen[0])
-    passed = np.abs(acted) > 0.5 * PROBE
+    passed = np.abs(acted) > 0.5 * probe
     free = free_way(seen[1][-1], acted, gaps(plant, memory))
     position, acted = position - free, np.where(passed, acted - free, 1.0)
-    kp, compliance = plant.view(memory, "kp"), plant.view(memory, "compliance")
     plain = kp / (1.0 + kp * compliance)
     return np.where(passed, position / acted, plain * compliance), np.where(passed, torque / acted, plain)
 
