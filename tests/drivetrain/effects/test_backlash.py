@@ -52,7 +52,7 @@ def test_a_play_keeps_the_reading_until_the_joint_has_moved_through_it() -> None
     for q in (0.0, 0.03, 0.02, 0.01, 0.0):
         x = np.zeros((ROWS, 1))
         x[MOTOR_POSITION, 0] = q
-        readings.append(Backlash.law(x, 0, np.array([GAP, 0.0]), state, DT))
+        readings.append(Backlash.law(x, 0, np.array([GAP, 0.0, 0.0, 0.01]), state, DT))
     assert readings == pytest.approx([0.0, 0.02, 0.02, 0.02, 0.01])
 
 

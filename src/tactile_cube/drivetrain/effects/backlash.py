@@ -11,8 +11,8 @@ class Backlash(Effect):
 
     play: the motor encoder keeps its reading until the link has moved through the gap (hysteresis of width
     play). gap: a dead band of the spring. Within it the motor carries no torque and stands where its controller asks
-    for none; on either flank it leads or lags by half a gap. smooth: the motor leads or lags by half of it as the torque
-    changes its sign, softly over torques of `softness`, as where seals or grease carry the motor through its gap.
+    for none; on either flank it leads or lags by half a gap. smooth: the motor leads or lags by half of it as the
+    torque changes its sign, softly over torques of `softness`, as where seals or grease carry it through its gap.
     Source: Nordin and Gutman, Controlling mechanical systems with backlash, 2002.
     """
 
