@@ -170,11 +170,13 @@ class Simulations(Questions):
     def free_error(self, one: Explanation) -> ErrorSummary:
         """Error of its free run on the held-out trials [rad]."""
         if one.label not in self._errors:
-            model = with_offsets(self.final(one).model, one.judgement.model)
-            held_out = self.search.held_out
-            simulated = free_run(held_out, model, self.engine, self.step)
-            self._errors[one.label] = free_run_error(held_out, simulated)
+            self._errors[one.label] = self.simulated_error(one)
         return self._errors[one.label]
+
+    def simulated_error(self, one: Explanation) -> ErrorSummary:
+        """The same, simulated anew."""
+        model = with_offsets(self.final(one).model, one.judgement.model)
+        return free_run_error(self.search.held_out, free_run(self.search.held_out, model, self.engine, self.step))
 
     def unexplained(self, one: Explanation, beside_base: bool = False) -> list[Unexplained]:
         """What is left at each joint that is not explained; `beside_base`, also beside the base model.
