@@ -1,11 +1,13 @@
 """What each engine does with a contact that has an answer from mechanics."""
 
+import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.simulation import SimulationOptions
 from tactile_cube.simulation.mechanics import CASES, Answer
 from tactile_cube.simulation.mechanics.page import mechanics_page
+from tactile_cube.simulation.mechanics.refinement import Outcome, Refinement, refined
 from tactile_cube.simulation.mechanics.settings import Setting, chosen
 
 ENGINES = ("bullet", "mujoco")
@@ -37,6 +39,20 @@ def test_unknown_names_are_refused_with_the_known_ones() -> None:
 
 def test_the_page_has_a_column_for_each_setting_and_says_where_mechanics_says_zero() -> None:
     answers = {"twist": Answer("weight", "N", 2.0, 2.1), "creep": Answer("way", "mm", 0.0, 0.2)}
-    page = mechanics_page([Setting("mujoco fast", answers, 0.02)], "python -m x")
+    page = mechanics_page([Setting("mujoco fast", answers, 0.02)], [], "python -m x")
     assert "| twist: weight | 2 N | +5.0% |" in page
     assert "| creep: way | 0 mm | 0.200 mm |" in page
+
+
+def test_refinement_changes_nothing_that_is_resolved_and_shows_what_is_not() -> None:
+    def of(yaw: float) -> Outcome:
+        return Outcome(np.zeros(3), np.ones(4), 0.4, np.array([[0.0, 0.0, 0.0], [yaw, 0.1, 0.01]]))
+
+    row = mechanics_page([], [Refinement("mujoco", 3e-3, of(-1.0), of(-1.02))], "x")
+    assert "| mujoco, 3 mm | 0.00 mm | 0.00 N | 0 mrad | 20 mrad (-1.02 rad) | 0 mrad (0.10 rad) | 0.0 mm |" in row
+
+
+def test_refined_options_keep_the_policy_step() -> None:
+    fine = refined(SimulationOptions.fast("mujoco"))
+    assert (fine.dt, fine.solver_iterations) == (pytest.approx(2e-4), 300)
+    assert fine.policy_dt == pytest.approx(0.1)
