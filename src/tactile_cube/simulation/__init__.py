@@ -1,4 +1,4 @@
-"""The PyBullet world: bodies, 500 Hz physics steps, contacts, and every constant of an episode in one dataclass."""
+"""The world in PyBullet or MuJoCo: bodies, 500 Hz steps, contacts, every constant of an episode in one dataclass."""
 
 import tactile_cube.simulation.quiet_engine  # noqa: F401  # isort: skip (before whatever imports pybullet)
 

@@ -20,6 +20,7 @@ from tactile_cube.measurement.replay.parameters import Parameters
 from tactile_cube.measurement.replay.rig_replay import Simulated
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 from tactile_cube.simulation.contact_effects import contact_catalogue
+from tactile_cube.simulation.options import EngineName
 from tactile_cube.simulation.pose import to_world
 
 Array = NDArray[np.float64]
@@ -72,6 +73,7 @@ class HandReplay:
         step: float = 0.002,
         iterations: int = 30,
         hand: HandModel = DLR_HAND2,
+        engine: EngineName = "bullet",
     ) -> None:
         """Builds the world.
 
@@ -81,6 +83,7 @@ class HandReplay:
             step: longest physics step [s].
             iterations: of the contact solver.
             hand: the hand that was recorded.
+            engine: of the world: bullet or mujoco.
 
         Raises:
             InputError: the recording is of another mechanism, or its commands are torques.
@@ -92,7 +95,7 @@ class HandReplay:
         self.finger_of = self._back // JOINTS_PER_FINGER
         self._parameters = parameters
         substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
-        options = SimulationOptions(dt=recording.step / substeps, substeps=substeps, solver_iterations=iterations)
+        options = SimulationOptions(engine, recording.step / substeps, substeps, iterations)
         effects = [
             cls(joint, **values)
             for name, values in self._parameters.effects

@@ -32,6 +32,7 @@ from tactile_cube.measurement.replay.rig_replay import Replay
 from tactile_cube.measurement.sources.session import FreeSession, free_command, logged, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
+from tactile_cube.simulation.options import EngineName
 from tactile_cube.simulation.pose import to_hand
 
 Array = NDArray[np.float64]
@@ -67,6 +68,7 @@ class SimulatedGrasp:
         resolution: of the position [rad].
         torque_noise: standard deviation of the torque [N m].
         step: simulation step [s]; finer than the reader's.
+        engine: of the world in which loads are held: bullet or mujoco.
         validation: also record a further initialisation into `validation`.
     """
 
@@ -91,6 +93,7 @@ class SimulatedGrasp:
     resolution: float = 1e-4
     torque_noise: float = 2e-3
     step: float = 0.001
+    engine: EngineName = "bullet"
     validation: bool = True
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
@@ -139,7 +142,8 @@ class SimulatedGrasp:
         contact = Contact({name: values for name, values in hidden if is_contact_effect(name)})
         recording = unmeasured(description, parse_rig(urdf, Path("hand.urdf")), constants)
         free = FreeSession(self, Replay(recording, [name for name, _ in drive], self.step), constants, drive, rng)
-        simulator = HandReplay(recording, Parameters(constants, drive, np.zeros(len(joints))), self.step)
+        known = Parameters(constants, drive, np.zeros(len(joints)))
+        simulator = HandReplay(recording, known, self.step, engine=self.engine)
         return _Session(self, simulator, contact, free, rng)
 
 
