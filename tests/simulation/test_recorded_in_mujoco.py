@@ -1,8 +1,9 @@
 """A load held and twisted in MuJoCo, recorded once, replayed in both engines of today.
 
-The recording: `python -m tactile_cube.record source=grasp source.engine=mujoco source.weights=[0.15] source.levers=[0.04]
-source.initialisations=1 source.loosen=1.0 source.rate=50 source.validation=false source.noise=0 source.resolution=0
-source.torque_noise=0 source.placing=0 source.offset=0 source.true_spread=0 out=tests/simulation/recordings/mujoco_grasp`
+The recording: `python -m tactile_cube.record source=grasp out=tests/simulation/recordings/mujoco_grasp
+source.engine=mujoco source.weights=[0.15] source.levers=[0.04] source.initialisations=1 source.loosen=1.0
+source.rate=50 source.validation=false source.noise=0 source.resolution=0 source.torque_noise=0 source.placing=0
+source.offset=0 source.true_spread=0`
 """
 
 from pathlib import Path
