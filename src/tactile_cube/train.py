@@ -1,7 +1,8 @@
 """Train a policy, or go on training it: the same command resumes.
 
 What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and policy_best.safetensors,
-checkpoint.pt (to go on from), ledger.json (CPU-hours) and .hydra/ (configuration).
+checkpoint.pt, checkpoint_before.pt and replay/ (to go on from), train.log (what the console showed), ledger.json
+(CPU-hours), finished.json (how it ended) and .hydra/ (configuration).
 """
 
 from pathlib import Path
