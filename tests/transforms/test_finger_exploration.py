@@ -5,8 +5,10 @@ import torch
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import check_env_specs, step_mdp
 
+from tactile_cube.env import Task
 from tactile_cube.errors import InputError
-from tactile_cube.transforms import Exploration, FingerExploration
+from tactile_cube.hand.gait import GaitRanges
+from tactile_cube.transforms import EnvConfig, Exploration, FingerExploration, make_env
 
 MakeEnv = Callable[..., TransformedEnv]
 
@@ -110,3 +112,24 @@ def test_impossible_settings_are_refused() -> None:
 
 def test_specs_hold(transformed: MakeEnv) -> None:
     check_env_specs(transformed(FingerExploration(Exploration())))
+
+
+def test_a_teacher_acts_on_what_it_observes() -> None:
+    seen: list[torch.Tensor] = []
+
+    def teacher(observation: torch.Tensor) -> torch.Tensor:
+        seen.append(observation)
+        return torch.full((*observation.shape[:-1], 12), 0.25)
+
+    settings = Exploration(episodes=0.0, demonstrations=1.0, noise=0.0, probability=0.0)
+    env = make_env(EnvConfig(Task("full", episode_steps=5), exploration=settings), 2, seed=0, teacher=teacher)
+    rollout = env.rollout(3, lambda td: td.set("action", torch.zeros(2, 12)))
+    env.close()
+    assert torch.equal(rollout["next", "action_taken"], torch.full((2, 3, 12), 0.25))
+    assert rollout["next", "demonstrated"].all()
+    assert torch.equal(torch.stack(seen, 1), rollout["observation"])
+
+
+def test_gaits_and_a_teacher_at_once_are_refused() -> None:
+    with pytest.raises(InputError, match=r"exploration\.teacher=default beside exploration\.gaits"):
+        Exploration(demonstrations=0.3, gaits=GaitRanges(low={}, high={}), teacher="default")

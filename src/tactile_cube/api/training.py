@@ -86,13 +86,17 @@ def run_training(job: Job) -> TrainingResult:
 def training_run(job: Job) -> Run:
     """The run that a job describes: new, or where its checkpoint says."""
     from hydra.utils import instantiate
+    from omegaconf import OmegaConf
 
-    from tactile_cube.evaluation.policy_path import networks_path
+    from tactile_cube.evaluation.policy_path import networks_path, policy_path
     from tactile_cube.training.build import build_run
     from tactile_cube.training.environment import as_environment
     from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
     config, plain = job.config, _plain(job)
+    if teacher := config.exploration.get("teacher"):
+        file = str(policy_path(teacher, "exploration.teacher"))
+        config = OmegaConf.merge(config, {"exploration": {"teacher": file}})
     return build_run(
         folder=job.folder,
         seed=RunSettings(name=config.name, seed=config.seed).seed,

@@ -3,16 +3,19 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.env import OUTCOMES, REWARD_TERMS
 from tactile_cube.env.rotation import JOINTS, OBJECT_STATE
 from tactile_cube.training.collection import MakeEnv
 from tactile_cube.transforms import EnvConfig, make_env
+from tactile_cube.transforms.finger_exploration import Teacher
 
 
 @dataclass(frozen=True)
@@ -37,12 +40,22 @@ class Environment:
 def rotation_environment(config: EnvConfig) -> Environment:
     """The rotation task as configured."""
     return Environment(
-        make=functools.partial(make_env, config),
+        make=functools.partial(make_env, config, teacher=_teacher(config)),
         sizes=Sizes(2 * JOINTS * config.stack, OBJECT_STATE, JOINTS),
         reward_terms=len(REWARD_TERMS),
         reward_weights=functools.partial(_weights, config),
         outcomes=tuple(OUTCOMES),
     )
+
+
+def _teacher(config: EnvConfig) -> Teacher | None:
+    """The policy that demonstrates, of the observation that this environment has."""
+    if config.exploration.teacher is None:
+        return None
+    path = Path(config.exploration.teacher)
+    actor, info = load_policy(path)
+    require_sizes(path, info, 2 * JOINTS * config.stack, JOINTS)
+    return actor.deterministic
 
 
 def _weights(config: EnvConfig, conditions: dict[str, Any]) -> Tensor:

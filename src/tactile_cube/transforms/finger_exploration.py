@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -25,6 +26,10 @@ GROUPS = torch.tensor(
 """Fingers that move together (8, 4): each alone, the opposing pairs ring-fore and middle-thumb, all (twice)."""
 
 
+Teacher = Callable[[Tensor], Tensor]
+"""From the stacked observation (..., 120) to the action (..., 12)."""
+
+
 @dataclass(frozen=True)
 class Exploration:
     """Extra exploration in a part of the episodes.
@@ -34,10 +39,11 @@ class Exploration:
         probability: with which a step of such an episode begins to hold a random target.
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
-        demonstrations: part of the episodes in which a scripted gait acts. There the policy takes over where an
+        demonstrations: part of the episodes in which a scripted gait, or a teacher, acts. There the policy takes over where an
             exploring one would hold a target, and for as long.
-        noise: standard deviation of the noise on the gait's actions.
-        gaits: what acts there; None: nothing does.
+        noise: standard deviation of the noise on their actions.
+        gaits: the gaits that act there; None: a teacher does.
+        teacher: the policy that acts there instead: a shipped policy's name, a policy file or a run's folder.
     """
 
     episodes: float = 0.3
@@ -47,6 +53,7 @@ class Exploration:
     demonstrations: float = 0.0
     noise: float = 0.1
     gaits: GaitRanges | None = None
+    teacher: str | None = None
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
@@ -61,6 +68,8 @@ class Exploration:
             raise InputError(
                 f"exploration holds {self.shortest} to {self.longest} steps; give 1 <= shortest <= longest"
             )
+        if self.gaits is not None and self.teacher is not None:
+            raise InputError(f"exploration.teacher={self.teacher} beside exploration.gaits; choose one of them")
         if not self.noise >= 0.0:
             raise InputError(f"exploration.noise is {self.noise}; give a standard deviation >= 0")
 
@@ -73,8 +82,8 @@ class Exploration:
 class FingerExploration(Transform):  # type: ignore[misc]
     """In some episodes a group of fingers holds a random target for a few steps instead of what the policy says.
 
-    In others a hand-crafted gait acts. Adds "exploring" (1), constant in an episode, so that statistics can leave such
-    episodes out, "demonstrated" (1), true after a step in which a gait acted, and "action_taken" (12), the action after
+    In others a scripted gait or a teacher acts. Adds "exploring" (1), constant in an episode, so that statistics can leave
+    such episodes out, "demonstrated" (1), true after a step in which gait or teacher acted, and "action_taken" (12), the action after
     this transform: the one that a replay must store. Draws from torch's global generator, the same number of draws at
     every step.
 
@@ -82,11 +91,18 @@ class FingerExploration(Transform):  # type: ignore[misc]
         >>> env = TransformedEnv(worlds, FingerExploration(Exploration(episodes=0.3)))
     """
 
-    def __init__(self, exploration: Exploration, gaits: Tensor | None = None) -> None:
-        """Explores as `exploration` says; `gaits` (gaits, steps, 12) are what demonstrations play."""
+    def __init__(self, exploration: Exploration, gaits: Tensor | None = None, teacher: Teacher | None = None) -> None:
+        """Explores as `exploration` says.
+
+        Args:
+            exploration: how much of it.
+            gaits: actions (gaits, steps, 12) that demonstrations play.
+            teacher: what acts in demonstrations instead.
+        """
         super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
         self._gaits = torch.zeros(1, 1, 12) if gaits is None else gaits
+        self._teacher = teacher
         self._exploring = self._demonstrating = self._demonstrated = self._held = torch.zeros(0)
         self._gait = self._clock = self._target = self._fingers = self._taken = torch.zeros(0)
 
@@ -117,14 +133,21 @@ class FingerExploration(Transform):  # type: ignore[misc]
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         policy = tensordict.get("action")
         self._begin(policy.shape[:-1])
-        gait = self._gaits[self._gait, self._clock].squeeze(-2) + self.settings.noise * torch.randn(policy.shape)
-        usual = torch.where(self._demonstrating, gait.clamp(-1.0, 1.0), policy)
+        shown = self._shown(tensordict) + self.settings.noise * torch.randn(policy.shape)
+        usual = torch.where(self._demonstrating, shown.clamp(-1.0, 1.0), policy)
         instead = torch.where(self._demonstrating, policy, torch.where(self._fingers, self._target, policy))
         self._taken = torch.where(self._held > 0, instead, usual)
         self._demonstrated = self._demonstrating & (self._held == 0)
         self._held = (self._held - 1).clamp_min(0)
         self._clock = (self._clock + 1).clamp_max(self._gaits.shape[1] - 1)
         return tensordict.set("action", self._taken)
+
+    def _shown(self, tensordict: TensorDictBase) -> Tensor:
+        """What demonstrations do at this step, (..., 12)."""
+        if self._teacher is not None:
+            with torch.no_grad():
+                return self._teacher(tensordict.get("observation"))
+        return self._gaits[self._gait, self._clock].squeeze(-2)
 
     def _begin(self, worlds: torch.Size) -> None:
         """Lets exploring worlds that hold nothing begin to hold, with the probability of a step."""

@@ -19,7 +19,7 @@ from tactile_cube.hand import DLR_HAND2, HandModel
 from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
-from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
+from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
 from tactile_cube.transforms.joint_offset import JointOffset
 from tactile_cube.transforms.observation_stack import ObservationStack
 from tactile_cube.transforms.privileged_state import SCALE, PrivilegedState
@@ -78,7 +78,12 @@ class EnvConfig:
 
 
 def make_env(
-    config: EnvConfig, worlds: int, seed: int, evaluation: bool = False, hand: HandModel = DLR_HAND2
+    config: EnvConfig,
+    worlds: int,
+    seed: int,
+    evaluation: bool = False,
+    hand: HandModel = DLR_HAND2,
+    teacher: Teacher | None = None,
 ) -> TransformedEnv:
     """Environment with batch size [worlds] and the keys "observation" (120), "privileged" (25), "action" (12).
 
@@ -88,6 +93,7 @@ def make_env(
         seed: seed of the worlds and, through torch's global generator, of the transforms.
         evaluation: leaves out the extra exploration and the curriculum; everything else stays as configured.
         hand: the hand.
+        teacher: what acts in demonstrations instead of gaits.
 
     Raises:
         InputError: fewer than one world.
@@ -97,7 +103,7 @@ def make_env(
     poses = config.start.of(hand)
     tasks = [rotation_env(_of_world(config, seed + index), hand, poses) for index in range(worlds)]
     base = WorldsEnv(tasks, None if evaluation else config.curriculum)
-    env = TransformedEnv(base, Compose(*transforms(config, hand, explore=not evaluation)))
+    env = TransformedEnv(base, Compose(*transforms(config, hand, explore=not evaluation, teacher=teacher)))
     env.set_seed(seed)
     return env
 
@@ -114,7 +120,7 @@ def rotation_env(config: EnvConfig, hand: HandModel = DLR_HAND2, poses: StartPos
     return RotationEnv(world, config.task, config.reward, config.randomization, start, config.constants, hand)
 
 
-def transforms(config: EnvConfig, hand: HandModel, explore: bool) -> list[Transform]:
+def transforms(config: EnvConfig, hand: HandModel, explore: bool, teacher: Teacher | None = None) -> list[Transform]:
     """The transforms, from the world to the policy: readings pass them downwards, actions upwards."""
     disturbances = config.randomization
     half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)
@@ -126,7 +132,8 @@ def transforms(config: EnvConfig, hand: HandModel, explore: bool) -> list[Transf
         StickyAction(disturbances.sticky_probability),
     ]
     if explore and config.exploration.extra > 0.0:
-        chain.append(FingerExploration(config.exploration, demonstrated_gaits(config, hand)))
+        gaits = None if teacher is not None else demonstrated_gaits(config, hand)
+        chain.append(FingerExploration(config.exploration, gaits, teacher))
     return chain
 
 
@@ -143,6 +150,8 @@ def demonstrated_gaits(config: EnvConfig, hand: HandModel) -> torch.Tensor | Non
     if config.exploration.demonstrations == 0.0:
         return None
     if config.exploration.gaits is None:
-        raise InputError("exploration.gaits is null, but gaits act in some episodes; choose exploration=demonstrations")
+        raise InputError(
+            "exploration.demonstrations has neither gaits nor a teacher; choose exploration=demonstrations or teacher"
+        )
     gaits = similar_gaits(hand, config.exploration.gaits, GAITS, config.task.episode_steps, config.task.direction)
     return torch.tensor(gaits, dtype=torch.float32)
