@@ -39,8 +39,8 @@ class Exploration:
         probability: with which a step of such an episode begins to hold a random target.
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
-        demonstrations: part of the episodes in which a scripted gait, or a teacher, acts. There the policy takes over where an
-            exploring one would hold a target, and for as long.
+        demonstrations: part of the episodes in which a scripted gait or a teacher acts. There the policy takes over
+            where an exploring one would hold a target, and for as long.
         noise: standard deviation of the noise on their actions.
         gaits: the gaits that act there; None: a teacher does.
         teacher: the policy that acts there instead: a shipped policy's name, a policy file or a run's folder.
@@ -82,10 +82,10 @@ class Exploration:
 class FingerExploration(Transform):  # type: ignore[misc]
     """In some episodes a group of fingers holds a random target for a few steps instead of what the policy says.
 
-    In others a scripted gait or a teacher acts. Adds "exploring" (1), constant in an episode, so that statistics can leave
-    such episodes out, "demonstrated" (1), true after a step in which gait or teacher acted, and "action_taken" (12), the action after
-    this transform: the one that a replay must store. Draws from torch's global generator, the same number of draws at
-    every step.
+    In others a scripted gait or a teacher acts. Adds "exploring" (1), constant in an episode, so that statistics can
+    leave such episodes out, "demonstrated" (1), true after a step in which gait or teacher acted, and "action_taken"
+    (12), the action after this transform: the one that a replay must store. Draws from torch's global generator, the
+    same number of draws at every step.
 
     Example:
         >>> env = TransformedEnv(worlds, FingerExploration(Exploration(episodes=0.3)))
