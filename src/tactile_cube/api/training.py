@@ -93,7 +93,8 @@ def training_run(job: Job) -> Run:
     from tactile_cube.training.environment import as_environment
     from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
-    config, plain = job.config, _plain(job)
+    config: Any = job.config
+    plain = _plain(job)
     if teacher := config.exploration.get("teacher"):
         file = str(policy_path(teacher, "exploration.teacher"))
         config = OmegaConf.merge(config, {"exploration": {"teacher": file}})
