@@ -8,6 +8,7 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torchrl.envs import TransformedEnv
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
@@ -40,12 +41,16 @@ class Environment:
 def rotation_environment(config: EnvConfig) -> Environment:
     """The rotation task as configured."""
     return Environment(
-        make=functools.partial(make_env, config, teacher=_teacher(config)),
+        make=functools.partial(_make, config),
         sizes=Sizes(2 * JOINTS * config.stack, OBJECT_STATE, JOINTS),
         reward_terms=len(REWARD_TERMS),
         reward_weights=functools.partial(_weights, config),
         outcomes=tuple(OUTCOMES),
     )
+
+
+def _make(config: EnvConfig, worlds: int, seed: int) -> TransformedEnv:
+    return make_env(config, worlds, seed, teacher=_teacher(config))
 
 
 def _teacher(config: EnvConfig) -> Teacher | None:
