@@ -13,6 +13,7 @@ from tactile_cube.evaluation.policies import Policy, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.replay import NearlyEqualStart
 from tactile_cube.evaluation.rollout import Interference, run_episode
+from tactile_cube.evaluation.senses import NumbPolicy
 from tactile_cube.evaluation.summary import Summary, succeeded, summarise
 from tactile_cube.evaluation.variant import Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge
@@ -68,14 +69,16 @@ class Evaluation:
         config = variant.apply(self._config)
         traced = dataclasses.replace(config.simulation, trace=self.protocol.trace)
         env = make_env(dataclasses.replace(config, simulation=traced), 1, self._seed, evaluation=True)
-        return self._closing(env, self._policy, result.seed, variant.pull)
+        policy = NumbPolicy(self._policy, variant.numb) if variant.numb else self._policy
+        return self._closing(env, policy, result.seed, variant.pull)
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
         env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
+        policy = NumbPolicy(self._policy, variant.numb) if variant.numb else self._policy
         results = []
         for episode in range(self.protocol.episodes):
             seed = episode_seed(self._seed, episode)
-            results.append(judge(run_episode(env, self._policy, seed, variant.pull), episode, seed))
+            results.append(judge(run_episode(env, policy, seed, variant.pull), episode, seed))
             report(variant.name, results[-1])
         env.close()
         return self._variant_result(variant, results)

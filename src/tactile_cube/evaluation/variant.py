@@ -12,6 +12,7 @@ import numpy as np
 from tactile_cube.drivetrain.effects import Effect, resolve
 from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.senses import numb_reading
 from tactile_cube.evaluation.touch import FINGERS
 from tactile_cube.hand import DLR_HAND2, HandModel
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
@@ -65,6 +66,7 @@ class Variant:
         simulation: replaced options of the world (fields of SimulationOptions).
         effects: effects of the drivetrain, by catalogue name or dotted path, at their typical size on every joint.
         pull: a pull at a finger, or none.
+        numb: senses of the policy that are frozen at the start: q_m, e_q, or a finger's name for all of that finger.
     """
 
     name: str = "nominal"
@@ -74,6 +76,7 @@ class Variant:
     simulation: Mapping[str, Any] = field(default_factory=dict)
     effects: tuple[str, ...] = ()
     pull: Pull | None = None
+    numb: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse unknown constants and options."""
@@ -81,6 +84,7 @@ class Variant:
             for key in getattr(self, group):
                 if key not in known:
                     raise InputError(f"variant {self.name}: {group}.{key} is unknown; choose from {', '.join(known)}")
+        numb_reading(self.numb)
 
     def apply(self, config: EnvConfig) -> EnvConfig:
         """Return the environment with this change."""
