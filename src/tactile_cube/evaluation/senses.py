@@ -17,7 +17,7 @@ _JOINT = np.arange(24) % 12
 SENSES: dict[str, NDArray[np.bool_]] = {
     "q_m": np.arange(24) < 12,
     "e_q": np.arange(24) >= 12,
-    **{finger: index == _JOINT // 3 for index, finger in enumerate(FINGERS)},
+    **{finger: np.isin(_JOINT // 3, index) for index, finger in enumerate(FINGERS)},
 }
 """Which of the 24 numbers of a reading belong to each sense: measured angles, control errors, all of one finger's."""
 
