@@ -11,9 +11,11 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.bam_xl330 import BamXl330, stiffness
+from tactile_cube.measurement.sources.dfki_pendulum import DfkiPendulum
 from tactile_cube.measurement.sources.shadow_lfj3 import ShadowLfj3
 from tactile_cube.measurement.sources.so101_sage import So101Sage
 from tactile_cube.measurement.sources.source import Source
+from tactile_cube.measurement.sources.tx40 import Tx40
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data")
@@ -53,6 +55,31 @@ def test_so101_repeats_give_a_noise_floor(tmp_path: Path) -> None:
     assert floor.source == "repeats"
     assert floor.repeats >= 8
     assert 0.0005 < floor.overall < 0.006
+
+
+@needs_data
+def test_what_somebody_pushed_by_hand_is_no_trial_of_the_pendulum(tmp_path: Path) -> None:
+    parts = imported(DfkiPendulum(str(DATA / "dfki_pendulum" / "dfki_pendulum.npz")), tmp_path)
+    assert all(recording.torque_controlled for recording in parts.values())
+    swings = [trial for trial in parts[""].trials if trial.kind == "energy_shaping"]
+    assert len(swings) == 7, "seven seconds before somebody pushes, of one each"
+    assert len([entry for entry in parts[""].description.trials if entry.kind == "energy_shaping"]) == 20
+    assert {trial.kind for trial in parts["validation"].trials} == {"sac"}
+    assert {trial.kind for trial in parts["heavier"].trials} == {"energy_shaping_1kg"}
+
+
+@needs_data
+def test_the_arms_joint_6_is_freed_from_joint_5_and_friction_brakes_every_joint(tmp_path: Path) -> None:
+    recording = imported(Tx40(str(DATA / "tx40")), tmp_path)[""]
+    assert recording.rate == 500.0
+    raw = np.load(DATA / "tx40" / "tx40.npz")["position_deg"]
+    first = recording.trials[0].position[0]
+    assert first[5] == pytest.approx(np.radians(raw[0, 5] - raw[0, 4]), abs=1e-3)
+    power = sum(
+        np.sum(np.sign(trial.velocity()) * np.where(np.abs(trial.velocity()) > 0.2, trial.command, 0), axis=0)
+        for trial in recording.trials
+    )
+    assert (power > 0).all()
 
 
 def test_a_missing_archive_is_named(tmp_path: Path) -> None:

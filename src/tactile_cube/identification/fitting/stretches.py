@@ -212,7 +212,7 @@ def _rows(fine: Array, first: int, last: int) -> Array:
 
 def steps_per_row(recording: Recording, time: float = 1.0) -> int:
     """Simulation steps between two samples."""
-    return max(1, int(np.ceil(recording.step / (LONGEST_STEP * time) - 1e-6)))
+    return recording.substeps(LONGEST_STEP * time)
 
 
 def _gains(recording: Recording, trial: Trial) -> Array:

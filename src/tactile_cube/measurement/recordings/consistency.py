@@ -11,6 +11,7 @@ from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Gains
 
 Array = NDArray[np.float64]
+SLOWER = 0.75  # share of the log's rate that rounding explains
 
 
 def check_joints(description: Description, rig: Rig, file: Path) -> None:
@@ -30,6 +31,16 @@ def check_joints(description: Description, rig: Rig, file: Path) -> None:
             )
         if joint in description.joints:
             raise InputError(f"{file}: key 'coupled.{joint}': the joint is actuated too (joints {description.joints})")
+
+
+def check_rate(description: Description, file: Path) -> None:
+    """Refuse a controller that is slower than the log."""
+    own = description.controller.rate_hz
+    if own is not None and own < SLOWER * description.rate_hz:
+        raise InputError(
+            f"{file}: key 'controller.rate_hz': received {own:g}, below the log's rate_hz {description.rate_hz:g}; "
+            "a controller that skips rows is not simulated: log at its rate, or leave the key out"
+        )
 
 
 def check_coupling(description: Description, rig: Rig) -> list[str]:

@@ -32,12 +32,14 @@ class Controller(_Strict):
         kd: [N m s/rad].
         torque_limit: [N m].
         mode: `position` (commands are angles) or `torque` (commands are torques [N m]; kp and kd are not used).
+        rate_hz: how often the controller computes its torque; None: as often as a row is logged.
     """
 
     kp: PerJoint = 0.0
     kd: PerJoint = 0.0
     torque_limit: PerJoint = float("inf")
     mode: Literal["position", "torque"] = "position"
+    rate_hz: Positive | None = None
 
 
 class ControllerChange(_Strict):
@@ -145,6 +147,8 @@ class TrialEntry(_Strict):
         clamped: the links are held still (bench test of the drive stiffness).
         touch: a link ends at a known place (bench test of the joint offsets).
         object: the hand holds the recording's object (bench test of friction at the fingertips).
+        exclude: stretches [start, end] of the file [s from its first row] that follow no model, as when somebody pushes
+            the arm; what is left becomes trials of its own.
         note: free text.
     """
 
@@ -156,6 +160,7 @@ class TrialEntry(_Strict):
     clamped: bool = False
     touch: Touch | None = None
     object: Grasp | None = None
+    exclude: list[tuple[NotNegative, NotNegative]] = Field(default_factory=list)
     note: str = ""
 
 

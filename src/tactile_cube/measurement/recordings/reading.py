@@ -10,10 +10,12 @@ from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
     check_joints,
     check_nominal,
+    check_rate,
     gains_of,
     joints_where,
 )
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
+from tactile_cube.measurement.recordings.excluded import without_excluded
 from tactile_cube.measurement.recordings.plausibility import check_assignment, check_units
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
@@ -38,6 +40,7 @@ def read_recording(folder: str | Path) -> Recording:
     description = read_schema(file, Description)
     rig = read_rig(_inside(folder, description.rig, "rig"))
     check_joints(description, rig, file)
+    check_rate(description, file)
     try:
         recording = _assemble(folder, description, rig)
     except InputError:
@@ -60,8 +63,10 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
         )
     for index, entry in enumerate(description.trials):
         trial = read_trial(folder, entry, description, rig, f"trials.{index}.controller")
-        trials.append(trial)
+        trials += without_excluded(trial, entry.exclude, f"{folder / DESCRIPTION}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
+    if not trials:
+        raise InputError(f"{folder / DESCRIPTION}: key 'trials': 'exclude' leaves nothing of any trial")
     return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
 
 

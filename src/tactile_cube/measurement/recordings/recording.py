@@ -1,5 +1,6 @@
 """What was measured on a rig: its description, the mechanism, the controller and the trials."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -71,6 +72,11 @@ class Recording:
     def step(self) -> float:
         """Time between samples [s]."""
         return 1.0 / self.rate
+
+    def substeps(self, longest: float) -> int:
+        """Simulation steps from sample to sample: none longer than `longest` [s], nor than the controller's period."""
+        control = self.description.controller.rate_hz or self.rate
+        return max(1, math.ceil(self.step / longest - 1e-6), round(control / self.rate))
 
     @property
     def read(self) -> Literal["after", "before"]:

@@ -79,7 +79,7 @@ class Replay:
         if engine not in get_args(Engine):
             raise InputError(f"engine={engine}: unknown; choose one of {', '.join(get_args(Engine))}")
         self.recording = recording
-        self.substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
+        self.substeps = recording.substeps(step)
         coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
         self.tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
         self._classes = {name: resolve([name], recording.joints) for name in effects}

@@ -39,7 +39,7 @@ class RosBag:
     files: Iterable[str]
     urdf: str
     joints: Iterable[str]
-    controller: Mapping[str, float]
+    controller: Mapping[str, float | None]
     states: str = "/joint_states"
     commands: str = "/joint_commands"
     nominal: Mapping[str, float | None] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class RosBag:
             tables.append(self._trial(path, joints, entry))
         rate = self.rate if self.rate is not None else float(np.round(1 / np.median(np.diff(tables[0].time)), 2))
         description = described(
-            gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=dict(self.controller),
+            gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=known(self.controller),
             nominal=known(self.nominal), sensors={"read": self.read},
         )  # fmt: skip
         return {"": RecordingTables(description, rig.text, tables)}
