@@ -6,7 +6,7 @@ Every draw is a pendulum-like joint of its own, recorded in three initialisation
 `identify` is told the effect's name and not its size. Counted are the effect's parameters and the constants fitted
 beside it. Writes coverage.json with every interval and its truth. With `--step 0.002` the recorded world takes the
 model's own steps: what is missed even then is the intervals' fault, what is missed in the finer world alone is the
-time step's.
+time step's. `--told` states that world's rate as controller.rate_hz, and the fit follows it.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import yaml
 from scipy import stats
 
 import tactile_cube
@@ -49,8 +50,8 @@ class Interval:
         return self.low <= self.truth <= self.high
 
 
-def drawn(draw: int, seed: int, step: float, folder: Path) -> list[Interval]:
-    """The intervals of one draw, recorded in simulation steps of `step` [s]."""
+def drawn(draw: int, seed: int, step: float, told: bool, folder: Path) -> list[Interval]:
+    """The intervals of one draw, recorded in simulation steps of `step` [s], and `told` as the controller's rate."""
     rng = np.random.default_rng([seed, draw])
     effect = find_effect(EFFECTS[draw % len(EFFECTS)])
     truth = {one.name: float(one.typical * rng.uniform(*SIZE)) for one in effect.parameters}
@@ -62,6 +63,8 @@ def drawn(draw: int, seed: int, step: float, folder: Path) -> list[Interval]:
         step=step, kinds=["ramps", "multisine", "policy"], validation=False,
     )  # fmt: skip
     write_recording(folder / str(draw), source.recordings(int(rng.integers(2**31)))[""])
+    if told:
+        _tell(folder / str(draw) / "recording.yaml", 1 / step)
     fitted = tactile_cube.identify(folder / str(draw), [f"{effect.name}@j"], "engine=fast", say=lambda line: None).model
     known = CONTROLLER | NOMINAL
     constants = [(key, known[key], one["j"]) for key, one in fitted.values.items() if key in known and "j" in one]
@@ -71,6 +74,13 @@ def drawn(draw: int, seed: int, step: float, folder: Path) -> list[Interval]:
         for name, value, one in [*constants, *parameters]
         if one.high > one.low
     ]
+
+
+def _tell(file: Path, rate: float) -> None:
+    """State in recording.yaml how often the controller computed its torque [Hz]."""
+    said = yaml.safe_load(file.read_text())
+    said["controller"]["rate_hz"] = rate
+    file.write_text(yaml.safe_dump(said))
 
 
 def summary(intervals: list[Interval]) -> str:
@@ -92,13 +102,14 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--step", type=float, default=2.5e-4, help="of the recorded world [s]; the model takes 0.002")
+    parser.add_argument("--told", action="store_true", help="recording.yaml states the rate of the world's controller")
     parser.add_argument("--out", type=Path, default=Path("outputs/coverage"))
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     intervals: list[Interval] = []
     with tempfile.TemporaryDirectory() as folder:
         for draw in range(given.draws):
-            intervals += drawn(draw, given.seed, given.step, Path(folder))
+            intervals += drawn(draw, given.seed, given.step, given.told, Path(folder))
             rows = [asdict(one) | {"holds": one.holds} for one in intervals]
             (given.out / "coverage.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
             print(f"{draw + 1} of {given.draws} draws\n{summary(intervals)}", flush=True)
