@@ -70,6 +70,12 @@ def test_the_ancestry_lists_each_run_with_its_settings() -> None:
     assert alone[2:5] == ["1.00", "outputs/train/curriculum-seed0", "none"]
 
 
+def test_a_policy_that_taught_is_named() -> None:
+    shown = {"exploration": {"demonstrations": 0.3, "teacher": "policies/default.safetensors"}}
+    run = Ancestor("contact", 9, RUNS[0].hours, shown)
+    assert run.teacher == "the policy default in 30 % of the episodes, imitated with weight 0"
+
+
 def test_a_run_is_read_from_its_ledger_and_its_policy(tmp_path: Path) -> None:
     (tmp_path / "ledger.json").write_text(json.dumps(LEDGER))
     hours = {"simulating": 1.5, "learning": 2.0, "wall": 3.0}

@@ -45,7 +45,9 @@ class Ancestor:
         share, weight = exploration.get("demonstrations", 0), agent.get("demonstration_weight", 0)
         if not share:
             return "none"
-        return f"a scripted gait in {100 * share:.0f} % of the episodes, imitated with weight {weight:g}"
+        named = exploration.get("teacher")
+        who = f"the policy {Path(named).stem}" if named else "a scripted gait"
+        return f"{who} in {100 * share:.0f} % of the episodes, imitated with weight {weight:g}"
 
 
 def read_ancestor(folder: Path) -> Ancestor:
