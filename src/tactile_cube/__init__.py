@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from tactile_cube.errors import InputError
+from tactile_cube.registration_hook import register_with_gymnasium
 
 if TYPE_CHECKING:
     from tactile_cube.api.comparison import compare
@@ -84,7 +85,4 @@ class _Package(ModuleType):
 
 sys.modules[__name__].__class__ = _Package
 
-if "gymnasium" in sys.modules:  # only then can anybody ask Gymnasium for the environment; importing it here costs 0.2 s
-    from tactile_cube.registration import register
-
-    register()
+register_with_gymnasium()

@@ -1,4 +1,8 @@
-"""The environment's name in Gymnasium's registry: "tactile_cube/Rotation-v0"."""
+"""The environment's name in Gymnasium's registry: "tactile_cube/Rotation-v0".
+
+Gymnasium 1 loads no entry points of other packages. `import tactile_cube` registers the name, before or after
+`import gymnasium`; without it `gymnasium.make("tactile_cube.registration:tactile_cube/Rotation-v0")` does.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from typing import TYPE_CHECKING
 import gymnasium
 
 if TYPE_CHECKING:
-    from tactile_cube.transforms.gymnasium_env import GymnasiumRotation
+    from tactile_cube.gymnasium_env import GymnasiumRotation
 
 NAME = "tactile_cube/Rotation-v0"
 
@@ -23,6 +27,7 @@ def make_rotation(
     reward: str = "early",
     randomization: str = "paper",
     start: str = "wide_yaw",
+    engine: str = "bullet",
     overrides: tuple[str, ...] = (),
     render_mode: str | None = None,
 ) -> GymnasiumRotation:
@@ -33,16 +38,20 @@ def make_rotation(
         reward: option of the group of that name.
         randomization: option of the group of that name.
         start: option of the group of that name.
+        engine: "bullet" or "mujoco".
         overrides: further settings as on the command line, e.g. "task.filter_time=0.25".
-        render_mode: None; pictures come from `evaluate`.
+        render_mode: "rgb_array", or None for no pictures.
     """
     from hydra.utils import instantiate
 
     from tactile_cube.composition import composed
-    from tactile_cube.transforms.gymnasium_env import GymnasiumRotation
+    from tactile_cube.gymnasium_env import GymnasiumRotation
 
     groups = {"task": task, "reward": reward, "randomization": randomization, "start": start}
     groups |= {"exploration": "none", "curriculum": "none", "env": "rotation"}
     chosen = [f"+{group}={option}" for group, option in groups.items()]
-    config = composed(None, [*chosen, "+model=null", *overrides])
+    config = composed(None, [*chosen, "+model=null", f"+engine={engine}", *overrides])
     return GymnasiumRotation(instantiate(config.env), render_mode)
+
+
+register()

@@ -14,9 +14,9 @@ from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.benchmarking.report import Growth, Section, rates
 from tactile_cube.benchmarking.the_task import table_config, table_environment
 from tactile_cube.benchmarking.timing import in_turns
+from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
-from tactile_cube.transforms.gymnasium_env import GymnasiumRotation
 from tactile_cube.transforms.make_env import rotation_env
 
 YARDSTICK = "the bare task, one world"
@@ -109,7 +109,7 @@ def _bare(steps: int) -> Callable[[], None]:
 
 
 def _gymnasium(steps: int) -> Callable[[], None]:
-    env = GymnasiumRotation(table_config())
+    env = GymnasiumRotation(table_config(), judged=False)
     env.reset(seed=0)
     actions = _actions()
 

@@ -19,11 +19,11 @@ from tactile_cube.benchmarking.report import Figure, Section
 from tactile_cube.benchmarking.sb3_sac import learning_sac
 from tactile_cube.benchmarking.the_task import table_config, table_environment
 from tactile_cube.benchmarking.timing import Timing, in_turns
+from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.training.build import build_run
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
-from tactile_cube.transforms.gymnasium_env import GymnasiumRotation
 
 WORLDS, STEPS, UPDATES, HIDDEN = 12, 25, 100, 512
 YARDSTICK = "Stable-Baselines3 SAC"
@@ -105,7 +105,7 @@ def _run(
 
 def _peer(sb3: ModuleType, worlds: int, steps: int, updates: int, hidden: int) -> Callable[[], object]:
     config = table_config()
-    model = learning_sac(sb3, lambda: GymnasiumRotation(config), worlds, hidden, steps, updates)
+    model = learning_sac(sb3, lambda: GymnasiumRotation(config, judged=False), worlds, hidden, steps, updates)
     return lambda: model.learn(worlds * steps, reset_num_timesteps=False)
 
 

@@ -1,0 +1,163 @@
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from gymnasium.utils.env_checker import check_env
+from hydra import initialize
+from hydra.core.global_hydra import GlobalHydra
+
+from tactile_cube import gymnasium_env
+from tactile_cube.env import REWARD_TERMS, Task
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.rollout import run_episode
+from tactile_cube.evaluation.scripted import ScriptedPolicy
+from tactile_cube.evaluation.verdict import Verdict, judge
+from tactile_cube.gymnasium_env import GymnasiumRotation
+from tactile_cube.randomization import Randomization
+from tactile_cube.transforms import EnvConfig, make_env
+
+
+@pytest.fixture
+def env() -> Iterator[GymnasiumRotation]:
+    noisy = Randomization(sensor_noise=0.002, sticky_probability=0.1)
+    env = GymnasiumRotation(EnvConfig(Task("table", table=True, episode_steps=5), randomization=noisy))
+    yield env
+    env.close()
+
+
+def test_checker_of_gymnasium_is_content(env: GymnasiumRotation) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env, skip_render_check=True)
+
+
+def test_checker_of_gymnasium_is_content_with_the_pictures() -> None:
+    env = gymnasium.make("tactile_cube/Rotation-v0", render_mode="rgb_array", overrides=("task.episode_steps=5",))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("imports", "name"),
+    [
+        ("import gymnasium; import tactile_cube", "tactile_cube/Rotation-v0"),
+        ("import tactile_cube; import gymnasium", "tactile_cube/Rotation-v0"),
+        ("import tactile_cube.env; import gymnasium", "tactile_cube/Rotation-v0"),
+        ("import gymnasium", "tactile_cube.registration:tactile_cube/Rotation-v0"),
+    ],
+)
+def test_the_name_is_registered_whatever_the_order_of_imports(imports: str, name: str) -> None:
+    code = f"{imports}; print(gymnasium.make({name!r}).spec.id)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert run.stdout.strip() == "tactile_cube/Rotation-v0", run.stderr
+
+
+def test_a_picture_shows_the_cube_where_it_is(env: GymnasiumRotation) -> None:
+    assert env.render() is None, "without a render mode"
+    drawing = GymnasiumRotation(EnvConfig(Task("table", table=True, episode_steps=5)), render_mode="rgb_array")
+    drawing.reset(seed=0)
+    picture = drawing.render()
+    assert (picture.shape, picture.dtype) == ((256, 512, 3), np.uint8)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
+    np.testing.assert_array_equal(drawing.render(), picture)
+    drawing.step(np.ones(12, dtype=np.float32))
+    moved = np.abs(drawing.render().astype(int) - picture).max(axis=2) > 30
+    assert 20 < moved.sum() < 0.5 * moved.size
+    drawing.close()
+
+
+def test_another_render_mode_is_refused() -> None:
+    with pytest.raises(InputError, match="render_mode is 'human'; choose 'rgb_array' or None"):
+        GymnasiumRotation(EnvConfig(Task("full")), render_mode="human")
+
+
+@pytest.mark.parametrize("verdict", [Verdict.REGRASPING, Verdict.DROPPED])
+def test_success_is_the_verdict_of_evaluate_told_in_the_last_step(
+    env: GymnasiumRotation, verdict: Verdict, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged = []
+
+    def judge(record: EpisodeRecord, episode: int, seed: int) -> SimpleNamespace:
+        judged.append(record)
+        return SimpleNamespace(verdict=verdict)
+
+    monkeypatch.setattr(gymnasium_env, "judge", judge)
+    env.reset(seed=0)
+    infos = [env.step(np.zeros(12, dtype=np.float32))[-1] for _ in range(5)]
+    assert [info.get("is_success") for info in infos] == [None] * 4 + [verdict is Verdict.REGRASPING]
+    (record,) = judged
+    assert record.steps == 5
+    assert record.theta[-1] == infos[-1]["theta"]
+    assert record.ending == infos[-1]["outcome"] == "time_limit"
+    assert len(record.contacts.step) > 0
+
+
+def test_the_scripted_gait_earns_the_success_that_evaluate_gives_it() -> None:
+    config = EnvConfig(Task("table", table=True, episode_steps=100))
+    env = GymnasiumRotation(config)
+    observation, _ = env.reset(seed=0)
+    policy, step, ended, info = ScriptedPolicy(), 0, False, {}
+    policy.start(env._task, 0)
+    while not ended:
+        observation, _, terminated, truncated, info = env.step(policy.act(observation, step))
+        step, ended = step + 1, terminated or truncated
+    env.close()
+    made = make_env(config, 1, 0, evaluation=True)
+    expected = judge(run_episode(made, ScriptedPolicy(), 0), 0, 0)
+    made.close()
+    assert info["theta"] == pytest.approx(expected.final_angle)
+    assert info["is_success"] == (expected.verdict is Verdict.REGRASPING)
+
+
+def test_registered_name_takes_options_of_the_configuration() -> None:
+    env = gymnasium.make("tactile_cube/Rotation-v0", task="float", overrides=("task.filter_time=0.25",))
+    observation, _ = env.reset(seed=0)
+    assert observation.shape == (120,)
+    task = env.unwrapped._env.base_env.tasks[0].task
+    assert (task.name, task.filter_time) == ("float", 0.25)
+    env.close()
+
+
+def test_time_limit_is_truncation_and_the_info_is_named(env: GymnasiumRotation) -> None:
+    env.reset(seed=0)
+    for _ in range(5):
+        *_, terminated, truncated, info = env.step(np.zeros(12, dtype=np.float32))
+    assert (terminated, truncated, info["outcome"]) == (False, True, "time_limit")
+    assert tuple(info["reward_terms"]) == REWARD_TERMS
+    assert info["privileged"].shape == (25,)
+
+
+def test_torchs_global_generator_is_neither_used_nor_changed(env: GymnasiumRotation) -> None:
+    first, _ = env.reset(seed=1)
+    torch.manual_seed(5)
+    before = torch.get_rng_state()
+    second, _ = env.reset(seed=1)
+    assert np.array_equal(first, second)
+    assert torch.equal(torch.get_rng_state(), before)
+
+
+def test_can_be_made_inside_a_hydra_application() -> None:
+    with initialize(version_base=None):
+        gymnasium.make("tactile_cube/Rotation-v0").close()
+        assert GlobalHydra.instance().is_initialized()
+
+
+def test_the_example_for_stable_baselines_runs() -> None:
+    pytest.importorskip("stable_baselines3")
+    page = (Path(__file__).parents[1] / "docs" / "gymnasium.md").read_text()
+    example = page.split("```python\n")[1].split("```")[0]
+    namespace: dict[str, Any] = {}
+    exec(example, namespace)
+    assert namespace["picture"].shape == (256, 512, 3)
+    assert namespace["info"]["is_success"] in (True, False)
