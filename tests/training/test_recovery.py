@@ -88,6 +88,25 @@ def test_a_killed_or_stopped_worker_is_replaced(
     assert not multiprocessing.active_children()
 
 
+def test_a_run_whose_workers_are_ended_with_it_ends_and_goes_on_later(tmp_path: Path, reference: torch.Tensor) -> None:
+    def build() -> Run:
+        run = tiny_run(tmp_path, collector=COLLECTOR)
+        iterate = run.learner.iterate
+
+        def ended() -> None:
+            if run.learner.iteration == 6:
+                os.kill(os.getpid(), signal.SIGTERM)
+                send(signal.SIGTERM, run)
+            iterate()
+
+        run.learner.iterate = ended  # type: ignore[method-assign]
+        return run
+
+    run, reason = train_on(build)
+    assert (reason, run.saved_at) == ("interrupted", 80)
+    assert torch.equal(finish(tiny_run(tmp_path, collector=COLLECTOR)), reference)
+
+
 @pytest.mark.parametrize("wish", ["nan", "raise"])
 def test_a_world_that_fails_once_is_replaced(tmp_path: Path, reference: torch.Tensor, wish: str) -> None:
     asks = tmp_path / "asks"

@@ -10,6 +10,7 @@ from filelock import BaseFileLock
 
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
 from tactile_cube.training.checkpoint import Checkpoints
+from tactile_cube.training.collection import CollectionError
 from tactile_cube.training.finished import Finished
 from tactile_cube.training.interruption import Interruption
 from tactile_cube.training.ledger import Ledger
@@ -72,6 +73,10 @@ class Run:
                     reason = reason or (INTERRUPTED if self._interruption.asked else "")
         except KeyboardInterrupt:
             return INTERRUPTED
+        except CollectionError:
+            if self._interruption.asked:  # whoever ends a job often ends the workers too
+                return INTERRUPTED
+            raise
         return reason
 
     def announce(self) -> None:
