@@ -33,6 +33,17 @@ def test_the_robustness_map_is_drawn_without_a_film_too(tmp_path: Path) -> None:
     assert not list((tmp_path / "run").glob("episode*"))
 
 
+def test_a_baseline_is_tried_in_the_engine_and_the_world_that_are_asked_for(tmp_path: Path) -> None:
+    words = ["policy=hold", "protocol=smoke", "protocol.seconds=0.5", "film=false", "+env.constants.cube_mass=0.06"]
+    angles = []
+    for engine in ("bullet", "mujoco"):
+        run = evaluate(tmp_path, *words, f"engine={engine}", f"hydra.run.dir={tmp_path}/{engine}")
+        assert run.returncode == 0, run.stderr
+        data = json.loads((tmp_path / engine / "results.json").read_text())
+        angles.append([row["final_angle"] for row in data["variants"][0]["episodes"]])
+    assert angles[0] != angles[1]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
