@@ -245,7 +245,7 @@ def commands() -> dict[str, str]:
     result = {}
     for path in sorted(Path(__file__).parent.glob("*.py")):
         text = path.read_text()
-        if f'@verb("{path.stem}")' in text:
+        if f'@verb("{path.stem}"' in text:
             docstring = ast.get_docstring(ast.parse(text)) or ""
             result[path.stem] = docstring.partition("\n")[0]
     return result
