@@ -30,7 +30,7 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
     seen = []
     kp, compliance = plant.view(memory, "kp"), plant.view(memory, "compliance")
     probe = np.minimum(PROBE, SAFE * plant.view(memory, "torque_limit") / np.maximum(kp, np.finfo(float).tiny))
-    for jump in (0.0, probe):
+    for jump in (np.zeros_like(probe), probe):
         copy = memory.copy()
         plant.kernel.step(command, copy)
         plant.kernel.step(command + jump, copy)
