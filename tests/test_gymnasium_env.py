@@ -161,3 +161,11 @@ def test_the_example_for_stable_baselines_runs() -> None:
     exec(example, namespace)
     assert namespace["picture"].shape == (256, 512, 3)
     assert namespace["info"]["is_success"] in (True, False)
+
+
+def test_looking_for_gymnasium_before_it_is_imported_does_not_lose_the_name() -> None:
+    program = (
+        "import tactile_cube, importlib.util; importlib.util.find_spec('gymnasium'); import gymnasium; "
+        "assert 'tactile_cube/Rotation-v0' in gymnasium.registry"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)

@@ -17,17 +17,24 @@ def register_with_gymnasium() -> None:
 
 
 class _WhenGymnasiumComes(MetaPathFinder):
+    _asking = False
+
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
         """Gymnasium's own spec, with the registration after its execution."""
-        if name != "gymnasium":
+        if name != "gymnasium" or self._asking:
             return None
-        sys.meta_path.remove(self)
+        self._asking = (
+            True  # the other finders are asked; this one stays, as many look for a module and import it later
+        )
         spec = importlib.util.find_spec(name)
+        self._asking = False
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 
             def execute_and_register(module: ModuleType) -> None:
                 execute(module)
+                if self in sys.meta_path:
+                    sys.meta_path.remove(self)
                 importlib.import_module("tactile_cube.registration")
 
             spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]

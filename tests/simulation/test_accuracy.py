@@ -9,7 +9,7 @@ def test_the_fast_preset_holds_and_twists_the_cube() -> None:
     assert result.fault == ""
     assert result.creep < 5e-4
     assert result.coupling_error < 0.02
-    assert TWIST * 1.1 < result.twist < TWIST * 0.5
+    assert TWIST * 1.15 < result.twist < TWIST * 0.5  # tips that spin on the faces let the cube go on a little
     assert (result.tip_forces > 0.3).all()
     again = measure_accuracy(SimulationOptions.fast())
     assert dataclasses.replace(again, steps_per_second=0.0, rest=None, tip_forces=None) == dataclasses.replace(  # type: ignore[arg-type]

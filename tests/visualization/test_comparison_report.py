@@ -120,8 +120,8 @@ def test_a_sliding_joint_is_shown_in_millimetres_and_newtons(tmp_path: Path) -> 
     )
     one = compare(recording, ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[friction]))
     text = page(identification_report(one, DIAGNOSIS["error"], {}, "cmd", "m.yaml"), tmp_path / "i.html")
-    assert "kd a 0.2 0.1 .. 0.3 0.2 N s/m" in text
-    assert "kd b 0.2 0.1 .. 0.3 0.2 N m s/rad" in text
+    assert "kd a0.20.1 .. 0.30.2N s/m" in text
+    assert "kd b0.20.1 .. 0.30.2N m s/rad" in text
     assert "0.1 N [0.05, 0.2]" in text
     assert "a [mm]" in text
     assert "b [mrad]" in text

@@ -215,7 +215,7 @@ class MultiSyncCollection:
         """CPU time of all workers since they started [s]; 0 where the system does not tell."""
         if self._final_cpu is not None:
             return self._final_cpu
-        return sum(_process_cpu_seconds(process.pid) for process in self._processes)
+        return sum(map(_process_cpu_seconds, self._processes))
 
     def close(self) -> None:
         """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
@@ -265,10 +265,10 @@ def _prepare_worker(parent: int | None) -> None:
             os._exit(1)
 
 
-def _process_cpu_seconds(pid: int) -> float:
-    """User and system time of a running process [s], from /proc."""
+def _process_cpu_seconds(process: Any) -> float:
+    """User and system time of a running process [s], from /proc; 0 for one that is closed already."""
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
+        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    except (OSError, ValueError):
         return 0.0
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -12,6 +12,6 @@ class SpinningFriction(ContactEffect):
     shown_by = ("twist",)
     parameters = (
         Parameter(
-            "radius", "m", neutral=0.1, low=2e-3, high=0.3, typical=0.02, source="website: 0.1, 0.03, 2e-4..2e-2"
+            "radius", "m", neutral=0.003, low=2e-4, high=0.3, typical=0.02, source="website: 0.1, 0.03, 2e-4..2e-2"
         ),
     )
