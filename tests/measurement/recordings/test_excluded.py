@@ -8,10 +8,10 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import table, write
 
 
-def excluding(*stretches: list[float], every: bool = False) -> object:
+def excluding(*intervals: list[float], every: bool = False) -> object:
     def change(data: dict) -> None:
         for entry in data["trials"] if every else data["trials"][:1]:
-            entry["exclude"] = list(stretches)
+            entry["exclude"] = list(intervals)
 
     return change
 
@@ -31,9 +31,9 @@ def test_rests_that_are_too_short_are_dropped(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stretch", "every", "said"),
+    ("interval", "every", "said"),
     [([2.0, 1.0], False, r"key 'trials\.0\.exclude': received \[2, 1\]"), ([0.0, 9.0], True, "leaves nothing")],
 )
-def test_a_senseless_exclusion_is_refused(stretch: list[float], every: bool, said: str, tmp_path: Path) -> None:
+def test_a_senseless_exclusion_is_refused(interval: list[float], every: bool, said: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=said):
-        read_recording(write(tmp_path, excluding(stretch, every=every)))  # type: ignore[arg-type]
+        read_recording(write(tmp_path, excluding(interval, every=every)))  # type: ignore[arg-type]

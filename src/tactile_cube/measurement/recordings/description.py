@@ -147,7 +147,7 @@ class TrialEntry(_Strict):
         clamped: the links are held still (bench test of the drive stiffness).
         touch: a link ends at a known place (bench test of the joint offsets).
         object: the hand holds the recording's object (bench test of friction at the fingertips).
-        exclude: stretches [start, end] of the file [s from its first row] that follow no model, as when somebody pushes
+        exclude: intervals [start, end] of the file [s from its first row] that follow no model, as when somebody pushes
             the arm; what is left becomes trials of its own.
         note: free text.
     """

@@ -1,4 +1,4 @@
-"""Trials without the stretches that follow no model, as when somebody pushes the arm."""
+"""Trials without the intervals that follow no model, as when somebody pushes the arm."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,21 +10,21 @@ from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES
 from tactile_cube.measurement.recordings.trial import Trial
 
 
-def without_excluded(trial: Trial, stretches: Sequence[tuple[float, float]], key: str) -> list[Trial]:
-    """What lies before, between and after the stretches, as trials that start at 0; shorter rests are dropped.
+def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key: str) -> list[Trial]:
+    """What lies before, between and after the intervals, as trials that start at 0; shorter rests are dropped.
 
     Args:
         trial: on its uniform grid.
-        stretches: start and end [s].
+        intervals: start and end [s].
         key: what an error names.
 
     Raises:
-        InputError: a stretch that ends before it starts.
+        InputError: an interval that ends before it starts.
     """
-    if not stretches:
+    if not intervals:
         return [trial]
     kept = np.ones(len(trial.time), dtype=bool)
-    for start, end in stretches:
+    for start, end in intervals:
         if end <= start:
             raise InputError(f"{key}: received [{start:g}, {end:g}]; expected start < end [s]")
         kept &= (trial.time < start) | (trial.time >= end)
