@@ -34,7 +34,8 @@ class Command:
     def start(self) -> None:
         """Start it."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        words = ["+experiment=smoke", ENV, "collector.processes=2", "collector.timeout=60", *self.settings]
+        collector = ("collector.processes=2", "collector.timeout=60", "collector.start_timeout=60")
+        words = ["+experiment=smoke", ENV, *collector, *self.settings]
         path = os.pathsep.join([str(ROOT / "src"), str(ROOT)])
         marks = {MARK: str(self.folder), WISH: str(self.wish), "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
         with (self.folder.parent / f"{self.folder.name}.txt").open("a") as console:

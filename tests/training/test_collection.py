@@ -13,17 +13,29 @@ from tests.training.tiny_env import LENGTH, SIZES, TinyEnv, tiny_environment
 
 
 class StuckEnv(TinyEnv):
-    """Stops answering after the first steps."""
+    """Stops answering in its second block."""
 
     def _step(self, tensordict):  # type: ignore[no-untyped-def]
-        if int(self._count.max()) >= 2:
+        if self._calls >= 7:  # in the second block
             time.sleep(60)
         return super()._step(tensordict)
 
 
-def start(make=None, timeout: float = 30.0, processes: int = 1) -> MultiSyncCollection:  # type: ignore[no-untyped-def]
+class ColdEnv(TinyEnv):
+    """Takes its time before the first step, as if it had to compile."""
+
+    def _step(self, tensordict):  # type: ignore[no-untyped-def]
+        if self._calls == 0:
+            time.sleep(1.0)
+        return super()._step(tensordict)
+
+
+def start(  # type: ignore[no-untyped-def]
+    make=None, timeout: float = 30.0, processes: int = 1, start_timeout: float = 30.0
+) -> MultiSyncCollection:
     actor = Actor(SIZES, (8,))
-    return MultiSyncCollection(make or tiny_environment().make, actor, 4, 5, processes, timeout, "fork")
+    make = make or tiny_environment().make
+    return MultiSyncCollection(make, actor, 4, 5, processes, timeout, start_timeout, "fork")
 
 
 def collect(collection: MultiSyncCollection, blocks: int = 1) -> None:
@@ -45,13 +57,18 @@ def test_killed_worker_is_reported_within_seconds() -> None:
 
 
 def test_stuck_worker_is_reported_after_the_timeout() -> None:
-    collection = start(make=StuckEnv)
-    collection._timeout = 2.0  # after the start, which may take longer on a busy machine
+    collection = start(make=StuckEnv, timeout=2.0)
     began = time.perf_counter()
     with pytest.raises(CollectionError, match=r"collector\.timeout=2 s"):
-        collect(collection)
+        collect(collection, blocks=3)
     collection.close()
     assert time.perf_counter() - began < 20.0
+
+
+def test_a_cold_start_is_not_taken_for_a_stuck_worker() -> None:
+    collection = start(make=ColdEnv, timeout=0.5)
+    collect(collection)
+    collection.close()
 
 
 def test_failing_world_is_reported() -> None:

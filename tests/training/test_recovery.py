@@ -53,6 +53,7 @@ def disturbed(folder: Path, at: int, disturb: Any, environment: Any = None) -> R
     def build() -> Run:
         run = tiny_run(folder, collector=COLLECTOR, environment=environment)
         run.learner.collection._timeout = 3.0  # type: ignore[attr-defined]
+        run.learner.collection._start_timeout = 10.0  # type: ignore[attr-defined]
         iterate = run.learner.iterate
 
         def disturbed_iterate() -> None:
@@ -138,7 +139,8 @@ def test_a_worker_stopped_while_it_starts_is_given_up_and_leaves_nothing_behind(
     environment = tiny_environment()
     environment = type(environment)(stopped, environment.sizes, environment.reward_terms, environment.reward_weights)
     began = time.perf_counter()
-    with pytest.raises(CollectionError, match=r"no simulation worker answered within collector\.timeout=5 s"):
-        tiny_run(tmp_path / "run", collector=COLLECTOR | {"timeout": 5.0, "processes": 1}, environment=environment)
+    with pytest.raises(CollectionError, match=r"no simulation worker answered within collector\.start_timeout=5 s"):
+        collector = COLLECTOR | {"start_timeout": 5.0, "processes": 1}
+        tiny_run(tmp_path / "run", collector=collector, environment=environment)
     assert time.perf_counter() - began < 25.0
     assert not multiprocessing.active_children()

@@ -66,7 +66,7 @@ def _processes(environment: Environment, rounds: int, worlds: int, processes: tu
     speeds = []
     for n in processes:
         actor = actor_of(environment)
-        collection = MultiSyncCollection(environment.make, actor, worlds, steps, n, TIMEOUT, "fork")
+        collection = MultiSyncCollection(environment.make, actor, worlds, steps, n, TIMEOUT, TIMEOUT, "fork")
         try:
             timing = in_turns({"": collecting(collection, environment)}, rounds, 1)[""]
         finally:

@@ -109,6 +109,7 @@ def build_collection(
         training.steps_per_iteration,
         collector.workers,
         collector.timeout,
+        collector.start_timeout,
         collector.start_method,
     )
 

@@ -26,6 +26,7 @@ FREE_KEYS = {
     "training.stop_when_angle_above",
     "training.init_from",
     "collector.timeout",
+    "collector.start_timeout",
     "collector.start_method",
 }
 """Settings that may change between the sessions of a run: they do not touch what is learned from an iteration."""

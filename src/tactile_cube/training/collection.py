@@ -134,7 +134,8 @@ class MultiSyncCollection:
         worlds: number of worlds in all.
         steps: environment steps a world and block.
         processes: worker processes; divides `worlds`.
-        timeout: longest wait for a block or a start [s]; then the workers count as stuck.
+        timeout: longest wait for a block [s]; then the workers count as stuck.
+        start_timeout: the same up to the end of the first block: workers that start may have to compile first.
         start_method: "fork" (Linux, fast) or "spawn".
     """
 
@@ -146,9 +147,11 @@ class MultiSyncCollection:
         steps: int,
         processes: int,
         timeout: float,
+        start_timeout: float,
         start_method: str,
     ):
-        self._timeout = timeout
+        self._timeout, self._start_timeout = timeout, start_timeout
+        self._started = False
         self._behaviour = Behaviour(copy.deepcopy(actor))
         self._thread = Background()
         self._block: Future[TensorDictBase] | None = None
@@ -209,7 +212,9 @@ class MultiSyncCollection:
     def take(self) -> TensorDictBase:
         """Wait for the block begun last."""
         assert self._block is not None, "launch first"
-        return self._wait(self._block, "collect")
+        block: TensorDictBase = self._wait(self._block, "collect")
+        self._started = True
+        return block
 
     def cpu_seconds(self) -> float:
         """CPU time of all workers since they started [s]; 0 where the system does not tell."""
@@ -227,12 +232,13 @@ class MultiSyncCollection:
         self._thread.close()
 
     def _wait(self, future: "Future[Any]", doing: str) -> Any:
+        name, seconds = ("timeout", self._timeout) if self._started else ("start_timeout", self._start_timeout)
         try:
-            return future.result(timeout=self._timeout)
+            return future.result(timeout=seconds)
         except TimeoutError:
             self._kill()
             raise CollectionError(
-                f"no simulation worker answered within collector.timeout={self._timeout:g} s (to {doing})"
+                f"no simulation worker answered within collector.{name}={seconds:g} s (to {doing})"
             ) from None
         except Exception as error:
             self._kill()

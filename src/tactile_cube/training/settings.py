@@ -28,6 +28,7 @@ class CollectorSettings(BaseModel):
         worlds: worlds in all. Source: the paper's 12 workers.
         processes: worker processes; None takes one for each core beside the learner's, as far as it divides `worlds`.
         timeout: longest wait for the workers [s].
+        start_timeout: the same until their first block, before which they may compile.
         start_method: how worker processes start; fork takes under a second, spawn about 3 s a worker.
     """
 
@@ -37,6 +38,7 @@ class CollectorSettings(BaseModel):
     worlds: PositiveInt = 12
     processes: PositiveInt | None = None
     timeout: PositiveFloat = 120.0
+    start_timeout: PositiveFloat = 600.0
     start_method: Literal["fork", "spawn", "forkserver"] = "fork"
 
     @model_validator(mode="after")
