@@ -2,6 +2,7 @@
 
     python -m tests.faults.campaign --faults 100 --seed 0 --out docs/results/reliability
 
+The run is as short as it can be with four barriers, two workers and learning from a replay; words at the end change it.
 After each fault the same command is given until it ends by itself; policy, checkpoint and metrics must then be those of
 the undisturbed run, bit for bit.
 """
@@ -26,6 +27,13 @@ from tactile_cube.training.checkpoint import BEFORE, FILE, Checkpoints, load_che
 from tests.faults.command import Command
 from tests.faults.kinds import KINDS, Kind
 
+SHORT = (
+    "collector.worlds=4",
+    "training.steps=480",
+    "training.barrier_iterations=3",
+    "training.learning_starts=80",
+    "training.random_steps=80",
+)
 TIMES = ("simulating_hours", "learning_hours", "wall_hours")
 """Columns of metrics.csv that no two runs share."""
 
@@ -72,7 +80,7 @@ def strike(kind: Kind, folder: Path, moment: float, settings: Sequence[str], ref
     command = Command(folder, tuple(settings))
     command.start()
     began = time.monotonic()
-    while time.monotonic() - began < moment and command.process.poll() is None:
+    while time.monotonic() - began < moment and not command.ended:
         time.sleep(0.02)
     struck = kind.strike(command)
     at = time.monotonic()
@@ -147,12 +155,15 @@ def table(outcomes: Sequence[Outcome], seconds: float) -> str:
     return f"{len(outcomes)} faults; the undisturbed run took {seconds:.0f} s; commit {current_commit()}\n\n{rows}\n"
 
 
-def campaign(faults: int, seed: int, out: Path | None, settings: Sequence[str] = ()) -> list[Outcome]:
+def campaign(faults: int, seed: int, out: Path | None, settings: Sequence[str] = SHORT) -> list[Outcome]:
     """Strike with all kinds in turn, at moments spread over the run; write the table after each."""
     moments = random.Random(seed)
     outcomes: list[Outcome] = []
     with tempfile.TemporaryDirectory() as place:
+        first, _ = undisturbed(Path(place) / "first", settings)  # waits for the process that commands are forked from
         reference, seconds = undisturbed(Path(place) / "undisturbed", settings)
+        if not same(first, reference):
+            raise RuntimeError("two undisturbed runs differ")
         for number in range(faults):
             kind = KINDS[number % len(KINDS)]
             folder = Path(place) / f"fault{number}"
@@ -174,7 +185,7 @@ def main() -> None:
     words.add_argument("--out", type=Path)
     words.add_argument("settings", nargs="*", help="further settings of the run, e.g. training.steps=1800")
     given = words.parse_args()
-    outcomes = campaign(given.faults, given.seed, given.out, given.settings)
+    outcomes = campaign(given.faults, given.seed, given.out, [*SHORT, *given.settings])
     lost = [one for one in outcomes if one.status is None or one.orphans or one.damaged or not one.equal]
     print(f"{len(outcomes)} faults, {len(lost)} with a loss")
     raise SystemExit(1 if lost else 0)

@@ -1,24 +1,27 @@
 """A training command in a process of its own, and what is left of it."""
 
+import multiprocessing
 import os
-import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import psutil
 
 from tests.faults.faulty_worlds import WISH
 
-MARK = "TACTILE_CUBE_TEST_RUN"
 ENV = "env._target_=tests.faults.faulty_worlds.faulty_environment"
-ROOT = Path(__file__).parents[2]
+SILENT = 60
+"""Seconds after which silent workers count as stuck: on a machine at load 5, too."""
+SERVER = multiprocessing.get_context("forkserver")
+SERVER.set_forkserver_preload(["tests.faults.preloaded"])
 
 
 @dataclass
 class Command:
-    """`train +experiment=smoke` in a folder.
+    """`train +experiment=smoke` in a folder, forked from a process that has loaded what it needs.
 
     Attributes:
         folder: run folder.
@@ -29,51 +32,52 @@ class Command:
     folder: Path
     settings: tuple[str, ...] = ()
     limit: float = 600.0
-    process: subprocess.Popen[str] = field(init=False)
+    process: BaseProcess = field(init=False)
 
     def start(self) -> None:
         """Start it."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        collector = ("collector.processes=2", "collector.timeout=60", "collector.start_timeout=60")
-        words = ["+experiment=smoke", ENV, *collector, *self.settings]
-        path = os.pathsep.join([str(ROOT / "src"), str(ROOT)])
-        marks = {MARK: str(self.folder), WISH: str(self.wish), "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
-        with (self.folder.parent / f"{self.folder.name}.txt").open("a") as console:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "tactile_cube.train", *words, f"hydra.run.dir={self.folder}"],
-                env=os.environ | marks,
-                stdout=console,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                text=True,
-            )
+        collector = ("collector.processes=2", f"collector.timeout={SILENT}", f"collector.start_timeout={SILENT}")
+        words = ["+experiment=smoke", ENV, *collector, *self.settings, f"hydra.run.dir={self.folder}"]
+        self.process = SERVER.Process(target=_train, args=(words, self.folder.with_suffix(".txt"), self.wish))
+        self.process.start()
+
+    @property
+    def pid(self) -> int:
+        """Of its main process."""
+        assert self.process.pid is not None
+        return self.process.pid
+
+    @property
+    def ended(self) -> bool:
+        """Whether its main process has."""
+        return self.process.exitcode is not None
 
     @property
     def wish(self) -> Path:
         """File that asks a world for a fault."""
-        return self.folder.parent / f"{self.folder.name}.wish"
+        return self.folder.with_suffix(".wish")
 
     def wait(self) -> int | None:
-        """Its exit status; None when it hangs, and then it is killed."""
-        try:
-            return self.process.wait(self.limit)
-        except subprocess.TimeoutExpired:
+        """Its exit status, negative after a signal; None when it hangs, and then it is killed."""
+        self.process.join(self.limit)
+        if not self.ended:
             for process in self.processes():
                 process.kill()
-            return None
+        return self.process.exitcode if self.ended else None
 
     def workers(self) -> list[psutil.Process]:
         """Its simulation workers."""
-        return [process for process in self.processes() if process.pid != self.process.pid]
+        return [process for process in self.processes() if process.pid != self.pid]
 
     def processes(self) -> list[psutil.Process]:
-        """All that runs of it."""
+        """All that runs of it: the processes of its session."""
         found = []
         for process in psutil.process_iter():
             try:
-                if process.environ().get(MARK) == str(self.folder) and process.status() != psutil.STATUS_ZOMBIE:
+                if os.getsid(process.pid) == self.pid and process.status() != psutil.STATUS_ZOMBIE:
                     found.append(process)
-            except psutil.Error:
+            except (psutil.Error, ProcessLookupError):
                 continue
         return found
 
@@ -85,3 +89,15 @@ class Command:
         for process in left:
             process.kill()
         return len(left)
+
+
+def _train(words: list[str], console: Path, wish: Path) -> None:
+    from tactile_cube.train import main
+
+    os.setsid()
+    with console.open("a") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+    os.environ[WISH] = str(wish)
+    sys.argv = ["train", *words]
+    main()

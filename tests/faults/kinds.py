@@ -5,6 +5,7 @@ written is a folder in its place, which stops root too. A jump of the clock is n
 monotonic clock alone (tests/faults/test_campaign.py).
 """
 
+import os
 import resource
 import signal
 import time
@@ -33,11 +34,14 @@ class Kind:
 
 def _main(*signals: int) -> Callable[[Command], bool]:
     def strike(command: Command) -> bool:
-        if command.process.poll() is not None:
+        if command.ended:
             return False
-        for number in signals:
-            command.process.send_signal(number)
-            time.sleep(0.1 if len(signals) > 1 else 0.0)
+        try:
+            for number in signals:
+                os.kill(command.pid, number)
+                time.sleep(0.1 if len(signals) > 1 else 0.0)
+        except ProcessLookupError:  # one was enough
+            return True
         return True
 
     return strike
@@ -46,7 +50,7 @@ def _main(*signals: int) -> Callable[[Command], bool]:
 def _worker(do: Callable[[psutil.Process], None]) -> Callable[[Command], bool]:
     def strike(command: Command) -> bool:
         deadline = time.monotonic() + 60.0
-        while command.process.poll() is None and time.monotonic() < deadline:
+        while not command.ended and time.monotonic() < deadline:
             workers = command.workers()
             if workers:
                 do(workers[0])
@@ -65,7 +69,7 @@ def _little_memory(worker: psutil.Process) -> None:
 def _wish(text: str) -> Callable[[Command], bool]:
     def strike(command: Command) -> bool:
         command.wish.write_text(text)
-        return command.process.poll() is None
+        return not command.ended
 
     return strike
 
@@ -75,15 +79,15 @@ def _no_wish(command: Command) -> None:
 
 
 def _full(command: Command) -> bool:
-    if command.process.poll() is not None:
+    if command.ended:
         return False
-    resource.prlimit(command.process.pid, resource.RLIMIT_FSIZE, (20_000, 20_000))
+    resource.prlimit(command.pid, resource.RLIMIT_FSIZE, (20_000, 20_000))
     return True
 
 
 def _blocked(command: Command) -> bool:
     (command.folder / "checkpoint_next.pt.partial").mkdir(exist_ok=True)
-    return command.process.poll() is None
+    return not command.ended
 
 
 def _unblocked(command: Command) -> None:

@@ -8,10 +8,8 @@ import pytest
 
 import tactile_cube.agent
 import tactile_cube.training
-from tests.faults.campaign import damaged_checkpoints, results, same, strike, undisturbed
+from tests.faults.campaign import SHORT, damaged_checkpoints, results, same, strike, undisturbed
 from tests.faults.kinds import KINDS
-
-SHORT = ("collector.worlds=4", "training.steps=400", "training.learning_starts=80", "training.random_steps=80")
 
 
 @pytest.mark.timeout(900)
