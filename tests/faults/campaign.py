@@ -24,7 +24,7 @@ import torch
 from tactile_cube.agent.policy_file import current_commit, load_policy
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import BEFORE, FILE, Checkpoints, load_checkpoint
-from tests.faults.command import Command
+from tests.faults.command import Command, be_ready
 from tests.faults.kinds import KINDS, Kind
 
 SHORT = (
@@ -67,6 +67,7 @@ class Outcome:
 
 def undisturbed(folder: Path, settings: Sequence[str]) -> tuple[dict[str, Any], float]:
     """What the command gives without a fault, and how long it takes [s]."""
+    be_ready()
     command = Command(folder, tuple(settings))
     began = time.monotonic()
     command.start()
@@ -160,7 +161,7 @@ def campaign(faults: int, seed: int, out: Path | None, settings: Sequence[str] =
     moments = random.Random(seed)
     outcomes: list[Outcome] = []
     with tempfile.TemporaryDirectory() as place:
-        first, _ = undisturbed(Path(place) / "first", settings)  # waits for the process that commands are forked from
+        first, _ = undisturbed(Path(place) / "first", settings)
         reference, seconds = undisturbed(Path(place) / "undisturbed", settings)
         if not same(first, reference):
             raise RuntimeError("two undisturbed runs differ")

@@ -91,6 +91,13 @@ class Command:
         return len(left)
 
 
+def be_ready() -> None:
+    """Wait for the process that commands are forked from."""
+    first = SERVER.Process(target=int)
+    first.start()
+    first.join()
+
+
 def _train(words: list[str], console: Path, wish: Path) -> None:
     from tactile_cube.train import main
 

@@ -139,8 +139,8 @@ def test_a_worker_stopped_while_it_starts_is_given_up_and_leaves_nothing_behind(
     environment = tiny_environment()
     environment = type(environment)(stopped, environment.sizes, environment.reward_terms, environment.reward_weights)
     began = time.perf_counter()
+    collector = COLLECTOR | {"start_timeout": 5.0, "processes": 1}
     with pytest.raises(CollectionError, match=r"no simulation worker answered within collector\.start_timeout=5 s"):
-        collector = COLLECTOR | {"start_timeout": 5.0, "processes": 1}
         tiny_run(tmp_path / "run", collector=collector, environment=environment)
     assert time.perf_counter() - began < 25.0
     assert not multiprocessing.active_children()
