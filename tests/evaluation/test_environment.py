@@ -1,7 +1,10 @@
 import pytest
 
+from tactile_cube.composition import composed
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.environment import _checked, _refuse_foreign_effects
+from tactile_cube.evaluation.environment import _checked, environment
+from tactile_cube.evaluation.policies import HoldPolicy
+from tactile_cube.evaluation.policy_source import PolicySource
 
 
 def test_a_policy_file_cannot_name_foreign_classes() -> None:
@@ -16,10 +19,35 @@ def test_own_classes_pass() -> None:
 
 
 @pytest.mark.parametrize(
-    "config",
-    [{"model": {"effects": [{"effect": "my_rig.CableDrag@q2"}]}}, {"effects": ["my_rig.CableDrag@q2: stiffness=1"]}],
+    "target",
+    ["tactile_cube.cli.os.system", "tactile_cube.transforms.make_env", "tactile_cube.env.task.dataclasses.field"],
 )
-def test_a_policy_file_cannot_have_an_effect_of_its_owner_imported(config: dict) -> None:
-    with pytest.raises(InputError, match=r"my_rig\.CableDrag"):
-        _refuse_foreign_effects(config, "stranger")
-    _refuse_foreign_effects({"model": None, "effects": ["backlash@q2: play=0.1"]}, "own")
+def test_only_classes_that_an_environment_consists_of_are_made(target: str) -> None:
+    with pytest.raises(InputError, match=target):
+        _checked({"task": [{"_target_": target}]}, "stranger")
+
+
+def test_a_policy_file_cannot_read_what_is_outside_it() -> None:
+    with pytest.raises(InputError, match="refers to something outside"):
+        _checked({"task": {"name": "${oc.env:HOME}"}}, "stranger")
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        {"model": {"joints": ["q2"], "effects": [{"effect": "stranger.CableDrag@q2"}]}},
+        {"effects": ["stranger.CableDrag@q2: stiffness=1"]},
+    ],
+)
+def test_a_policy_file_cannot_have_an_effect_of_its_owner_imported(named: dict, tmp_path, monkeypatch) -> None:
+    (tmp_path / "stranger.py").write_text("open('ran', 'w')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    config = {
+        "_target_": "tactile_cube.transforms.EnvConfig",
+        "task": {"_target_": "tactile_cube.env.Task", "name": "full"},
+    } | named
+    source = PolicySource(HoldPolicy(), "stranger", config={"env": config})
+    with pytest.raises(InputError, match=r"own_effects=\[stranger\.CableDrag\]"):
+        environment(composed("evaluate", []), source, {})
+    assert not (tmp_path / "ran").exists()

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.drivetrain.effects import find_effect, import_own_effects
 from tactile_cube.env import Task
 from tactile_cube.identification.identification import identify
 from tactile_cube.measurement.recordings.reading import read_recording
@@ -32,6 +32,7 @@ BENCH = {
 @pytest.fixture(autouse=True)
 def rig_on_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT / "examples"))
+    import_own_effects(["my_rig.CableDrag"])
 
 
 def test_the_guide_shows_the_file_and_it_is_short() -> None:

@@ -2,7 +2,7 @@
 
     python -m tests.faults.campaign --faults 100 --seed 0 --out docs/results/reliability
 
-The run is as short as it can be with four barriers, two workers and learning from a replay; words at the end change it.
+The run is as short as it can be with three barriers, two workers and learning from a replay; words at the end change it.
 After each fault the same command is given until it ends by itself; policy, checkpoint and metrics must then be those of
 the undisturbed run, bit for bit.
 """
@@ -29,8 +29,8 @@ from tests.faults.kinds import KINDS, Kind
 
 SHORT = (
     "collector.worlds=4",
-    "training.steps=480",
-    "training.barrier_iterations=3",
+    "training.steps=240",
+    "training.barrier_iterations=2",
     "training.learning_starts=80",
     "training.random_steps=80",
 )

@@ -13,7 +13,7 @@ import psutil
 from tests.faults.faulty_worlds import WISH
 
 ENV = "env._target_=tests.faults.faulty_worlds.faulty_environment"
-SILENT = 60
+SILENT = 45
 """Seconds after which silent workers count as stuck: on a machine at load 5, too."""
 SERVER = multiprocessing.get_context("forkserver")
 SERVER.set_forkserver_preload(["tests.faults.preloaded"])

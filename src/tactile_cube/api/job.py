@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Say = Callable[[str], None]
 """Takes lines of progress, as `print` does."""
 PathLike = str | Path
+EFFECTS = ("effects", "own_effects", "hidden")
+"""Keys of the configuration that name effects."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ def typed_job(config: DictConfig) -> Job:
     """The job that a command line asks for."""
     from hydra.core.hydra_config import HydraConfig
 
+    import_named_effects(config)
     hydra = HydraConfig.get()
     words = ["python", "-m", f"tactile_cube.{hydra.job.config_name}", *sys.argv[1:]]
     return Job(config, Path(hydra.runtime.output_dir), shlex.join(words), dict(hydra.runtime.choices))
@@ -75,9 +78,33 @@ def called_job(command: str, settings: tuple[str, ...], folder: PathLike | None 
         if value is not None:
             OmegaConf.update(config, key, value)
             words.append(f"{key}={value}")
+    import_named_effects(config)
     target = Path(config.hydra.run.dir if folder is None else folder)
     choices = dict(config.hydra.runtime.choices)
     OmegaConf.set_struct(config, False)
     del config["hydra"]
     OmegaConf.set_struct(config, True)
     return Job(config, target, shlex.join(["python", "-m", f"tactile_cube.{command}", *words]), choices)
+
+
+def import_named_effects(config: DictConfig) -> None:
+    """Import the user's own classes of effects that a configuration names; it is the user's, as no file's is.
+
+    Raises:
+        InputError: one that cannot be imported.
+    """
+    from omegaconf import OmegaConf
+
+    names = [name for name in _effects(OmegaConf.to_container(config)) if "." in name.partition(":")[0]]
+    if names:
+        from tactile_cube.drivetrain.effects import import_own_effects  # imports slowly
+
+        import_own_effects(names)
+
+
+def _effects(part: Any) -> Iterator[str]:
+    """What stands at the keys that name effects, anywhere in a tree."""
+    for key, value in part.items() if isinstance(part, dict) else []:
+        if key in EFFECTS and isinstance(value, list):
+            yield from (name for name in value if isinstance(name, str))
+        yield from _effects(value)

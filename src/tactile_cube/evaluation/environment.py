@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from importlib import import_module
 from typing import Any
 
 import hydra.utils
@@ -15,8 +16,8 @@ from tactile_cube.transforms import EnvConfig
 GROUPS = ("task", "reward", "randomization", "start")
 PUBLISHED_SPINNING_FRICTION = 0.1
 """What policies were trained at [m] before files stated it: it was the only nominal value then."""
-TRUSTED = "tactile_cube."
-"""A policy file is data from somewhere: of the classes it names, only the package's own are made."""
+PARTS = ("curriculum", "env", "randomization", "simulation", "transforms")
+"""A policy file is data from somewhere: of the classes it names, only those that these packages list are made."""
 
 
 def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None]) -> EnvConfig:
@@ -46,8 +47,6 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
             "tip_spinning_friction": PUBLISHED_SPINNING_FRICTION,
         }
         settings.constants = OmegaConf.merge(constants, settings.get("constants") or {})
-        if not named:
-            _refuse_foreign_effects(trained, source.label)
     if named:
         settings.model, settings.effects = config.model, config.effects or []
     for group in GROUPS:
@@ -79,30 +78,31 @@ def _set_engine(settings: Any, wanted: str | None) -> None:
 
 def _checked(config: Mapping[str, Any], label: str) -> dict[str, Any]:
     """Return the configuration as plain data after making sure that it names no foreign class."""
-    for target in _targets(config):
-        if not str(target).startswith(TRUSTED):
-            raise InputError(f"policy={label}: its configuration names {target!r}; only {TRUSTED}* is made from a file")
+    for key, text in _texts(config):
+        if key == "_target_" and not _is_part(text):
+            raise InputError(f"policy={label}: its configuration names {text!r}, which is no part of an environment")
+        if "${" in text:
+            raise InputError(f"policy={label}: its configuration refers to something outside ({key}: {text})")
     return {str(key): value for key, value in config.items()}
 
 
-def _refuse_foreign_effects(config: Mapping[str, Any], label: str) -> None:
-    """Code is imported because a user names it, never because a policy file does."""
-    model = config.get("model") or {}
-    named = [str(one.get("effect")) for one in model.get("effects", [])] + [
-        str(one) for one in config.get("effects", [])
-    ]
-    own = [name for name in named if "." in name.partition("@")[0] and not name.startswith("{")]
-    if own:
-        raise InputError(
-            f"policy={label}: was trained with {', '.join(own)}, a class of its owner's, which no policy file can have "
-            "imported; give model=FILE or effects=[...] to name it yourself"
-        )
+def _is_part(target: str) -> bool:
+    """Whether it names a class that one of `PARTS` lists; by Hydra, tactile_cube.cli.os.system would be found too."""
+    module, _, name = target.rpartition(".")
+    if module not in {f"tactile_cube.{part}" for part in PARTS}:
+        return False
+    listed = import_module(module)
+    return name in listed.__all__ and isinstance(getattr(listed, name), type)
 
 
-def _targets(value: Any) -> list[Any]:
+def _texts(value: Any, key: str = "") -> Iterator[tuple[str, str]]:
+    """All that may be text in plain data, with the key it stands at; a target that is no text, as text."""
     if isinstance(value, Mapping):
-        own = [value["_target_"]] if "_target_" in value else []
-        return own + [target for part in value.values() for target in _targets(part)]
-    if isinstance(value, list | tuple):
-        return [target for part in value for target in _targets(part)]
-    return []
+        for name, part in value.items():
+            yield "", str(name)
+            yield from _texts(part, str(name))
+    elif isinstance(value, list | tuple):
+        for part in value:
+            yield from _texts(part, key)
+    else:
+        yield key, str(value)

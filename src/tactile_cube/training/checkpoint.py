@@ -25,6 +25,7 @@ FREE_KEYS = {
     "training.regrasp_angle",
     "training.stop_when_angle_above",
     "training.init_from",
+    "own_effects",
     "collector.timeout",
     "collector.start_timeout",
     "collector.start_method",

@@ -1,6 +1,8 @@
+from pathlib import Path
+
 import pytest
 
-from tactile_cube.drivetrain.effects import Stage, catalogue, find_effect, matching_joints, resolve
+from tactile_cube.drivetrain.effects import Stage, catalogue, find_effect, import_own_effects, matching_joints, resolve
 from tactile_cube.drivetrain.effects.stribeck_friction import StribeckFriction
 from tactile_cube.errors import InputError
 from tests.drivetrain.effects.laws import CableDrag
@@ -30,7 +32,7 @@ def test_a_finger_s_joint_stands_for_that_joint_of_every_finger() -> None:
     ("name", "complaint"),
     [
         ("striebeck", "'striebeck' is unknown"),
-        ("no_such_rig.Drag", "cannot import 'no_such_rig'"),
+        ("no_such_rig.Drag", "whose code no file can have run"),
         ("tests.drivetrain.effects.laws.Nothing", "no subclass of Effect named 'Nothing'"),
         ("tests.drivetrain.effects.laws.NOT_AN_EFFECT", "no subclass of Effect"),
         ("tests.drivetrain.effects.laws.Nameless", "lacks 'name'"),
@@ -41,6 +43,23 @@ def test_a_finger_s_joint_stands_for_that_joint_of_every_finger() -> None:
 def test_what_cannot_be_found_is_named(name: str, complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
         resolve([name], ("q1", "q2"))
+
+
+def test_nothing_is_imported_for_a_name_until_the_user_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "stranger.py").write_text("from tests.drivetrain.effects.laws import CableDrag\nopen('ran', 'w')\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(InputError, match=r"own_effects=\[stranger\.CableDrag\]"):
+        resolve(["stranger.CableDrag@q2"], ("q1", "q2"))
+    assert not (tmp_path / "ran").exists()
+    import_own_effects(["backlash", "stranger.CableDrag@q2: tension=0.1"])
+    assert (tmp_path / "ran").exists()
+    assert resolve(["stranger.CableDrag@q2"], ("q1", "q2")) == [(CableDrag, "q2")]
+
+
+def test_a_module_that_is_not_there_is_named() -> None:
+    with pytest.raises(InputError, match="cannot import 'no_such_rig'"):
+        import_own_effects(["no_such_rig.Drag"])
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

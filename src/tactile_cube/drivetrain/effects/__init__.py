@@ -1,6 +1,12 @@
 """The catalogue of physical effects: one class each, used in training, in fitting and in the search."""
 
-from tactile_cube.drivetrain.effects.catalogue import catalogue, find_effect, matching_joints, resolve
+from tactile_cube.drivetrain.effects.catalogue import (
+    catalogue,
+    find_effect,
+    import_own_effects,
+    matching_joints,
+    resolve,
+)
 from tactile_cube.drivetrain.effects.effect import Effect, Parameter, Place, Stage
 from tactile_cube.drivetrain.effects.effect_text import parse_effect
 from tactile_cube.drivetrain.signals import (
@@ -47,6 +53,7 @@ __all__ = [
     "Stage",
     "catalogue",
     "find_effect",
+    "import_own_effects",
     "matching_joints",
     "parse_effect",
     "resolve",

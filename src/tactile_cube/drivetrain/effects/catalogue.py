@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -57,7 +57,9 @@ def catalogue() -> dict[str, EffectClass]:
 
 
 def find_effect(name: str) -> EffectClass:
-    """An effect by its catalogue name, or a user's own class by its dotted path.
+    """An effect by its catalogue name, or a user's own class by the dotted path of a module that is imported already.
+
+    Names stand in files that come from anywhere, so nothing is imported for them: see `import_own_effects`.
 
     Raises:
         InputError: there is no such effect.
@@ -67,7 +69,30 @@ def find_effect(name: str) -> EffectClass:
     if "." not in name:
         known = ", ".join(catalogue())
         raise InputError(f"effect '{name}' is unknown; use a dotted path to your own class, or one of: {known}")
-    return _import_effect(name)
+    return _own_effect(name)
+
+
+def import_own_effects(names: Iterable[str]) -> None:
+    """Import the modules of a user's own classes, so that files may name them; of other names nothing.
+
+    Args:
+        names: what the user wrote, never what a file says: `my_rig.CableDrag`, `my_rig.CableDrag@q2: tension=0.1`.
+
+    Raises:
+        InputError: a module that cannot be imported, or has no such effect.
+    """
+    for name in names:
+        path = name.partition(":")[0].partition("@")[0].strip()
+        module = path.rpartition(".")[0]
+        if not module:
+            continue
+        if str(Path.cwd()) not in sys.path:
+            sys.path.append(str(Path.cwd()))  # a user's file lies where the command is typed
+        try:
+            import_module(module)
+        except Exception as error:  # whatever the user's file raises
+            raise InputError(f"effect '{path}': cannot import '{module}': {error}") from None
+        _own_effect(path)
 
 
 def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectClass, str]]:
@@ -103,15 +128,14 @@ def matching_joints(joint: str, joints: Sequence[str]) -> list[str]:
     return found
 
 
-def _import_effect(path: str) -> EffectClass:
+def _own_effect(path: str) -> EffectClass:
     module_name, _, class_name = path.rpartition(".")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.append(str(Path.cwd()))  # a user's file lies where the command is typed
-    try:
-        module = import_module(module_name)
-    except Exception as error:  # whatever the user's file raises
-        raise InputError(f"effect '{path}': cannot import '{module_name}': {error}") from None
-    found = getattr(module, class_name, None)
+    if module_name not in sys.modules:
+        raise InputError(
+            f"effect '{path}' is a class of its owner's, whose code no file can have run; if you trust it, name it "
+            f"yourself: own_effects=[{path}] on the command line, import {module_name} in a program"
+        )
+    found = getattr(sys.modules[module_name], class_name, None)
     if not (isinstance(found, type) and issubclass(found, Effect)):
         raise InputError(f"effect '{path}': '{module_name}' has no subclass of Effect named '{class_name}'")
     _check(found, path)
