@@ -2,7 +2,8 @@
 
     python -m tests.faults.campaign --faults 100 --seed 0 --out docs/results/reliability
 
-The run is as short as it can be with three barriers, two workers and learning from a replay; words at the end change it.
+The run is as short as it can be with three barriers, two workers and learning from a replay; words at the end
+change it.
 After each fault the same command is given until it ends by itself; policy, checkpoint and metrics must then be those of
 the undisturbed run, bit for bit.
 """
