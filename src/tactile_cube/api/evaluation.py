@@ -109,12 +109,14 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
     protocol = instantiate(config.protocol)
     settings = environment(config, source, job.choices)
     evaluation = Evaluation(settings, source.policy, protocol, config.seed)
-    task = settings.task
+    task, engine = settings.task, settings.simulation.engine
+    for approximation in settings.approximations():
+        say(f"approximation: {approximation}")
     say(
         f"policy {source.label}, protocol {protocol.name}, seed {config.seed}, task {task.name}: "
-        f"T_s {task.filter_time:g} s, {100 * task.gravity_scale:.0f} % of the weight\n{HEADER}"
+        f"T_s {task.filter_time:g} s, {100 * task.gravity_scale:.0f} % of the weight, engine {engine}\n{HEADER}"
     )
     began = time.process_time()
     variants = evaluation.run(lambda name, result: say(row(result, name)))
     hours = (time.process_time() - began) / 3600
-    return EvaluationResult(Run(protocol, source, task, config.seed, job.command, hours), variants, evaluation)
+    return EvaluationResult(Run(protocol, source, task, engine, config.seed, job.command, hours), variants, evaluation)

@@ -29,6 +29,7 @@ class Run:
         protocol: how.
         source: which policy.
         task: what it had to do.
+        engine: of the worlds, where a condition names none of its own.
         seed: of the evaluation.
         command: the words of the command line.
         cpu_hours: processor time it took [h].
@@ -37,6 +38,7 @@ class Run:
     protocol: Protocol
     source: PolicySource
     task: Task
+    engine: str
     seed: int
     command: str
     cpu_hours: float
@@ -52,6 +54,7 @@ def write_results(path: Path, run: Run, variants: list[VariantResult]) -> None:
         "success_share": run.protocol.success_share,
         "policy": {"label": run.source.label, **run.source.provenance},
         "task": asdict(run.task),
+        "engine": run.engine,
         "seed": run.seed,
         "command": run.command,
         "cpu_hours": run.cpu_hours,

@@ -90,7 +90,8 @@ def build_run(
         ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
         made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
         seconds = expected_seconds(training.steps - learner.steps, agent.settings, collector, training)
-        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds)
+        notices = [*environment.approximations, *agent.approximations()]
+        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, notices)
         held.pop_all()  # it is the run's from here
     run.best_angle = saved["best_angle"] if saved is not None else 0.0
     return run

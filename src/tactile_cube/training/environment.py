@@ -29,6 +29,7 @@ class Environment:
         reward_terms: number of reward terms.
         reward_weights: weights of the terms (terms,) under the curriculum's values in force.
         outcomes: names of the codes in the key "outcome".
+        approximations: what its worlds compute less well than they could, in words.
     """
 
     make: MakeEnv
@@ -36,6 +37,7 @@ class Environment:
     reward_terms: int
     reward_weights: Callable[[dict[str, float]], Tensor]
     outcomes: tuple[str, ...] = ()
+    approximations: tuple[str, ...] = ()
 
 
 def rotation_environment(config: EnvConfig) -> Environment:
@@ -46,6 +48,7 @@ def rotation_environment(config: EnvConfig) -> Environment:
         reward_terms=len(REWARD_TERMS),
         reward_weights=functools.partial(_weights, config),
         outcomes=tuple(OUTCOMES),
+        approximations=tuple(config.approximations()),
     )
 
 

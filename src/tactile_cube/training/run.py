@@ -36,6 +36,7 @@ class Run:
         checkpoints: where its state goes.
         saved_at: environment steps at the last checkpoint.
         expected_seconds: on the clock until all steps are done, on two idle cores.
+        approximations: which shortcuts are on, in words.
     """
 
     learner: Learner
@@ -46,6 +47,7 @@ class Run:
     lock: BaseFileLock
     checkpoints: Checkpoints
     expected_seconds: float
+    approximations: list[str]
 
     def __post_init__(self) -> None:
         """A session begins."""
@@ -90,7 +92,7 @@ class Run:
         if not learner.steps and settings.init_from:
             waits = f"; critics begin anew, the actor waits for {settings.actor_frozen} updates"
             self.line.say(f"networks of {settings.init_from}{waits if settings.actor_frozen else ''}")
-        for approximation in learner.agent.approximations():
+        for approximation in self.approximations:
             self.line.say(f"approximation: {approximation}")
 
     def conclude(self, reason: str) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import torch
 from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import Compose, Transform
@@ -19,6 +20,7 @@ from tactile_cube.hand import DLR_HAND2, HandModel
 from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
+from tactile_cube.simulation.resolution import unresolved
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
 from tactile_cube.transforms.joint_offset import JointOffset
 from tactile_cube.transforms.observation_stack import ObservationStack
@@ -26,6 +28,8 @@ from tactile_cube.transforms.privileged_state import SCALE, PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
 
+ALMOST_ALL = 1.0 - 1e-9
+"""The fraction of draws below what counts as a distribution's largest value."""
 GAITS = 64  # that demonstrations choose from
 
 
@@ -75,6 +79,14 @@ class EnvConfig:
         object.__setattr__(self, "effects", effects)
         if self.stack < 1:
             raise InputError(f"env.stack is {self.stack}; give at least 1 reading")
+
+    def approximations(self) -> list[str]:
+        """What is computed less well than it could be, in words; [] if nothing."""
+        key = "tip_spinning_friction"
+        drawn = self.randomization.values.get(key)
+        largest = self.constants.tip_spinning_friction if drawn is None else float(drawn.quantile(np.array(ALMOST_ALL)))
+        said = unresolved(largest, self.simulation)
+        return [said] if said else []
 
 
 def make_env(
