@@ -4,7 +4,7 @@ BIN := .venv/bin
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: docs help train test check show example benchmark clean
+.PHONY: docs help train test check audit show example benchmark clean
 
 help: ## print these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 20
@@ -28,6 +28,19 @@ check: .venv/installed ## lint, format, types, tests
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest $(ARGS)
+
+# The tools stand in an environment of their own, so that they audit none of themselves. torchrl's metadata state no
+# licence; its LICENSE file is MIT.
+LICENCES := MIT;BSD;Apache;MPL;Mozilla Public License;PSF-2.0;Python Software Foundation;zlib
+AUDIT := .venv/audit/bin
+
+$(AUDIT)/pip-audit:
+	@$(PYTHON) -m venv .venv/audit
+	@$(AUDIT)/python -m pip install -qq --disable-pip-version-check pip-audit==2.10.1 pip-licenses==5.5.5
+
+audit: .venv/installed $(AUDIT)/pip-audit ## licences of everything installed, then known vulnerabilities (asks the registry's database)
+	$(AUDIT)/pip-licenses --python $(BIN)/python --order=license --ignore-packages torchrl --partial-match --allow-only='$(LICENCES)'
+	$(AUDIT)/pip-audit --strict --disable-pip --no-deps --requirement requirements.txt
 
 show: .venv/installed ## watch the shipped policy turn the cube
 	$(BIN)/python -m tactile_cube.evaluate $(ARGS)

@@ -42,6 +42,8 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 LONGEST = 180
 """Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
 INTERRUPTED = 130
+NOT_AN_OPTION = "Config group override must be"
+"""What Hydra says to `task=1`, as a ValueError like any other."""
 
 
 def verb(
@@ -181,6 +183,9 @@ def usage_error(error: BaseException) -> str | None:
         if cause is not None:
             message = _one_line(cause)
             return message + did_you_mean(message, CONFIG)
+    plain = _find(error, ValueError)
+    if plain is not None and str(plain).startswith(NOT_AN_OPTION):
+        return _one_line(plain)
     full = _find(error, OSError)
     if isinstance(full, OSError) and full.errno in FULL:
         return (

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import torch
-from pydantic import BaseModel, ConfigDict, Field, PositiveInt, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, PositiveInt
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor, nn
@@ -153,7 +153,7 @@ def _verify(path: Path, metadata: dict[str, str]) -> None:
 def _read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
     try:
         return PolicyInfo.model_validate(json.loads(metadata["info"]))
-    except (KeyError, json.JSONDecodeError, ValidationError) as error:
+    except (KeyError, ValueError, RecursionError) as error:  # no JSON, huge numbers, deep lists, another schema
         raise InputError(f"{path}: metadata of the policy cannot be read ({type(error).__name__})") from error
 
 

@@ -26,8 +26,10 @@ def read_yaml(path: Path) -> dict[str, Any]:
     except yaml.constructor.ConstructorError as error:
         raise InputError(f"{path}{_place(error)}: {error.problem}; only plain data is read, remove the tag") from None
     except yaml.YAMLError as error:
-        problem = getattr(error, "problem", None) or error
+        problem = getattr(error, "problem", None) or " ".join(str(error).split())
         raise InputError(f"{path}{_place(error)}: not valid YAML: {problem}") from None
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, lists within lists within lists
+        raise InputError(f"{path}: not usable YAML: {str(error).partition(';')[0]}") from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping of keys to values, received {type(data).__name__}")
     return data

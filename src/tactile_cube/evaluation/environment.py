@@ -62,7 +62,7 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
     except hydra.errors.InstantiationException as error:
         if isinstance(error.__cause__, InputError):
             raise error.__cause__ from None
-        raise InputError(f"environment of policy={source.label}: {error}") from error
+        raise InputError(f"environment of policy={source.label}: {' '.join(str(error).split())}") from error
     if not isinstance(made, EnvConfig):
         raise InputError(f"policy={source.label}: its configuration has no environment of this package")
     return made

@@ -88,9 +88,9 @@ def parse_rig(text: str, path: Path) -> Rig:
     """
     try:
         root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+        joints = {joint.name: joint for joint in map(_joint, root.iter("joint")) if joint is not None}
+    except (ElementTree.ParseError, ValueError) as error:
         raise InputError(f"{path}: not a URDF: {error}") from None
-    joints = {joint.name: joint for joint in map(_joint, root.iter("joint")) if joint is not None}
     if root.tag != "robot" or not joints:
         raise InputError(f"{path}: not a URDF with movable joints (root element <{root.tag}>)")
     return Rig(text, path, joints)
@@ -102,7 +102,17 @@ def _joint(element: ElementTree.Element) -> RigJoint | None:
         return None
     limit, mimic = element.find("limit"), element.find("mimic")
     bounded = limit is not None and kind != "continuous"
-    lower = float(limit.get("lower", "-inf")) if bounded and limit is not None else -math.inf
-    upper = float(limit.get("upper", "inf")) if bounded and limit is not None else math.inf
+    name = element.get("name", "")
+    lower, upper = -math.inf, math.inf
+    if bounded and limit is not None:
+        lower, upper = _number(limit, "lower", name, lower), _number(limit, "upper", name, upper)
     leader = mimic.get("joint") if mimic is not None else None
-    return RigJoint(element.get("name", ""), lower, upper, leader, kind == "prismatic")
+    return RigJoint(name, lower, upper, leader, kind == "prismatic")
+
+
+def _number(limit: ElementTree.Element, key: str, joint: str, default: float) -> float:
+    text = limit.get(key)
+    try:
+        return default if text is None else float(text)
+    except ValueError:
+        raise ValueError(f"joint '{joint}': limit {key}='{text}' is no number") from None

@@ -14,6 +14,7 @@ UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 DROPPED = 1.75  # periods between samples above which at least one is missing
 LONGEST_GAP = 0.25  # [s] beyond this the command in between is anybody's guess
 JITTER = 0.1  # share of a period that is worth a warning
+TINY = 1e-12  # share of a period below which no rate fits
 ON_GRID = 0.02  # share of a period below which samples are taken as they are
 
 
@@ -84,9 +85,10 @@ def _require_rate(gaps: Array, rate: float, path: Path) -> None:
                 f"{path}: column 'time', row 1: steps of {typical / rate:g} at rate_hz {rate:g}: this looks like "
                 f"{unit}; time is in seconds"
             )
+    remedy = f"set rate_hz to {rate / typical:.4g}" if typical > TINY else "time is in seconds"
     raise InputError(
         f"{path}: column 'time', row 1: steps of {typical / rate * 1e3:.3g} ms, but rate_hz {rate:g} in recording.yaml "
-        f"means {1e3 / rate:.3g} ms; set rate_hz to {rate / typical:.4g}"
+        f"means {1e3 / rate:.3g} ms; {remedy}"
     )
 
 

@@ -18,7 +18,7 @@ from tactile_cube.measurement.recordings.writing import RecordingTables
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
 from tactile_cube.measurement.sources.foreign_log import SaidUnits, cut, understand
 from tactile_cube.measurement.sources.kinds import kinds_of
-from tactile_cube.measurement.sources.source import described, known
+from tactile_cube.measurement.sources.source import described, known, median_rate
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")
@@ -80,7 +80,7 @@ class CsvFiles:
             for path, name, start in zip(paths, _distinct(paths), starts, strict=True)
         ]
         trials = [reading.trial(tables[p], p, entry, self.rate) for p, entry in zip(paths, entries, strict=True)]
-        rate = self.rate if self.rate is not None else float(np.round(1 / np.median(np.diff(trials[0].time)), 3))
+        rate = self.rate if self.rate is not None else median_rate(trials[0].time, 3, str(paths[0]))
         guessed = kinds_of([path.stem for path in paths], [trial.command for trial in trials], 1 / rate)
         kinds = _one_each(self.kind, paths, "kind", guessed)
         named = [

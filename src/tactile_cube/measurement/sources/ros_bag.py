@@ -12,7 +12,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.source import described, known
+from tactile_cube.measurement.sources.source import described, known, median_rate
 
 Array = NDArray[np.float64]
 SAME_STAMP = 1e-6  # [s]
@@ -55,7 +55,7 @@ class RosBag:
             path = Path(name)
             entry = TrialEntry(file=f"trials/{path.stem}.parquet", kind=path.stem, note=f"from {path.name}")
             tables.append(self._trial(path, joints, entry))
-        rate = self.rate if self.rate is not None else float(np.round(1 / np.median(np.diff(tables[0].time)), 2))
+        rate = self.rate if self.rate is not None else median_rate(tables[0].time, 2, str(tables[0].entry.note))
         description = described(
             gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=known(self.controller),
             nominal=known(self.nominal), sensors={"read": self.read},
@@ -80,7 +80,6 @@ class RosBag:
 def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float, Any]]]:
     """Topic -> (time [s], message); the header's stamp where a message has one, else when it was logged."""
     try:
-        from mcap.exceptions import McapError
         from mcap.reader import make_reader
         from mcap_ros2.decoder import DecoderFactory
     except ImportError:
@@ -91,8 +90,9 @@ def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float
             reader = make_reader(stream, decoder_factories=[DecoderFactory()])
             for _, channel, logged, message in reader.iter_decoded_messages(topics=list(topics)):
                 found[channel.topic].append((_stamp(message, logged.log_time), message))
-    except (OSError, McapError) as error:
-        raise InputError(f"{path}: not a complete MCAP file: {error}") from None
+    except Exception as error:  # decoder and decompressors raise a dozen kinds for damaged files
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path}: not a complete MCAP file: {reason}") from None
     for topic, messages in found.items():
         if len(messages) < 2:
             raise InputError(

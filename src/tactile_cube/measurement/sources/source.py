@@ -3,6 +3,10 @@
 from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables
 
@@ -26,3 +30,21 @@ def described(**values: object) -> Description:
 def known(values: Mapping[str, Value | None]) -> dict[str, Value]:
     """The entries that are not None."""
     return {key: value for key, value in values.items() if value is not None}
+
+
+def median_rate(time: NDArray[np.float64], digits: int, where: str) -> float:
+    """Samples per second, from the median of the steps between rows.
+
+    Args:
+        time: of the rows (samples,) [s].
+        digits: to round to.
+        where: the rows are from, for the error.
+
+    Raises:
+        InputError: time does not go forward.
+    """
+    step = float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
+    rate = float(np.round(1 / step, digits)) if step > 0 else 0.0
+    if not 0 < rate < float("inf"):
+        raise InputError(f"{where}: the rows are {step:g} s apart in the median; time must go forward by a fixed step")
+    return rate
