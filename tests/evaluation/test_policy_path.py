@@ -41,3 +41,26 @@ def test_training_begins_from_a_run_with_its_critics_where_it_has_a_checkpoint(t
 def test_training_from_an_unknown_policy_is_refused() -> None:
     with pytest.raises(InputError, match=r"^training.init_from=nobody: .* default, robust, table$"):
         networks_path("nobody")
+
+
+def test_a_gait_that_was_searched_acts(tmp_path: Path) -> None:
+    file = tmp_path / "gait.yaml"
+    file.write_text("best: {swing: 0.5, period: 40, phases: [0.0, 0.1, 0.2, 0.3]}")
+    source = find_policy(f"scripted:{file}")
+    assert source.label == "scripted gait of gait.yaml"
+    assert source.policy._gait.swing == 0.5  # type: ignore[attr-defined]
+    assert source.policy._gait.phases == (0.0, 0.1, 0.2, 0.3)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    "content", ["", "best: 3", "best: {}", "best: {stride: 1, phases: [0, 0, 0, 0]}", "{", "worst: {}"]
+)
+def test_a_file_without_a_gait_is_refused(content: str, tmp_path: Path) -> None:
+    (tmp_path / "gait.yaml").write_text(content)
+    with pytest.raises(InputError, match=r"policy=scripted:.*gait\.yaml"):
+        find_policy(f"scripted:{tmp_path / 'gait.yaml'}")
+
+
+def test_a_gait_file_that_is_missing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nothing\.yaml"):
+        find_policy(f"scripted:{tmp_path / 'nothing.yaml'}")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tactile_cube.errors import InputError
 
-BASELINES = ("hold", "random", "scripted", "replay:EPISODE.npz")
+BASELINES = ("hold", "random", "scripted", "scripted:GAIT.yaml", "replay:EPISODE.npz")
 """Names that are no files; evaluate knows them."""
 SHIPPED = Path(str(resources.files("tactile_cube"))) / "policies"
 """Policies that come with the package; the one called `default` is taken when none is named."""

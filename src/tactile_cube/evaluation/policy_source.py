@@ -46,13 +46,17 @@ def find_policy(name: str | None) -> PolicySource:
 
     Args:
         name: a policy file, a folder of a training run, the name of a policy that ships with the package, "hold",
-            "random", "scripted", "replay:FILE", or None for the shipped default.
+            "random", "scripted", "scripted:FILE" (the best gait that search_gait found), "replay:FILE", or None for the
+            shipped default.
 
     Raises:
         InputError: there is no such policy, or its file cannot be used.
     """
     if name is not None and name in BASELINES:
         return PolicySource(BASELINES[name](), name)
+    if name is not None and name.startswith("scripted:"):
+        file = Path(name.removeprefix("scripted:"))
+        return PolicySource(ScriptedPolicy.from_file(file), f"scripted gait of {file.name}")
     if name is not None and name.startswith("replay:"):
         file = Path(name.removeprefix("replay:"))
         return PolicySource(ReplayPolicy.from_file(file), f"replay of {file.name}")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from tactile_cube.env import RotationEnv
+from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.hand import Gait
 
@@ -15,6 +19,21 @@ class ScriptedPolicy:
 
     def __init__(self, gait: Gait | None = None) -> None:
         self._gait = gait or Gait()
+
+    @classmethod
+    def from_file(cls, path: Path) -> ScriptedPolicy:
+        """The best gait of a file that `search_gait` wrote.
+
+        Raises:
+            InputError: it cannot be read, or holds no gait.
+        """
+        try:
+            best = yaml.safe_load(path.read_text(encoding="utf-8"))["best"]
+            return cls(Gait(**best | {"phases": tuple(best["phases"])}))
+        except OSError as error:
+            raise InputError(f"policy=scripted:{path}: cannot be read: {error.strerror}") from error
+        except (UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+            raise InputError(f"policy=scripted:{path}: no gait of search_gait (key 'best')") from error
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Remember hand and direction."""

@@ -36,7 +36,7 @@ def load_mujoco() -> ModuleType:
     try:
         import mujoco
     except ImportError as error:
-        raise InputError("engine=mujoco needs the package mujoco: pip install 'tactile-cube[mujoco]'") from error
+        raise InputError("engine=mujoco needs the package mujoco: pip install mujoco") from error
     module: ModuleType = mujoco
     return module
 
