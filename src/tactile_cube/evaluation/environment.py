@@ -41,7 +41,7 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
     if trained is None:
         settings = OmegaConf.create(OmegaConf.to_container(config.untrained, resolve=True))
     else:
-        settings = OmegaConf.create(_checked(trained, source.label) | {"curriculum": None, "exploration": None})
+        settings = OmegaConf.create(_checked(dict(trained) | {"curriculum": None, "exploration": None}, source.label))
         constants = {
             "_target_": "tactile_cube.simulation.EpisodeConstants",
             "tip_spinning_friction": PUBLISHED_SPINNING_FRICTION,
