@@ -8,7 +8,6 @@ from tactile_cube.evaluation.environment import _checked, environment
 from tactile_cube.evaluation.policies import HoldPolicy
 from tactile_cube.evaluation.policy_source import PolicySource
 
-
 EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))
 
 

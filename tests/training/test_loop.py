@@ -166,6 +166,22 @@ def test_warm_start_from_other_shape_is_refused(tmp_path: Path) -> None:
             tiny_run(tmp_path / "next", agent_settings={"hidden": (8,)}, init_from=str(tmp_path / "first" / file))
 
 
+def test_a_run_can_begin_with_the_experience_of_another(tmp_path: Path) -> None:
+    first = tiny_run(tmp_path / "first", steps=80)
+    finish(first)
+    next_one = tiny_run(tmp_path / "next", init_from=str(tmp_path / "first" / "checkpoint.pt"), init_replay=True)
+    assert len(next_one.learner.replay) == len(first.learner.replay) > 0
+    assert torch.equal(next_one.learner.replay.rows, first.learner.replay.rows)
+    assert next_one.learner.steps == 0
+
+
+@pytest.mark.parametrize("file", ["policy.safetensors", "nothing/checkpoint.pt"])
+def test_a_policy_file_has_no_experience(file: str, tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path / "first", steps=80))
+    with pytest.raises(InputError, match=r"nothing|training\.init_replay=true.*policy\.safetensors"):
+        tiny_run(tmp_path / "next", init_from=str(tmp_path / "first" / file), init_replay=True)
+
+
 def test_faulty_transitions_never_reach_the_replay(tmp_path: Path) -> None:
     run = tiny_run(tmp_path, environment=tiny_environment(fault=0.2), agent_settings={"n_step": 3})
     finish(run)

@@ -85,6 +85,8 @@ def build_run(
         )
         if saved is not None:
             learner.load_state_dict(saved["learner"])
+        elif training.init_replay:
+            learner.replay.load_state_dict(replay_of(training.init_from))
         in_process = isinstance(collection, SingleCollection)
         processes = 1 if in_process else collector.workers + 1
         ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
@@ -135,6 +137,23 @@ def warm_start(agent: Agent, path: Path) -> None:
     else:
         state = load_checkpoint(path)
         _fit(path, lambda: agent.load_networks(state["learner"]["agent"]))
+
+
+def replay_of(init_from: str | None) -> dict[str, Any]:
+    """The experience in a run's newest checkpoint.
+
+    Raises:
+        InputError: there is no run, or it is damaged.
+    """
+    folder = Path(init_from).parent if init_from and Path(init_from).suffix != POLICY_SUFFIX else None
+    saved = Checkpoints(folder).load() if folder else None
+    if saved is None:
+        raise InputError(
+            f"training.init_replay=true: training.init_from is {init_from}, which has no experience; "
+            "name the folder of a run with a checkpoint"
+        )
+    replay: dict[str, Any] = saved["learner"]["replay"]
+    return replay
 
 
 def _fit(path: Path, load: Callable[[], None]) -> None:

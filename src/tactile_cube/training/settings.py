@@ -73,6 +73,8 @@ class TrainingSettings(BaseModel):
         log_iterations: iterations from one row of metrics to the next.
         resume: "auto" goes on from the newest checkpoint of this run folder; "never" starts over.
         init_from: checkpoint (.pt) or policy (.safetensors) whose networks the run starts from.
+        init_replay: take over the experience of `init_from`, a run's checkpoint then, as well: fine-tuning begins
+            with a full replay instead of the few steps it has made itself.
         actor_frozen: updates at the beginning that leave the actor as it is: after `init_from` a policy file, whose
             critics are fresh, they would lead it astray before they know what it is worth. None: as many as they need
             there, and none after a checkpoint, which brings its critics.
@@ -97,6 +99,7 @@ class TrainingSettings(BaseModel):
     log_iterations: PositiveInt = 5
     resume: Literal["auto", "never"] = "auto"
     init_from: str | None = None
+    init_replay: bool = False
     actor_frozen: PositiveInt | None = None
     stop_if_no_regrasp_by: PositiveInt | None = None
     regrasp_angle: PositiveFloat = 2.0
