@@ -6,7 +6,8 @@ Every draw is a pendulum-like joint of its own, recorded in three initialisation
 `identify` is told the effect's name and not its size. Counted are the effect's parameters and the constants fitted
 beside it. Writes coverage.json with every interval and its truth. With `--step 0.002` the recorded world takes the
 model's own steps: what is missed even then is the intervals' fault, what is missed in the finer world alone is the
-time step's. `--told` states that world's rate as controller.rate_hz, and the fit follows it.
+time step's. `--told` states that world's rate as controller.rate_hz, and the fit follows it. `--beside cogging@j` hides
+another effect, which nobody tells: the model is wrong then, and not its numbers alone.
 """
 
 from __future__ import annotations
@@ -50,8 +51,11 @@ class Interval:
         return self.low <= self.truth <= self.high
 
 
-def drawn(draw: int, seed: int, step: float, told: bool, folder: Path) -> list[Interval]:
-    """The intervals of one draw, recorded in simulation steps of `step` [s], and `told` as the controller's rate."""
+def drawn(draw: int, seed: int, step: float, told: bool, beside: list[str], folder: Path) -> list[Interval]:
+    """The intervals of one draw, recorded in simulation steps of `step` [s], and `told` as the controller's rate.
+
+    `beside`: effects that are hidden as well, and not told.
+    """
     rng = np.random.default_rng([seed, draw])
     effect = find_effect(EFFECTS[draw % len(EFFECTS)])
     truth = {one.name: float(one.typical * rng.uniform(*SIZE)) for one in effect.parameters}
@@ -59,7 +63,7 @@ def drawn(draw: int, seed: int, step: float, told: bool, folder: Path) -> list[I
     urdf.write_text(single_joint_urdf("rig", "j", rng.uniform(0.05, 0.15), rng.uniform(0.03, 0.08), limit=1.2))
     hidden = f"{effect.name}@j: " + ", ".join(f"{name}={value:.6g}" for name, value in truth.items())
     source = SimulatedRig(
-        urdf=str(urdf), controller=CONTROLLER, nominal=NOMINAL, hidden=[hidden], duration=6.0, true_spread=0.0,
+        urdf=str(urdf), controller=CONTROLLER, nominal=NOMINAL, hidden=[hidden, *beside], duration=6.0, true_spread=0.0,
         step=step, kinds=["ramps", "multisine", "policy"], validation=False,
     )  # fmt: skip
     write_recording(folder / str(draw), source.recordings(int(rng.integers(2**31)))[""])
@@ -103,13 +107,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--step", type=float, default=2.5e-4, help="of the recorded world [s]; the model takes 0.002")
     parser.add_argument("--told", action="store_true", help="recording.yaml states the rate of the world's controller")
+    parser.add_argument("--beside", action="append", default=[], help="an effect that is hidden as well and not told")
     parser.add_argument("--out", type=Path, default=Path("outputs/coverage"))
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     intervals: list[Interval] = []
     with tempfile.TemporaryDirectory() as folder:
         for draw in range(given.draws):
-            intervals += drawn(draw, given.seed, given.step, given.told, Path(folder))
+            intervals += drawn(draw, given.seed, given.step, given.told, given.beside, Path(folder))
             rows = [asdict(one) | {"holds": one.holds} for one in intervals]
             (given.out / "coverage.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
             print(f"{draw + 1} of {given.draws} draws\n{summary(intervals)}", flush=True)

@@ -9,6 +9,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.drivetrain.effects.backlash import Backlash
+from tactile_cube.drivetrain.effects.command_delay import CommandDelay
 from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.beginnings import with_beginnings
 from tactile_cube.identification.fitting.model import Model, Term
@@ -50,6 +51,16 @@ def test_segments_show_what_the_replay_logs(recording: Recording, gap: bool) -> 
     stretches = cut(logged, NOISE)
     error = (Shooting(logged, EFFECTS).positions([model], stretches)[0] - stretches.measured)[stretches.weight > 0.0]
     assert np.sqrt(np.mean(error**2)) < 5e-4, "a motor that floats jumps with the whole command"
+
+
+@pytest.mark.parametrize("delay", [0.010, 0.0135, 0.017])
+def test_a_delayed_jump_is_felt_when_it_acts_and_not_at_the_row(recording: Recording, delay: float) -> None:
+    plain = nominal_model(recording)
+    model = replace(plain, terms=tuple(Term(CommandDelay, joint, {"delay": delay}, ("delay",)) for joint in "ab"))
+    logged = measured(recording, model)
+    stretches = cut(logged, NOISE)
+    error = (Shooting(logged, EFFECTS).positions([model], stretches)[0] - stretches.measured)[stretches.weight > 0.0]
+    assert np.sqrt(np.mean(error**2)) < 4e-4, "a delay that is no whole number of rows leaves no more than one that is"
 
 
 def hidden_start(recording: Recording, place: float) -> tuple[Shooting, Model, Stretches]:

@@ -124,6 +124,11 @@ def precision(unknowns: Sequence[Unknown]) -> Array:
     return np.array([(u.scale / u.spread) ** 2 + 1e-9 for u in unknowns])
 
 
+def covariance(fitted: Fit) -> Array:
+    """What white noise of the sensors leaves (P, P), in units of the scales."""
+    return np.asarray(np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns))))
+
+
 def _information(problem: Problem, columns: Array) -> Array:
     return np.asarray(np.einsum("grp,grq->pq", columns, problem.free(columns), optimize=True))
 

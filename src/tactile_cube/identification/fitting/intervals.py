@@ -1,4 +1,4 @@
-"""Values with 95 % intervals: the final fit on all fitted trials, and what its residual says about its certainty."""
+"""Values with 95 % intervals: the final fit on all fitted trials, what its residual and its time step leave unsure."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
+from tactile_cube.identification.fitting.gauss_newton import Fit, covariance, fit
 from tactile_cube.identification.fitting.model import Model, Unknown, read_all
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.time_step import step_shift
 
 Array = NDArray[np.float64]
 NORMAL_95 = 1.96
@@ -18,44 +19,59 @@ NORMAL_95 = 1.96
 
 @dataclass(frozen=True)
 class Fitted:
-    """The final fit: the model and, for each unknown, the half width (P,) of its 95 % interval."""
+    """The final fit.
+
+    Attributes:
+        model: with the fitted values.
+        fit: where they come from.
+        half_width: (P,) of the 95 % interval that noise and misfit leave each unknown.
+        step_shift: (P,) by which each unknown would move in much shorter simulation steps.
+    """
 
     model: Model
     fit: Fit
     half_width: Array
+    step_shift: Array
 
 
 def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], iterations: int = 3) -> Fitted:
     """Refit constants and effects of a model on all stretches, with intervals."""
     problem.linearise_starts(model)
     fitted = fit(problem, model, unknowns, iterations)
-    return Fitted(fitted.model, fitted, NORMAL_95 * standard_errors(problem, fitted))
+    scales = np.array([u.scale for u in fitted.unknowns])
+    half_width = NORMAL_95 * standard_errors(problem, fitted) * scales
+    return Fitted(fitted.model, fitted, half_width, step_shift(problem, fitted) * scales)
 
 
 def standard_errors(problem: Problem, fitted: Fit) -> Array:
-    """Standard errors (P,) of the unknowns.
+    """Standard errors (P,) of the unknowns, in units of their scales.
 
     The residual of a model that is not perfect remembers itself; so the scatter of the score is taken segment by
     segment (cluster-robust), and never less than the sensor's noise alone would give.
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)
-    inverse = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)))
+    inverse = covariance(fitted)
     segments, unknowns = scores.shape
     correction = segments / max(segments - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse
-    variance = np.maximum(np.diag(robust), np.diag(inverse))
-    return np.asarray(np.sqrt(variance) * np.array([u.scale for u in fitted.unknowns]))
+    return np.asarray(np.sqrt(np.maximum(np.diag(robust), np.diag(inverse))))
 
 
 def bounds(fitted: Fitted) -> dict[tuple[str, str, int, int], tuple[float, float, float]]:
-    """(kind, key, place, initialisation) -> value and interval, cut at the unknown's own bounds."""
+    """(kind, key, place, initialisation) -> value and interval, cut at the unknown's own bounds.
+
+    The value is the best one in the model's own steps. The interval reaches from there to the best one in much shorter
+    steps, and beyond both by the half width.
+    """
     values = read_all(fitted.model, fitted.fit.unknowns)
+    below = fitted.half_width - np.minimum(fitted.step_shift, 0.0)
+    above = fitted.half_width + np.maximum(fitted.step_shift, 0.0)
     return {
         (u.kind, u.key, u.place, u.initialisation): (
             float(value),
-            float(min(max(value - half, u.low), value)),
-            float(max(min(value + half, u.high), value)),
+            float(min(max(value - less, u.low), value)),
+            float(max(min(value + more, u.high), value)),
         )
-        for u, value, half in zip(fitted.fit.unknowns, values, fitted.half_width, strict=True)
+        for u, value, less, more in zip(fitted.fit.unknowns, values, below, above, strict=True)
     }

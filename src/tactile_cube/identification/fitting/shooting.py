@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -43,6 +44,12 @@ class Shooting:
         dt = recording.step / steps_per_row(recording, self.time)
         self.plant = Plant([self.tree], dt=dt, effects=tuple(effects), joint_names=recording.joints)
         self.workers = min(4, len(os.sched_getaffinity(0)))
+
+    def finer(self, times: int) -> Shooting:
+        """The same in steps so many times as short, for stretches that are made finer likewise."""
+        fine = copy(self)
+        fine.plant = Plant([self.tree], self.plant.dt / times, self.plant.effects, self.recording.joints)
+        return fine
 
     @property
     def time(self) -> float:
@@ -176,12 +183,15 @@ class Shooting:
 def _jumps(acting: Array, stretches: Stretches) -> Array:
     """Simulated command at each reading less the one that the log feels (S, K segment, n).
 
-    Known exactly unless an effect changes the command on its way; then half the change from row to row, smoothed.
+    Known exactly unless an effect changes the command on its way; then half the change across the reading, smoothed
+    where a row is one step.
     """
     first, fine = stretches.history * stretches.substeps, stretches.substeps
     if np.array_equal(acting, stretches.commands[:, first:]):
         return stretches.jump
-    rows = acting[:, ::fine]
-    jumps = np.zeros_like(rows)
-    jumps[:, 1:-1] = 0.25 * (rows[:, 2:] - rows[:, :-2])
+    jumps = np.zeros_like(acting[:, ::fine])
+    if fine == 1:
+        jumps[:, 1:-1] = 0.25 * (acting[:, 2:] - acting[:, :-2])
+    else:
+        jumps[:, 1:] = 0.5 * (acting[:, fine + 1 :: fine] - acting[:, fine - 1 : -fine : fine])
     return jumps if stretches.read_after else -jumps
