@@ -14,7 +14,7 @@ def main(config: DictConfig) -> None:
     from pathlib import Path
 
     from tactile_cube.agent.policy_file import load_policy
-    from tactile_cube.evaluation.ancestry import read_ancestor
+    from tactile_cube.evaluation.ancestry import read_ancestry
     from tactile_cube.evaluation.model_card import model_card
     from tactile_cube.evaluation.policy_path import SHIPPED, policy_path
     from tactile_cube.evaluation.results_file import read_results
@@ -22,7 +22,7 @@ def main(config: DictConfig) -> None:
     source = policy_path(config.policy)
     _, info = load_policy(source)
     folders = [Path(folder) for folder in (*config.before, config.run or source.parent)]
-    runs = [read_ancestor(folder) for folder in folders]
+    runs = read_ancestry(folders)
     results = [read_results(Path(file)) for file in config.results]
     SHIPPED.mkdir(exist_ok=True)
     target = SHIPPED / f"{config.name}.safetensors"

@@ -9,6 +9,7 @@ from tactile_cube.env.task import DROPPED, RUNNING, TIME_LIMIT
 from tactile_cube.evaluation.gait_search import BOUNDS, search_gait, try_gait, write_gait
 from tactile_cube.hand import DLR_HAND2, Gait
 from tactile_cube.hand.gait import GaitRanges
+from tactile_cube.training.ledger import Costs
 
 
 class TurnsBySwing:
@@ -47,12 +48,14 @@ def worlds(kind: type[TurnsBySwing]) -> list[RotationEnv]:
 
 def test_a_search_finds_what_turns_more_and_says_what_it_cost() -> None:
     said: list[str] = []
+    booked: list[int] = []
     before = try_gait(worlds(TurnsBySwing), Gait(), seed=0)
-    found = search_gait(worlds(TurnsBySwing), generations=6, population=6, seed=0, say=said.append)
+    found = search_gait(worlds(TurnsBySwing), generations=6, population=6, seed=0, say=said.append, book=booked.append)
     assert found.best.score > 1.1 * before.score
     assert found.best.kept == 1.0
     assert found.tried == 36 + 4
-    assert found.cpu_seconds > 0.0
+    assert booked == [360, 720, 1080, 1440, 1800, 2160, found.steps]
+    assert found.steps == 30 * 2 * found.tried
     assert len(said) == 6
     for name, (low, high) in BOUNDS.items():
         assert low <= getattr(found.best.gait, name) <= high
@@ -71,11 +74,12 @@ def test_losing_the_object_halfway_leaves_a_quarter_of_the_angle() -> None:
 
 def test_what_is_written_are_ranges_that_demonstrations_can_draw_from(tmp_path: Path) -> None:
     found = search_gait(worlds(TurnsBySwing), 2, 4, seed=0, say=lambda line: None)
-    write_gait(tmp_path / "gait.yaml", found, seed=0)
+    write_gait(tmp_path / "gait.yaml", found, seed=0, costs=Costs(simulating=1800.0, wall=5400.0))
     written = yaml.safe_load((tmp_path / "gait.yaml").read_text())
     ranges = {key: value for key, value in written["gaits"].items() if key != "_target_"}
     drawn = GaitRanges(**ranges).draw(np.random.default_rng(0))
     assert drawn.phases == tuple(round(phase, 3) for phase in found.best.gait.phases)
     assert ranges["low"]["swing"] <= drawn.swing <= ranges["high"]["swing"]
     assert written["gaits_tried"] == found.tried
-    assert written["cpu_hours"] > 0.0
+    search = {"name": tmp_path.name, "steps": found.steps, "cpu_hours": 0.5, "wall_hours": 1.5}
+    assert ranges["search"].items() >= search.items()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import shlex
 import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.env import RotationEnv
 from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.hand import Gait
+from tactile_cube.training.ledger import Costs
 
 BOUNDS = {
     "swing": (0.3, 1.1),
@@ -41,12 +41,14 @@ class Trial:
         kept: share of the episodes that kept the object to the end.
         score: mean over the episodes of the final angle [rad]; where the object was lost, half of it, times the share
             of the time until then: a regrasp before a drop is worth something, one that holds much more.
+        steps: environment steps of the episodes.
     """
 
     gait: Gait
     angle: float
     kept: float
     score: float
+    steps: int
 
 
 @dataclass(frozen=True)
@@ -57,17 +59,22 @@ class Found:
         best: the gait with the best score when tried again in fresh episodes.
         elite: the best quarter of the last generations' gaits, best first.
         tried: number of gaits tried.
-        cpu_seconds: processor time of the search [s].
+        steps: environment steps of the search.
     """
 
     best: Trial
     elite: list[Trial]
     tried: int
-    cpu_seconds: float
+    steps: int
 
 
 def search_gait(
-    worlds: Sequence[RotationEnv], generations: int, population: int, seed: int, say: Callable[[str], None] = print
+    worlds: Sequence[RotationEnv],
+    generations: int,
+    population: int,
+    seed: int,
+    say: Callable[[str], None] = print,
+    book: Callable[[int], None] = lambda steps: None,
 ) -> Found:
     """Search by CMA-ES, beginning at the gait that is known.
 
@@ -77,8 +84,8 @@ def search_gait(
         population: gaits a generation.
         seed: of the search and of the episodes.
         say: takes a line a generation.
+        book: takes the environment steps so far, after each generation and at the end.
     """
-    begin = time.process_time()
     options = {"seed": seed + 1, "popsize": population, "verbose": -9, "maxiter": generations}
     strategy = cma.CMAEvolutionStrategy(_numbers(Gait()), 0.15, options)
     trials: list[Trial] = []
@@ -89,30 +96,34 @@ def search_gait(
         trials += tried
         best = max(tried, key=lambda trial: trial.score)
         say(f"generation {generation + 1}: best {best.score:.2f}, {best.angle:.2f} rad, kept {best.kept:.0%}")
+        book(sum(trial.steps for trial in trials))
     recent = trials[-max(4, len(trials) // 2) :]
     elite = sorted(recent, key=lambda trial: -trial.score)[: max(1, len(recent) // 4)]
     fresh = [try_gait(worlds, trial.gait, seed + 1000) for trial in elite[:5]]
     best = max(fresh, key=lambda trial: trial.score)
-    return Found(best, elite, len(trials) + len(fresh), time.process_time() - begin)
+    steps = sum(trial.steps for trial in (*trials, *fresh))
+    book(steps)
+    return Found(best, elite, len(trials) + len(fresh), steps)
 
 
 def try_gait(worlds: Sequence[RotationEnv], gait: Gait, seed: int) -> Trial:
     """Play a gait for one episode in each world."""
     task, hand = worlds[0].task, worlds[0].hand
     actions = gait.actions(hand, task.episode_steps, task.direction)
-    angles, shares = zip(*(_play(env, actions, seed, index) for index, env in enumerate(worlds)), strict=True)
+    angles, shares, steps = zip(*(_play(env, actions, seed, index) for index, env in enumerate(worlds)), strict=True)
     lost = np.array(shares) < 1.0
     score = float(np.mean(np.array(angles) * np.where(lost, 0.5 * np.array(shares), 1.0)))
-    return Trial(gait, float(np.mean(angles)), float(np.mean(np.array(shares) == 1.0)), score)
+    return Trial(gait, float(np.mean(angles)), float(np.mean(np.array(shares) == 1.0)), score, sum(steps))
 
 
-def _play(env: RotationEnv, actions: Array, seed: int, index: int) -> tuple[float, float]:
-    """Final angle [rad] and the share of the episode's time for which the object was kept."""
+def _play(env: RotationEnv, actions: Array, seed: int, index: int) -> tuple[float, float, int]:
+    """Final angle [rad], the share of the episode's time for which the object was kept, and its steps."""
     env.seed(seed, index)
     moment = env.reset()
     while not (moment.terminated or moment.truncated):
         moment = env.step(actions[moment.step])
-    return moment.theta, moment.step / env.task.episode_steps if moment.terminated else 1.0
+    share = moment.step / env.task.episode_steps if moment.terminated else 1.0
+    return moment.theta, share, moment.step
 
 
 def _numbers(gait: Gait) -> Array:
@@ -132,10 +143,11 @@ def _gait(numbers: Array) -> Gait:
     return Gait(**values, period=period, phases=phases)  # type: ignore[arg-type]
 
 
-def write_gait(path: Path, found: Found, seed: int) -> None:
+def write_gait(path: Path, found: Found, seed: int, costs: Costs) -> None:
     """Write the best gait, the ranges of the elite around it and what the search cost, as YAML.
 
-    Gaits of the elite whose fingers take turns as the best one's do give the ranges.
+    Gaits of the elite whose fingers take turns as the best one's do give the ranges. These say what the search cost,
+    so that the policies which they teach count it.
     """
     alike = [trial.gait for trial in found.elite if _turns_taken(trial.gait) == _turns_taken(found.best.gait)]
     rows = {name: [float(getattr(gait, name)) for gait in [*alike, found.best.gait]] for name in BOUNDS}
@@ -145,14 +157,19 @@ def write_gait(path: Path, found: Found, seed: int) -> None:
             "low": {name: round(min(row), 4) for name, row in rows.items()},
             "high": {name: round(max(row), 4) for name, row in rows.items()},
             "phases": [round(phase, 3) for phase in found.best.gait.phases],
+            "search": {
+                "name": path.parent.name,
+                "steps": found.steps,
+                "cpu_hours": round((costs.simulating + costs.learning) / 3600, 4),
+                "wall_hours": round(costs.wall / 3600, 4),
+                "commit": current_commit(),
+            },
         },
         "best": {**dataclasses.asdict(found.best.gait), "phases": list(found.best.gait.phases)},
         "angle": found.best.angle,
         "kept": found.best.kept,
         "gaits_tried": found.tried,
-        "cpu_hours": found.cpu_seconds / 3600,
         "seed": seed,
-        "commit": current_commit(),
         "command": shlex.join(["python", "-m", "tactile_cube.search_gait", *sys.argv[1:]]),
     }
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tactile_cube.agent.policy_file import PolicyInfo
-from tactile_cube.evaluation.ancestry import Ancestor, ancestry_table
+from tactile_cube.evaluation.ancestry import NONE, Ancestor, ancestry_table, total
 
 Results = dict[str, Any]
 
@@ -25,14 +25,14 @@ def model_card(name: str, info: PolicyInfo, runs: Sequence[Ancestor], results: S
     """
     task = info.config.get("task", {})
     filter_time, gravity = task.get("filter_time", "?"), task.get("gravity_scale", "?")
+    trained = [run for run in runs if run.settings]
     made = {
         "task": f"{task.get('name', '?')}, T_s {filter_time} s, gravity {gravity}",
-        "environment steps": ", then ".join(f"{run.steps:,} ({run.name})".replace(",", " ") for run in runs),
+        "environment steps": ", then ".join(f"{run.steps or 0:,} ({run.name})".replace(",", " ") for run in trained),
         "seed": info.seed,
         "commit": info.commit,
-        "teacher": "; ".join(f"{run.teacher} ({run.name})" for run in runs if run.teacher != "none") or "none",
-        "CPU hours": f"{sum(run.cpu_hours for run in runs):.2f} ({sum(run.hours['wall'] for run in runs):.2f} h on the "
-        "clock)",
+        "teacher": "; ".join(f"{run.teacher} ({run.name})" for run in trained if run.teacher != NONE) or NONE,
+        "CPU hours": total(runs),
         "network": f"{info.observation_size} -> {' -> '.join(map(str, info.hidden))} -> {info.action_size}",
     }
     lines = [

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 PLACES = np.radians([-90.0, 0.0, 90.0, 180.0])
 """Where ring, middle, fore and thumb stand around the cube."""
+SEARCH_KEYS = ("name", "steps", "cpu_hours", "wall_hours", "commit")
+"""What is known of the search behind a range of gaits."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +89,14 @@ class GaitRanges:
         low: the smallest of each number, by the names of `Gait`.
         high: the largest.
         phases: of every one of them.
+        search: what the search for them cost, for the cards of the policies that they teach: `name` of its folder,
+            `steps` of the environment, `cpu_hours`, `wall_hours` and `commit`, as far as they were recorded.
     """
 
     low: Mapping[str, float]
     high: Mapping[str, float]
     phases: tuple[float, ...] = Gait.phases
+    search: Mapping[str, float | str] | None = None
 
     def __post_init__(self) -> None:
         """Refuse names that no gait has, and bounds that do not fit."""
@@ -101,6 +106,8 @@ class GaitRanges:
                 raise InputError(f"exploration.gaits.{name}: give low and high for one of {', '.join(sorted(known))}")
             if self.low[name] > self.high[name]:
                 raise InputError(f"exploration.gaits.{name}: low {self.low[name]} is above high {self.high[name]}")
+        for name in set(self.search or {}) - set(SEARCH_KEYS):
+            raise InputError(f"exploration.gaits.search.{name}: not one of {', '.join(SEARCH_KEYS)}")
 
     def draw(self, rng: np.random.Generator) -> Gait:
         """Return one of them, all equally likely."""
