@@ -13,7 +13,8 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.measurement.comparing.postures import CORRELATED
 
 Array = NDArray[np.float64]
-CONVERGED = 2e-3  # relative gain below which a fit ends
+DAMPING = 1e-4  # of a first step, in units of the information
+CONVERGED = 2e-3  # relative gain below which a fit ends that only has to be compared with others
 SHORTER = (
     6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many
 )
@@ -48,6 +49,7 @@ def fit(
     unknowns: Sequence[Unknown],
     iterations: int = 4,
     frozen: Fit | None = None,
+    converged: float = CONVERGED,
 ) -> Fit:
     """Fit the unknowns of a model.
 
@@ -57,10 +59,11 @@ def fit(
         unknowns: what to fit; with `frozen`, beside its unknowns.
         iterations: most steps that are taken.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
+        converged: relative gain of a step below which the fit ends.
     """
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
     best = _linearised(problem, model, unknowns, everything, frozen)
-    damping = 1e-4
+    damping = DAMPING
     for _ in range(iterations):
         weight = temper(problem, best.cost)
         for _ in range(SHORTER):
@@ -73,10 +76,16 @@ def fit(
         gain = (best.cost - tried.cost) / max(best.cost, 1e-9)
         damping *= 0.3
         best = tried
-        if gain < CONVERGED:
+        if gain < converged:
             break
         best = _linearised(problem, best.model, unknowns, everything, frozen)
     return best
+
+
+def full_step(problem: Problem, model: Model, unknowns: Sequence[Unknown]) -> Array:
+    """Values (P,) of the unknowns one step from a model: the best ones, were the problem linear."""
+    near = _linearised(problem, model, unknowns, tuple(unknowns), None)
+    return read_all(_stepped(problem, near, 1.0, DAMPING), unknowns)
 
 
 def _linearised(
@@ -122,11 +131,6 @@ def surprise(model: Model, unknowns: Sequence[Unknown]) -> float:
 def precision(unknowns: Sequence[Unknown]) -> Array:
     """Weights (P,) of the expectations, per squared scale; a trace for those without, so that no direction is flat."""
     return np.array([(u.scale / u.spread) ** 2 + 1e-9 for u in unknowns])
-
-
-def covariance(fitted: Fit) -> Array:
-    """What white noise of the sensors leaves (P, P), in units of the scales."""
-    return np.asarray(np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns))))
 
 
 def _information(problem: Problem, columns: Array) -> Array:

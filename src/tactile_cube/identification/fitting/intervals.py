@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.gauss_newton import Fit, covariance, fit
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
 from tactile_cube.identification.fitting.model import Model, Unknown, read_all
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.time_step import step_shift
 
 Array = NDArray[np.float64]
 NORMAL_95 = 1.96
+UNDECIDED = 0.1  # squared error, in units of the residual's variance; 1 is a standard error of one unknown
 
 
 @dataclass(frozen=True)
@@ -34,13 +35,17 @@ class Fitted:
     step_shift: Array
 
 
-def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], iterations: int = 3) -> Fitted:
-    """Refit constants and effects of a model on all stretches, with intervals."""
+def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], iterations: int = 12) -> Fitted:
+    """Refit constants and effects of a model on all stretches, with intervals.
+
+    Where two numbers do nearly the same, the error is nearly flat along their valley: the fit goes on until a step
+    gains less than the noise decides.
+    """
     problem.linearise_starts(model)
-    fitted = fit(problem, model, unknowns, iterations)
+    fitted = fit(problem, model, unknowns, iterations, converged=UNDECIDED / np.count_nonzero(problem.weight))
     scales = np.array([u.scale for u in fitted.unknowns])
     half_width = NORMAL_95 * standard_errors(problem, fitted) * scales
-    return Fitted(fitted.model, fitted, half_width, step_shift(problem, fitted) * scales)
+    return Fitted(fitted.model, fitted, half_width, step_shift(problem, fitted))
 
 
 def standard_errors(problem: Problem, fitted: Fit) -> Array:
@@ -51,7 +56,7 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)
-    inverse = covariance(fitted)
+    inverse = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)))
     segments, unknowns = scores.shape
     correction = segments / max(segments - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse

@@ -7,27 +7,28 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.gauss_newton import Fit, covariance
+from tactile_cube.identification.fitting.gauss_newton import Fit, full_step
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.stretches import Stretches
 
 Array = NDArray[np.float64]
 FINER = 8  # times as short are the steps that show what the model's own ones do: 0.25 ms beside 2 ms
-TOGETHER = 12  # stretches that are simulated at once in finer steps, which bounds the memory they take
+ENOUGH = 12  # stretches that tell it, spread over the recording: up to 53 s of a finger
 
 
 def step_shift(problem: Problem, fitted: Fit) -> Array:
-    """How far the unknowns would move were the steps `FINER` times as short (P,), in units of their scales.
+    """How far the unknowns (P,) would move were the simulation's steps `FINER` times as short.
 
-    One simulation in finer steps shows what they change; the shift is the Gauss-Newton step that follows it, with the
-    derivatives of the fit.
+    A Gauss-Newton step in the finer simulation, less the one in the model's own: what noise moves moves alike in both.
     """
-    shooting, stretches = problem.shooting.finer(FINER), problem.stretches
-    turns = np.array_split(np.arange(len(stretches)), -(-len(stretches) // TOGETHER))
-    parts = [shooting.positions([fitted.model], finer(stretches.take(turn), FINER))[0] for turn in turns]
-    change = problem.residual(stretches.by_segment(np.concatenate(parts))) - fitted.residual
-    gradient = np.einsum("grp,gr->p", fitted.columns, problem.free(change), optimize=True)
-    return np.asarray(covariance(fitted) @ gradient)
+    stretches = problem.stretches
+    chosen = np.unique(np.linspace(0, len(stretches) - 1, ENOUGH).round().astype(np.int64))
+    part = stretches.take(chosen)
+    problems = [Problem(problem.shooting, part), Problem(problem.shooting.finer(FINER), finer(part, FINER))]
+    for one in problems:
+        one.linearise_starts(fitted.model)
+    own, fine = (full_step(one, fitted.model, fitted.unknowns) for one in problems)
+    return np.asarray(fine - own)
 
 
 def finer(stretches: Stretches, times: int) -> Stretches:
