@@ -11,7 +11,6 @@ import functools
 import hashlib
 import os
 import re
-import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,6 +22,7 @@ from tactile_cube.completion import install_script, prepare_query
 from tactile_cube.console_log import console_kept_in
 from tactile_cube.did_you_mean import did_you_mean
 from tactile_cube.errors import InputError
+from tactile_cube.run_folder import USAGE_ERROR, configuration_in
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -37,7 +37,6 @@ RECIPE = {"train": "curriculum"}
 """The experiment that a verb takes where the command line names none."""
 
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
-USAGE_ERROR = 2
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 LONGEST = 180
 """Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
@@ -109,8 +108,9 @@ def _run(name: str, function: Callable[["DictConfig"], None], after_sweep: Calla
         folder = Path(HydraConfig.get().runtime.output_dir)
         # errors inside Hydra, which otherwise adds lines of its own
         log = folder / f"{name}.log"
+        configuration = configuration_in(folder, config, log.name)
         try:
-            with _nothing_left_if_refused(folder, name), console_kept_in(log), _errors_in_one_line(wants_traceback):
+            with configuration, console_kept_in(log), _errors_in_one_line(wants_traceback):
                 function(config)
         except SystemExit as end:
             if HydraConfig.get().mode != RunMode.MULTIRUN or end.code == INTERRUPTED:
@@ -145,18 +145,6 @@ def _errors_in_one_line(wants_traceback: bool) -> Iterator[None]:
         if message is None:
             raise
         fail(message)
-
-
-@contextlib.contextmanager
-def _nothing_left_if_refused(folder: Path, name: str) -> Iterator[None]:
-    """Delete the folder of a command that was refused before it wrote anything."""
-    try:
-        yield
-    except SystemExit as refusal:
-        written = {path.name for path in folder.iterdir()} - {".hydra", ".lock", f"{name}.log"}
-        if refusal.code == USAGE_ERROR and not written and folder.resolve() != Path.cwd():
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
 
 
 def sweep_folder(overrides: str, seed: int) -> str:

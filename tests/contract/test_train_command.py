@@ -119,6 +119,18 @@ def test_wrong_value_ends_with_one_line_and_exit_code_2(tmp_path: Path) -> None:
     assert not (tmp_path / "outputs/train/smoke-seed0").exists()
 
 
+def test_a_refused_command_leaves_the_folder_of_a_run_that_was_there_as_it_was(tmp_path: Path) -> None:
+    folder = tmp_path / "outputs/train/smoke-seed0"
+    (folder / ".hydra").mkdir(parents=True)
+    before = {".hydra/config.yaml": "seed: 0\n", ".hydra/overrides.yaml": "- seed=0\n", "metrics.csv": "steps\n"}
+    for name, text in before.items():
+        (folder / name).write_text(text)
+    run = train("+experiment=smoke", "collector.worlds=0", folder=tmp_path)
+    assert run.returncode == 2
+    assert {name: (folder / name).read_text() for name in before} == before
+    assert "error: collector.worlds=0" in (folder / "train.log").read_text()
+
+
 def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
     short = ["+experiment=smoke", "collector=single", "collector.worlds=4", "training.learning_starts=100"]
     short += ["agent.precision=bf16"]
@@ -127,6 +139,9 @@ def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
     folder = tmp_path / "outputs/train/smoke-seed0"
     present = {path.name for path in folder.iterdir()}
     assert {"checkpoint.pt", "metrics.csv", "policy.safetensors", "ledger.json", ".hydra"} <= present
+    configuration = (folder / ".hydra/config.yaml").read_text()
+    assert "worlds: 4" in configuration
+    assert "training.steps=200" in (folder / ".hydra/overrides.yaml").read_text()
     assert "bf16" in first.stdout
     second = train(*short, "training.steps=400", folder=tmp_path)
     assert second.returncode == 0, second.stderr
