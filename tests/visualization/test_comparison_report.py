@@ -16,7 +16,7 @@ from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.units import of_joint
-from tactile_cube.visualization.comparison_episode import trial_starts, write_comparison
+from tactile_cube.visualization.comparison_episode import COLORS, trial_starts, write_comparison
 from tactile_cube.visualization.comparison_report import comparison_report
 from tactile_cube.visualization.comparison_summary import markdown, summary
 from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
@@ -239,6 +239,22 @@ def test_texts_are_escaped(tmp_path: Path) -> None:
 def test_the_summary_has_a_line_for_each_joint(comparison: Comparison) -> None:
     assert {"a", "b", "all"} <= {line.split()[0] for line in summary(comparison).splitlines() if line}
     assert "| a |" in markdown(comparison)
+
+
+CONTRAST = 2.5  # WCAG asks 3 of graphics; here a colour has to stand out on white and on black at once
+
+
+def luminance(color: tuple[int, ...]) -> float:
+    """Relative luminance of an sRGB colour. Source: WCAG 2.2."""
+    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in (one / 255 for one in color)]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+@pytest.mark.parametrize("name", COLORS)
+def test_curves_stand_out_in_the_light_theme_and_in_the_dark_one(name: str) -> None:
+    own = luminance(COLORS[name])
+    assert 1.05 / (own + 0.05) > CONTRAST
+    assert (own + 0.05) / 0.05 > CONTRAST
 
 
 def test_the_rerun_recording_is_written_with_all_trials(comparison: Comparison, tmp_path: Path) -> None:
