@@ -83,6 +83,12 @@ def test_a_row_names_the_commit_of_its_results() -> None:
     assert row.endswith("`python -m tactile_cube.evaluate protocol=paper` | abc123 |")
 
 
+def test_a_dirty_tree_is_called_one() -> None:
+    clean, dirty = (paper_page([results("paper") | {"commit": name}], []) for name in ("abc123", "abc123-dirty"))
+    assert "working tree" not in clean
+    assert "had changes in its working tree" in dirty
+
+
 @pytest.mark.parametrize("fact", ["acts in 30 %", "target's rate", "13 mm", "Spinning friction", "43 degrees"])
 def test_the_page_says_what_is_not_as_in_the_paper(fact: str) -> None:
     assert fact in paper_page([], [])

@@ -5,9 +5,11 @@ DIFFERENCES = {
         "A [scripted gait](../../src/tactile_cube/hand/gait.py) acts in 30 % of the training episodes and is "
         "imitated where the critics hold it for better. By itself it turns the cube, too, and drops it sooner or "
         "later: the row of the hand-crafted trajectory. Its shape was found by a search (`python -m "
-        "tactile_cube.search_gait` searches again), whose CPU hours belong to the cost of training; those of the "
-        "search behind the shipped gait were not recorded. The paper's runs find out by themselves; without the "
-        "teacher no run here has regrasped in the air ([levers](levers/README.md))."
+        "tactile_cube.search_gait` searches again), whose CPU hours belong to the cost of training. Those of the "
+        "search behind the gait that taught the policies of this page were not recorded; the gait of today's recipe "
+        "says [what its search cost](gait.yaml), and the cards of policies that it teaches count it. The paper's runs "
+        "find out by themselves; without the teacher no run here has regrasped in the air "
+        "([levers](levers/README.md))."
     ),
     "Reward": (
         "`reward=air`: a fifth of the published weights for moving the cube, a tenth for tilting it, a sixth for "

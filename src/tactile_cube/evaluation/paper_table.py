@@ -33,7 +33,8 @@ def paper_page(
         table1: the runs of `+experiment=table1`, as `read_sweep` gives them.
         free_finger: the comparison.json of a finger in free space, the paper's figure 4.
     """
-    parts = ["# The paper's results beside ours", INTRODUCTION, paper_rows(results, free_finger)]
+    rows = paper_rows(results, free_finger)
+    parts = ["# The paper's results beside ours", INTRODUCTION, rows, *([DIRTY] if "-dirty |" in rows else [])]
     parts += ["## What is not as in the paper", differences()]
     parts += _variant_section("Robustness", "perturbations", results)
     parts += [ROBUSTNESS_MAP] if any(one["protocol"] == "perturbations" for one in results) else []
@@ -54,6 +55,11 @@ INTRODUCTION = (
     "Written by `python -m tactile_cube.results` from the results files under docs/results/runs. Paper: Sievers, Pitz, "
     "Bäuml, *Learning Purely Tactile In-Hand Manipulation with a Torque-Controlled Hand*, ICRA 2022. Here everything "
     "is simulation; the paper's robot numbers are a real hand's."
+)
+
+DIRTY = (
+    "A commit that ends in `-dirty` had changes in its working tree when the command ran. What they were was not "
+    "recorded, so these rows may not come out the same; all others are of clean commits."
 )
 
 
