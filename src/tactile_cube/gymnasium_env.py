@@ -68,7 +68,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
             self._generator = torch.get_rng_state()
         shape = tuple(self._env.observation_spec["observation"].shape[1:])
         self.observation_space = gymnasium.spaces.Box(-FULL_TURN, FULL_TURN, shape, np.float32)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (12,), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (config.hand.joints,), np.float32)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -81,7 +81,9 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
             data = self._env.reset()
         if self._judged:
             offset = next(part.offset for part in self._env.transform if isinstance(part, JointOffset))
-            self._recorder = Recorder(self._task, np.broadcast_to(offset.double().numpy(), (1, 12))[0])
+            self._recorder = Recorder(
+                self._task, np.broadcast_to(offset.double().numpy(), (1, self._task.hand.joints))[0]
+            )
         return data["observation"][0].numpy().copy(), _info(data)
 
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -110,7 +112,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         """The scene of the last picture if the cube had this size, else a new one."""
         if self._scene is None or not np.array_equal(self._scene[0], cube_size):
             self._close_scene()
-            self._scene = cube_size, Scene(cube_size)
+            self._scene = cube_size, Scene(cube_size, self._task.hand, self._task.constants.object_shape)
         return self._scene[1]
 
     def _close_scene(self) -> None:

@@ -28,6 +28,8 @@ def make_rotation(
     randomization: str = "paper",
     start: str = "wide_yaw",
     engine: str = "bullet",
+    hand: str = "dlr_hand2",
+    object: str = "box",
     overrides: tuple[str, ...] = (),
     render_mode: str | None = None,
 ) -> GymnasiumRotation:
@@ -39,6 +41,8 @@ def make_rotation(
         randomization: option of the group of that name.
         start: option of the group of that name.
         engine: "bullet" or "mujoco".
+        hand: option of the group of that name.
+        object: option of the group of that name.
         overrides: further settings as on the command line, e.g. "task.filter_time=0.25".
         render_mode: "rgb_array", or None for no pictures.
     """
@@ -47,7 +51,14 @@ def make_rotation(
     from tactile_cube.composition import composed
     from tactile_cube.gymnasium_env import GymnasiumRotation
 
-    groups = {"task": task, "reward": reward, "randomization": randomization, "start": start}
+    groups = {
+        "hand": hand,
+        "object": object,
+        "task": task,
+        "reward": reward,
+        "randomization": randomization,
+        "start": start,
+    }
     groups |= {"exploration": "none", "curriculum": "none", "env": "rotation"}
     chosen = [f"+{group}={option}" for group, option in groups.items()]
     config = composed(None, [*chosen, "+model=null", f"+engine={engine}", *overrides])

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
 
+from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.senses import NumbPolicy, numb_reading
 from tactile_cube.evaluation.variant import Variant
+from tactile_cube.transforms import EnvConfig
 
 
 class Echo:
@@ -40,5 +42,5 @@ def test_nothing_is_felt_without_any_sense() -> None:
 
 def test_unknown_senses_are_refused() -> None:
     with pytest.raises(InputError, match=r"'nose'; choose from q_m, e_q, ring"):
-        Variant(numb=("nose",))
+        Variant(numb=("nose",)).apply(EnvConfig(Task("full")))
     assert not numb_reading(()).any()

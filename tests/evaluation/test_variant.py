@@ -50,7 +50,7 @@ def test_unknown_keys_are_refused(group: str) -> None:
 
 def test_a_pull_at_an_unknown_finger_is_refused() -> None:
     with pytest.raises(InputError, match="little"):
-        Pull("little", 1.0)
+        Variant(pull=Pull("little", 1.0)).apply(config())
 
 
 @pytest.mark.parametrize("name", sorted(catalogue()))

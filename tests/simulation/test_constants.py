@@ -48,6 +48,6 @@ def test_a_start_normalises_its_quaternion_and_refuses_zero() -> None:
         Start(np.zeros(12), cube_quaternion=(0, 0, 0, 0))
 
 
-def test_a_start_with_too_few_joints_is_refused() -> None:
-    with pytest.raises(InputError, match=r"start.angles has shape \(3,\)"):
-        Start(np.zeros(3))
+def test_a_start_whose_vectors_have_different_joints_is_refused() -> None:
+    with pytest.raises(InputError, match=r"start.velocities has shape \(3,\); give one number or 12"):
+        Start(np.zeros(12), velocities=np.zeros(3))

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tactile_cube.deployment.played_targets import PlayedTargets
     from tactile_cube.deployment.robot import Robot
     from tactile_cube.deployment.run_loop import LoopRun
+    from tactile_cube.hand import Hand
 
 
 @dataclass(frozen=True)
@@ -28,12 +29,14 @@ class DeploymentResult:
         turned: how far the simulated hand turned the cube in each run [rad]; empty on another hand.
         limits: of the commands.
         job: the call.
+        hand: the one that the policy was trained on.
     """
 
     runs: list[LoopRun]
     turned: list[float]
     limits: Limits
     job: Job
+    hand: Hand
 
     @property
     def text(self) -> str:
@@ -56,7 +59,7 @@ class DeploymentResult:
 
         logs = [run.log for run in self.runs if run.log.time]
         resolution = float(self.job.config.robot.get("resolution", 0.0))
-        return write_runs(logs, Path(folder), self.limits, self.rate, resolution) if logs else None
+        return write_runs(logs, Path(folder), self.limits, self.rate, resolution, self.hand) if logs else None
 
 
 @as_input_errors
@@ -80,20 +83,24 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
 
     from tactile_cube.deployment.run_loop import run_loop
     from tactile_cube.deployment.simulated_hand import SimulatedHand
+    from tactile_cube.deployment.trained_hand import trained_hand
 
     config, network = job.config, load_policy(job.config.policy)
     limits = contract_limits(network, float(config.rate_limit))
+    hand = trained_hand(network.info)
+    own = {"hand": hand} if str(config.robot._target_).startswith("tactile_cube.") else {}
     runs, turned = [], []
     for number in range(config.runs):
         seed = {"seed": config.seed + number} if "simulated" in str(config.robot._target_) else {}
-        robot: Robot = instantiate(config.robot, **seed)
+        # partial: hydra would make a dictionary of a hand that it is given
+        robot: Robot = instantiate(config.robot, _partial_=True, **seed)(**own)
         try:
             runs.append(run_loop(control_loop(job, network, limits), robot, say))
             if isinstance(robot, SimulatedHand) and robot.has_cube:
                 turned.append(robot.turned)
         finally:
             robot.close()
-    return DeploymentResult(runs, turned, limits, job)
+    return DeploymentResult(runs, turned, limits, job, hand)
 
 
 def control_loop(job: Job, network: Network, limits: Limits) -> ControlLoop:
@@ -103,19 +110,20 @@ def control_loop(job: Job, network: Network, limits: Limits) -> ControlLoop:
     from tactile_cube.deployment.control_loop import ControlLoop
     from tactile_cube.deployment.controller import Controller
     from tactile_cube.deployment.played_targets import excited_targets
+    from tactile_cube.deployment.trained_hand import trained_hand
     from tactile_cube.errors import InputError
 
-    config = job.config
+    config, hand = job.config, trained_hand(network.info)
     trained: Any = network.info.get("time_constant")
     time_constant = trained if config.filter_time is None else config.filter_time
     if time_constant is None:
         raise InputError("the policy file does not say its filter time T_s; give filter_time=SECONDS")
     if config.motion == "policy":
-        decides: Controller | PlayedTargets = Controller(network)
+        decides: Controller | PlayedTargets = Controller(network, hand)
     else:  # every run the same commands: repeats show the noise floor
-        decides = excited_targets(config.motion, float(config.reach), float(config.seconds), config.seed)
+        decides = excited_targets(config.motion, float(config.reach), float(config.seconds), config.seed, hand)
     rules, homing = instantiate(config.stop), instantiate(config.homing)
-    return ControlLoop(decides, float(time_constant), limits, rules, homing, float(config.seconds))
+    return ControlLoop(decides, float(time_constant), limits, rules, homing, float(config.seconds), hand)
 
 
 def contract_limits(network: Network, rate: float) -> Limits:
@@ -129,8 +137,8 @@ def contract_limits(network: Network, rate: float) -> Limits:
 
     from tactile_cube.deployment.interface_contract import trained_constants
     from tactile_cube.deployment.limits import Limits
-    from tactile_cube.hand import DLR_HAND2
+    from tactile_cube.deployment.trained_hand import trained_hand
 
-    trained = trained_constants(network.info)
-    gains = (np.full(12, trained["kp"]), np.full(12, trained["kd"]))
-    return Limits(DLR_HAND2.lower, DLR_HAND2.upper, rate, trained["torque_limit"], *gains)
+    trained, hand = trained_constants(network.info), trained_hand(network.info)
+    gains = (np.full(hand.joints, trained["kp"]), np.full(hand.joints, trained["kd"]))
+    return Limits(hand.lower, hand.upper, rate, trained["torque_limit"], *gains)

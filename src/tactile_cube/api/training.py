@@ -47,6 +47,13 @@ class TrainingResult:
         return read_curve(self.folder, self.folder.name).columns
 
 
+PUBLISHED: dict[str, dict[str, Any]] = {
+    "hand": {"_target_": "tactile_cube.hand.published_hand"},
+    "object": {"shape": "box", "size": 0.08, "mass": 0.05},
+}
+"""Hand and object of the paper, by the groups of conf/."""
+
+
 @as_input_errors
 def train(*settings: str, model: PathLike | None = None, folder: PathLike | None = None) -> TrainingResult:
     """Train a policy, or go on training it: the same call resumes.
@@ -119,4 +126,22 @@ def _plain(job: Job) -> dict[str, Any]:
     plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
     if job.config.model is not None:
         plain["env"]["model"] = read_model(job.config.model).model_dump()
+    return _without_published(plain)
+
+
+def _without_published(plain: dict[str, Any]) -> dict[str, Any]:
+    """A configuration that says nothing of hand and object where they are the published ones.
+
+    So runs and policies from before one could choose them stay the same.
+    """
+    environment = plain["env"]
+    constants = environment.get("constants") or {}
+    if "hand" not in environment or "object" not in constants:  # another environment than the package's
+        return plain
+    for group, published in PUBLISHED.items():
+        if constants.get(group) == published:
+            for tree in (plain, environment, constants):
+                tree.pop(group, None)
+    if not constants.keys() & PUBLISHED.keys():
+        constants["_target_"] = "tactile_cube.simulation.EpisodeConstants"
     return plain

@@ -14,7 +14,7 @@ from tactile_cube.deployment.limits import Limits
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.stop_rules import StopRules, Watchdog
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand import DLR_HAND2, Hand
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9  # [s] of clocks that add up ticks
@@ -42,7 +42,7 @@ class Decides(Protocol):
         """Begin a run."""
 
     def step(self, q_m: Array, q_f: Array) -> Array:
-        """Return q_n `(12,)` [rad] for measured angles and filtered targets `(12,)` [rad]."""
+        """Return q_n `(joints,)` [rad] for measured angles and filtered targets `(joints,)` [rad]."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,9 @@ class ControlLoop:
     Attributes:
         mode: what it is doing.
         reason: why it stopped; "" before.
-        q_n: desired angles of the policy `(12,)` [rad].
-        q_f: filtered ones `(12,)` [rad].
-        q_d: what was sent last `(12,)` [rad].
+        q_n: desired angles of the policy `(joints,)` [rad].
+        q_f: filtered ones `(joints,)` [rad].
+        q_d: what was sent last `(joints,)` [rad].
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class ControlLoop:
         rules: StopRules,
         homing: Homing,
         seconds: float,
-        hand: HandModel = DLR_HAND2,
+        hand: Hand = DLR_HAND2,
     ) -> None:
         if not seconds > 0:
             raise InputError(f"seconds is {seconds}; give a time above 0 s")
@@ -104,7 +104,7 @@ class ControlLoop:
         self._before = self._since = self._in_place = self._asked = 0.0
 
     def tick(self, now: float, reading: Reading | None) -> Array | None:
-        """Return the desired angles q_d `(12,)` [rad] to send, or None while nothing may be sent.
+        """Return the desired angles q_d `(joints,)` [rad] to send, or None while nothing may be sent.
 
         Args:
             now: time of this tick [s].

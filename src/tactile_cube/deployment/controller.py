@@ -8,16 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.network import Network
+from tactile_cube.deployment.trained_hand import trained_hand
 from tactile_cube.drivetrain.target_filter import low_pass
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand import Hand
 
 Array = NDArray[np.float64]
 
 POLICY_RATE = 10.0
 """Rate at which the policy is asked [Hz]."""
-READING = 24
-"""Numbers in one reading: q_m (12) and e_q (12)."""
+
+
+def reading_size(hand: Hand) -> int:
+    """Numbers in one reading: q_m and e_q of every joint."""
+    return 2 * hand.joints
 
 
 class Controller:
@@ -28,7 +32,7 @@ class Controller:
 
     Args:
         network: the policy.
-        hand: whose action range the outputs are scaled to.
+        hand: whose action range the outputs are scaled to; None: the one that it was trained on.
 
     Example:
         >>> controller = Controller(read_network(Path("policy.safetensors")))
@@ -36,16 +40,18 @@ class Controller:
         >>> q_n = controller.step(q_m, q_f)
     """
 
-    def __init__(self, network: Network, hand: HandModel = DLR_HAND2) -> None:
-        if network.observation_size % READING or network.action_size != len(hand.joint_names):
+    def __init__(self, network: Network, hand: Hand | None = None) -> None:
+        hand = hand or trained_hand(network.info)
+        self._reading = reading_size(hand)
+        if network.observation_size % self._reading or network.action_size != hand.joints:
             raise InputError(
                 f"the policy maps {network.observation_size} numbers to {network.action_size}; this controller "
-                f"gives it readings of {READING} and expects {len(hand.joint_names)} joints"
+                f"gives it readings of {self._reading} and expects {hand.joints} joints"
             )
         self._network = network
         self._middle = 0.5 * (hand.action_lower + hand.action_upper)
         self._half_range = 0.5 * (hand.action_upper - hand.action_lower)
-        self._readings = network.observation_size // READING
+        self._readings = network.observation_size // self._reading
         self._stack: NDArray[np.float32] | None = None
 
     def reset(self) -> None:
@@ -53,17 +59,17 @@ class Controller:
         self._stack = None
 
     def step(self, q_m: Array, q_f: Array) -> Array:
-        """Return the desired joint angles q_n `(12,)` [rad] for the next 0.1 s.
+        """Return the desired joint angles q_n `(joints,)` [rad] for the next 0.1 s.
 
         Args:
-            q_m: measured joint angles `(12,)` [rad], ring, middle, fore, thumb x (q1, q2, q3).
-            q_f: filtered targets at the same instant `(12,)` [rad].
+            q_m: measured joint angles `(joints,)` [rad], in the hand's order.
+            q_f: filtered targets at the same instant `(joints,)` [rad].
         """
         reading = np.concatenate([q_m, np.asarray(q_f) - q_m]).astype(np.float32)
         if self._stack is None:
             self._stack = np.tile(reading, self._readings)
         else:
-            self._stack = np.concatenate([self._stack[READING:], reading])
+            self._stack = np.concatenate([self._stack[self._reading :], reading])
         return np.asarray(self._middle + self._half_range * self._network(self._stack))
 
 
@@ -74,7 +80,7 @@ class TargetFilter:
     Attributes:
         time_constant: T_s [s]: 0.5 at the end of the paper's training.
         rate: of the fast loop [Hz]: 500 in simulation, 1000 on the robot.
-        filtered: q_f `(12,)` [rad]; set it to the measured angles before the first step.
+        filtered: q_f `(joints,)` [rad]; set it to the measured angles before the first step.
     """
 
     time_constant: float
@@ -82,7 +88,7 @@ class TargetFilter:
     filtered: Array = field(default_factory=lambda: np.zeros(12))
 
     def step(self, q_n: Array) -> Array:
-        """Advance by one period of the fast loop and return q_f `(12,)` [rad]."""
+        """Advance by one period of the fast loop and return q_f `(joints,)` [rad]."""
         for joint, goal in enumerate(q_n):
             self.filtered[joint] = low_pass(self.filtered[joint], goal, self.time_constant, 1.0 / self.rate)
         return self.filtered

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from tactile_cube.deployment.control_loop import Homing
-from tactile_cube.deployment.controller import POLICY_RATE, READING
+from tactile_cube.deployment.controller import POLICY_RATE, reading_size
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.stop_rules import StopRules
-from tactile_cube.hand import DLR_HAND2, HandModel
-from tactile_cube.hand.dlr_hand2 import KD, KP, TORQUE_LIMIT
+from tactile_cube.deployment.trained_hand import trained_hand
+from tactile_cube.hand import Hand
+from tactile_cube.hand.dlr_hand2 import DLR_HAND2, KD, KP, TORQUE_LIMIT
 
 FORMAT = "tactile_cube contract 2"
 FINGER = {
@@ -25,15 +26,17 @@ FINGER = {
 TOLERANCE = 1e-5  # between float32 products in different orders
 
 
-def interface_contract(network: Network, hand: HandModel = DLR_HAND2) -> dict[str, Any]:
-    """Return the contract of a policy, ready for JSON."""
+def interface_contract(network: Network, hand: Hand | None = None) -> dict[str, Any]:
+    """Return the contract of a policy on a hand, by default the one it was trained on, ready for JSON."""
+    hand = hand or trained_hand(network.info)
     names = list(hand.joint_names)
     constants = trained_constants(network.info)
     return {
         "format": FORMAT,
         "joints": names,
         "joint_convention": {
-            name: {"unit": "rad", "zero": 0.0, "direction": 1, "meaning": FINGER[name[-2:]]} for name in names
+            name: {"unit": "rad", "zero": 0.0, "direction": 1, "meaning": meaning}
+            for name, meaning in zip(names, _meanings(hand), strict=True)
         },
         "joint_range": {"lower": _plain(hand.lower), "upper": _plain(hand.upper), "unit": "rad"},
         "start_angles": {"angles": _plain(hand.start_angles), "unit": "rad", "homing": asdict(Homing())},
@@ -41,7 +44,7 @@ def interface_contract(network: Network, hand: HandModel = DLR_HAND2) -> dict[st
             "name": "observation",
             "shape": ["batch", network.observation_size],
             "dtype": "float32",
-            "readings": network.observation_size // READING,
+            "readings": network.observation_size // reading_size(hand),
             "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
             "unit": "rad, not scaled",
             "at_start": "the first reading fills all places",
@@ -83,11 +86,19 @@ def interface_contract(network: Network, hand: HandModel = DLR_HAND2) -> dict[st
     }
 
 
-def trained_constants(info: Mapping[str, Any]) -> dict[str, float]:
+def _meanings(hand: Hand) -> list[str]:
+    """What each joint does: known of the DLR-Hand II, else as its URDF says."""
+    if hand.name == DLR_HAND2.name:
+        return [FINGER[name[-2:]] for name in hand.joint_names]
+    return ["as in the URDF of the hand"] * hand.joints
+
+
+def trained_constants(info: Mapping[str, Any]) -> dict[str, Any]:
     """Return K_P, K_D and the torque limit that the policy was trained with, around which its gains were varied."""
     given = ((info.get("config") or {}).get("env") or {}).get("constants") or {}
-    published = {"kp": KP, "kd": KD, "torque_limit": TORQUE_LIMIT}
-    return {key: float(given.get(key, value)) for key, value in published.items()}
+    published = {"kp": KP, "kd": KD, "torque_limit": TORQUE_LIMIT} | dict(trained_hand(info).drive)
+    values = {key: given.get(key, published[key]) for key in ("kp", "kd", "torque_limit")}
+    return {key: _plain(value) if np.ndim(value) else float(value) for key, value in values.items()}
 
 
 def weights_hash(network: Network) -> str:
@@ -99,10 +110,12 @@ def weights_hash(network: Network) -> str:
     return digest.hexdigest()
 
 
-def _test_vector(network: Network, hand: HandModel) -> dict[str, Any]:
+def _test_vector(network: Network, hand: Hand) -> dict[str, Any]:
     """An observation that leaves no place at zero, and the action that belongs to it."""
     places = np.arange(network.observation_size)
-    rest = np.tile(np.concatenate([hand.start_angles, np.zeros(12)]), network.observation_size // READING)
+    rest = np.tile(
+        np.concatenate([hand.start_angles, np.zeros(hand.joints)]), network.observation_size // reading_size(hand)
+    )
     observation = (rest + 0.05 * np.sin(1.0 + places)).astype(np.float32)
     return {"observation": _plain(observation), "action": _plain(network(observation))}
 

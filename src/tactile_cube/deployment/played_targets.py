@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.controller import POLICY_RATE
-from tactile_cube.hand import DLR_HAND2
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.excitation import excitation
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class PlayedTargets:
         return np.asarray(row)
 
 
-def excited_targets(kind: str, reach: float, seconds: float, seed: int) -> PlayedTargets:
+def excited_targets(kind: str, reach: float, seconds: float, seed: int, hand: Hand = DLR_HAND2) -> PlayedTargets:
     """Return an excitation about the start angles, within the action range.
 
     Args:
@@ -41,10 +41,11 @@ def excited_targets(kind: str, reach: float, seconds: float, seed: int) -> Playe
         reach: half width [rad].
         seconds: length [s].
         seed: of its corners and phases.
+        hand: that moves.
 
     Raises:
         InputError: an unknown kind.
     """
-    home, hand = np.asarray(DLR_HAND2.start_angles), DLR_HAND2
+    home = np.asarray(hand.start_angles)
     low, high = np.maximum(home - reach, hand.action_lower), np.minimum(home + reach, hand.action_upper)
     return PlayedTargets(excitation(kind, low, high, seconds, POLICY_RATE, np.random.default_rng(seed)))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2
+from tactile_cube.hand import DLR_HAND2, Hand
 
 Array = NDArray[np.float64]
 
@@ -39,13 +39,14 @@ class Ros2Hand:
         zeros: Mapping[str, float] | None = None,
         directions: Mapping[str, int] | None = None,
         rate: float = 1000.0,
+        hand: Hand = DLR_HAND2,
     ) -> None:
         try:
             import rclpy
             from sensor_msgs.msg import JointState
         except ImportError as error:
             raise InputError(f"robot=ros2: {error}; source ROS 2's setup.bash, whose Python must be this one") from None
-        joints = DLR_HAND2.joint_names
+        joints = hand.joint_names
         _refuse_unknown(joints, names=names, zeros=zeros, directions=directions)
         self._names = [(names or {}).get(joint, joint) for joint in joints]
         self._zeros = np.array([(zeros or {}).get(joint, 0.0) for joint in joints])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.deployment.limits import Limits
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.hand import DLR_HAND2, hand_urdf
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.dlr_hand2 import REFLECTED_INERTIA, STATIC_FRICTION, STIFFNESS
 from tactile_cube.measurement.recordings.description import Controller, Coupling, Description, Sensors, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
@@ -34,7 +34,9 @@ class RunLog:
             self.time.append(reading.time)
             self.command.append(np.array(q_d))
             self.position.append(np.array(reading.q_m))
-            self.torque.append(np.full(12, np.nan) if reading.torque is None else np.array(reading.torque))
+            self.torque.append(
+                np.full(len(reading.q_m), np.nan) if reading.torque is None else np.array(reading.torque)
+            )
 
     def table(self, number: int) -> TrialTable:
         """The run as a trial of kind `policy`, its time from 0 [s]."""
@@ -45,7 +47,9 @@ class RunLog:
         return TrialTable(entry, time, np.array(self.command), np.array(self.position), measured)
 
 
-def write_runs(runs: Sequence[RunLog], folder: Path, limits: Limits, rate: float, resolution: float) -> Path:
+def write_runs(
+    runs: Sequence[RunLog], folder: Path, limits: Limits, rate: float, resolution: float, hand: Hand = DLR_HAND2
+) -> Path:
     """Write runs of the loop as one recording: of the hand alone, for no object is described.
 
     Args:
@@ -54,25 +58,30 @@ def write_runs(runs: Sequence[RunLog], folder: Path, limits: Limits, rate: float
         limits: of the loop; its gains are the controller's.
         rate: of the fast loop [Hz].
         resolution: of the measured angles [rad].
+        hand: that was run.
     """
-    names = list(DLR_HAND2.joint_names)
+    nominal = {"stiffness": STIFFNESS, "static_friction": STATIC_FRICTION, "reflected_inertia": REFLECTED_INERTIA}
+    told = {key: hand.drive.get(key, value) for key, value in nominal.items()}
+    followers = {
+        hand.chain_joints(k)[link]: hand.chain_joints(k)[leader]
+        for k in range(len(hand.fingers))
+        for link, leader in hand.coupled()
+    }
     description = Description(
         format=1,
-        gravity=[float(value) for value in DLR_HAND2.rotation.T @ (0.0, 0.0, -9.81)],
+        gravity=[float(value) for value in hand.rotation.T @ (0.0, 0.0, -9.81)],
         rate_hz=rate,
-        joints=names,
-        coupled={f"{finger.name}_q4": Coupling(joint=f"{finger.name}_q3") for finger in DLR_HAND2.fingers},
+        joints=list(hand.joint_names),
+        coupled={name: Coupling(joint=leader) for name, leader in followers.items()},
         controller=Controller(
             kp=[float(value) for value in limits.kp], kd=[float(value) for value in limits.kd],
             torque_limit=limits.torque,
         ),
-        nominal={
-            "stiffness": STIFFNESS, "static_friction": STATIC_FRICTION, "reflected_inertia": REFLECTED_INERTIA,
-        },
+        nominal={key: np.asarray(value).tolist() for key, value in told.items()},
         sensors=Sensors(read="before", position_resolution=resolution),
         trials=[TrialEntry(file="none")],
         source="log of the control loop",
     )  # fmt: skip
     tables = [run.table(number) for number, run in enumerate(runs)]
-    write_recording(folder, RecordingTables(description, hand_urdf(DLR_HAND2), tables))
+    write_recording(folder, RecordingTables(description, hand.urdf(), tables))
     return folder

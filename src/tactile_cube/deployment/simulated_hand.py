@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.hand import DLR_HAND2
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
+from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, constants_of
 
 Array = NDArray[np.float64]
 AWAY = (0.0, 0.0, -0.3)  # [m] where the cube waits
@@ -41,7 +41,8 @@ class SimulatedHand:
         opened: how far the fingers are from the start angles at first [rad].
         link: what gets lost on the way.
         seed: of noise and link.
-        constants: of the world; None: the published ones.
+        constants: of the world; None: those of the hand.
+        hand: which one.
     """
 
     def __init__(
@@ -54,16 +55,17 @@ class SimulatedHand:
         link: Disturbed | None = None,
         seed: int = 0,
         constants: EpisodeConstants | None = None,
+        hand: Hand = DLR_HAND2,
     ) -> None:
-        self._world = World(options=SimulationOptions(dt=1.0 / rate, substeps=1))
+        self._world = World(hand, options=SimulationOptions(dt=1.0 / rate, substeps=1))
         self._rate, self._noise, self._resolution = rate, noise, resolution
         self._cube, self._link = cube, link or Disturbed()
         self._rng = np.random.default_rng(seed)
-        self._given = constants or EpisodeConstants()
+        self._given = constants or constants_of(hand)
         self._ticks, self._late = 0, 0
-        home = np.asarray(DLR_HAND2.start_angles)
-        away = home - opened * np.tile([0.0, 1.0, 1.0], 4)
-        self._world.reset(self._constants(weight=0.0), Start(np.maximum(away, DLR_HAND2.lower), AWAY))
+        home = np.asarray(hand.start_angles)
+        away = home - opened * np.tile([0.0, *[1.0] * (hand.joints_per_finger - 1)], len(hand.fingers))
+        self._world.reset(self._constants(weight=0.0), Start(np.maximum(away, hand.lower), AWAY))
         self._q_d = np.array(self._world.q_m)
         self._yaw, self._last_yaw = 0.0, 0.0
 
@@ -95,7 +97,7 @@ class SimulatedHand:
         """Return what the sensors show now, unless it is lost."""
         if self._rng.random() < self._link.lost:
             return None
-        q_m = self._world.q_m + self._rng.normal(0.0, self._noise, 12)
+        q_m = self._world.q_m + self._rng.normal(0.0, self._noise, self._world.hand.joints)
         if self._resolution > 0.0:
             q_m = np.round(q_m / self._resolution) * self._resolution
         return Reading(self._ticks / self._rate, q_m, np.array(self._world.dq), np.array(self._world.torque))

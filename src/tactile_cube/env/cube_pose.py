@@ -6,6 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
 
 class CubePose(NamedTuple):
     """Pose of the cube in the world.
@@ -27,6 +31,21 @@ class CubePose(NamedTuple):
     phi: float
     psi: float
     tilt: float
+
+
+def frame_along(axis: Sequence[float] | NDArray[np.float64]) -> Rotation | None:
+    """The frame whose z axis is a direction of the world (3,); None for the vertical, which the world's own has."""
+    if np.array_equal(axis, (0.0, 0.0, 1.0)):
+        return None
+    return Rotation.align_vectors([axis], [(0.0, 0.0, 1.0)])[0]
+
+
+def seen_along(frame: Rotation | None, quaternion: Sequence[float]) -> Sequence[float]:
+    """An orientation (4,) x, y, z, w of the world as it is told in `frame`: turning about its z axis changes theta."""
+    if frame is None:
+        return quaternion
+    turned = frame.inv() * Rotation.from_quat(quaternion) * frame
+    return [float(part) for part in turned.as_quat()]
 
 
 def cube_pose(position: Sequence[float], quaternion: Sequence[float], previous_theta: float | None = None) -> CubePose:

@@ -40,9 +40,9 @@ def tilt(before: CubePose, after: CubePose) -> float:
     return abs(after.psi - before.psi) + abs(after.phi - before.phi)
 
 
-def proximal(joint_angles: Sequence[float]) -> float:
-    """Sum over the fingers of q1^4 [rad^4] for joint angles (12,): keeps the fingers from twisting."""
-    return sum(q**4 for q in joint_angles[::3])
+def proximal(joint_angles: Sequence[float], joints_per_finger: int = 3) -> float:
+    """Sum over the fingers of q1^4 [rad^4] for joint angles (joints,): keeps the fingers from twisting."""
+    return sum(q**4 for q in joint_angles[::joints_per_finger])
 
 
 def off_centre(first: CubePose, after: CubePose) -> float:

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from tactile_cube.env import reward as terms
 from tactile_cube.env.conditions import Conditions
-from tactile_cube.env.cube_pose import CubePose, cube_pose
+from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
 from tactile_cube.env.reward import REWARD_TERMS, Reward
 from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
-from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.randomization import Randomization, StartPoses
 from tactile_cube.simulation import EpisodeConstants, World
 
 Array = NDArray[np.float64]
 
-JOINTS = 12
-OBJECT_STATE = 25
+OBJECT = 13
+"""Numbers of the object in what only critics see; q_f follows."""
 LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))
 """Outcomes that end an episode because the cube left the allowed range."""
 
@@ -30,10 +30,10 @@ class Moment:
     """What the task says after a reset or a policy step.
 
     Attributes:
-        joint_position: q_m as the policy sees it, before sensor noise `(12,)` [rad].
-        control_error: e_q = q_f - q_m `(12,)` [rad].
-        object_state: what only the critic may see `(25,)`: cube position (3) [m], sin 4theta, cos 4theta, phi, psi,
-            linear velocity (3) [m/s], angular velocity (3) [rad/s], q_f (12) [rad]. Source: paper, section II.
+        joint_position: q_m as the policy sees it, before sensor noise `(joints,)` [rad].
+        control_error: e_q = q_f - q_m `(joints,)` [rad].
+        object_state: what only the critic may see `(13 + joints,)`: cube position (3) [m], sin 4theta, cos 4theta, phi,
+            psi, linear velocity (3) [m/s], angular velocity (3) [rad/s], q_f (joints) [rad]. Source: paper, section II.
         theta: rotation since the start in the rewarded direction, unwrapped [rad].
         reward_terms: the terms before weighing, in the order of REWARD_TERMS `(7,)`.
         reward: their weighted sum.
@@ -71,7 +71,7 @@ class RotationEnv:
         world: what simulates.
         constants: constants of the running episode.
         conditions: conditions of the next episode.
-        target: q_n of the last step `(12,)` [rad].
+        target: q_n of the last step `(joints,)` [rad].
 
     Example:
         >>> env = RotationEnv(World(), Task("table"), Reward(), Randomization(), StartStates().of(DLR_HAND2))
@@ -88,7 +88,7 @@ class RotationEnv:
         randomization: Randomization,
         start: StartPoses,
         constants: EpisodeConstants | None = None,
-        hand: HandModel = DLR_HAND2,
+        hand: Hand = DLR_HAND2,
     ) -> None:
         """Puts the task into `world`.
 
@@ -104,9 +104,9 @@ class RotationEnv:
         self.world, self.task, self.reward, self.randomization, self.hand = world, task, reward, randomization, hand
         self.nominal = EpisodeConstants() if constants is None else constants
         self.start_poses = start
+        self._frame = frame_along(task.axis_vector())
         self.conditions = task.conditions()
         self.constants = self.nominal
-        self.target = np.zeros(JOINTS)
         self.target = np.asarray(hand.start_angles, dtype=np.float64)
         self._middle = 0.5 * (np.asarray(hand.action_lower) + np.asarray(hand.action_upper))
         self._half_range = 0.5 * (np.asarray(hand.action_upper) - np.asarray(hand.action_lower))
@@ -129,12 +129,12 @@ class RotationEnv:
         self.world.reset(self.constants, self.start_poses.sample(self.randomization, self.constants, rng))
         self._weights = self.reward.weights(self.conditions.penalty_scale)
         self._limit = self.reward.fastest * self.world.options.policy_dt
-        self._first = self._pose = cube_pose(self.world.cube_position.tolist(), self.world.cube_quaternion.tolist())
+        self._first = self._pose = self._pose_now(None)
         self._moment = self._observe(np.zeros(len(REWARD_TERMS)), RUNNING, 0)
         return self._moment
 
     def step(self, action: Array) -> Moment:
-        """One policy step of 0.1 s with desired joint angles `action` (12,) in [-1, 1], scaled to the action range.
+        """One policy step of 0.1 s with desired joint angles `action` (joints,) in [-1, 1], scaled to the action range.
 
         Faulty physics ends the episode with the last sound state once more and no reward.
         """
@@ -143,8 +143,7 @@ class RotationEnv:
         step = self._moment.step + 1
         if self.world.healthy:
             before = self._pose
-            position, quaternion = self.world.cube_position.tolist(), self.world.cube_quaternion.tolist()
-            self._pose = cube_pose(position, quaternion, before.theta)
+            self._pose = self._pose_now(before.theta)
             outcome = self.task.outcome(self._first, self._pose, step)
             moment = self._observe(self._measure(before, self._pose, outcome), outcome, step)
             if math.isfinite(moment.reward + float(moment.object_state.sum() + moment.joint_position.sum())):
@@ -153,6 +152,10 @@ class RotationEnv:
         self._moment = self._fault(step)
         return self._moment
 
+    def _pose_now(self, previous_theta: float | None) -> CubePose:
+        quaternion = seen_along(self._frame, self.world.cube_quaternion.tolist())
+        return cube_pose(self.world.cube_position.tolist(), quaternion, previous_theta)
+
     def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
         return np.array(
             (
@@ -160,7 +163,7 @@ class RotationEnv:
                 terms.height(before, after),
                 terms.plane(before, after),
                 terms.tilt(before, after),
-                terms.proximal(self.world.q.tolist()),
+                terms.proximal(self.world.q.tolist(), self.hand.joints_per_finger),
                 terms.off_centre(self._first, after),
                 terms.leaving(outcome in LOST),
             )
@@ -169,12 +172,12 @@ class RotationEnv:
     def _observe(self, measured: Array, outcome: int, step: int) -> Moment:
         world, pose = self.world, self._pose
         q_m, q_f = world.q_m, world.q_f
-        state = np.empty(OBJECT_STATE)
+        state = np.empty(OBJECT + q_f.size)
         yaw = self.task.symmetry * pose.theta
         state[:7] = (pose.x, pose.y, pose.z, math.sin(yaw), math.cos(yaw), pose.phi, pose.psi)
         state[7:10] = world.cube_linear_velocity
         state[10:13] = world.cube_angular_velocity
-        state[13:] = q_f
+        state[OBJECT:] = q_f
         theta = self.task.direction * (pose.theta - self._first.theta)
         reward = float(measured @ self._weights)
         return Moment(np.array(q_m), q_f - q_m, state, theta, measured, reward, outcome, step)

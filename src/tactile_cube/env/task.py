@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_cube.env.conditions import Conditions
 from tactile_cube.env.cube_pose import CubePose
@@ -21,7 +23,7 @@ RUNNING, TIME_LIMIT, DROPPED, LEFT_RANGE, TILTED, LIFTED, FAULTY = range(len(OUT
 
 @dataclass(frozen=True)
 class Task:
-    """Rotate the cube about the vertical without losing it.
+    """Rotate the object about an axis of the world, the vertical by default, without losing it.
 
     Attributes:
         name: "table", "float" or "full"; only a label.
@@ -34,7 +36,9 @@ class Task:
         plane_range: distance from the start in x and y that ends the episode [m] (size not published).
         height_range: distance from the start in z that ends the episode [m] (size not published).
         tilt_limit: angle between the cube's z axis and the vertical that ends the episode [rad]; keeps theta defined.
-        symmetry: of the object about the vertical: critics see its yaw up to 1 / symmetry of a turn. Source: paper.
+        symmetry: of the object about the axis: critics see its angle up to 1 / symmetry of a turn. Source: paper.
+        axis: x, y, z or a direction of the world (3,). theta, phi, psi and the tilt are then told from this axis as
+            from the vertical; heights and the allowed range stay where gravity has them.
     """
 
     name: str
@@ -48,6 +52,7 @@ class Task:
     height_range: float = 0.04
     tilt_limit: float = 0.8
     symmetry: int = 4
+    axis: str | Sequence[float] = "z"
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
@@ -60,6 +65,17 @@ class Task:
                 raise InputError(f"task.{key} is {getattr(self, key)}; give a number >= 0")
         if self.direction not in (1, -1):
             raise InputError(f"task.direction is {self.direction}; give +1 or -1")
+        self.axis_vector()  # refuses what is no direction
+
+    def axis_vector(self) -> NDArray[np.float64]:
+        """The axis of the rotation as a unit vector (3,)."""
+        named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+        given = named.get(self.axis, ()) if isinstance(self.axis, str) else self.axis
+        vector = np.asarray(given, dtype=np.float64)
+        length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
+        if not (math.isfinite(length) and length > 0.0):
+            raise InputError(f"task.axis is {self.axis}; give x, y, z or three numbers that are not all zero")
+        return np.asarray(vector / length)
 
     def conditions(self) -> Conditions:
         """The task's own conditions, which a curriculum ends at."""

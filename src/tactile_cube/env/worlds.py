@@ -13,26 +13,28 @@ from torchrl.envs import EnvBase
 
 from tactile_cube.env.conditions import Conditions, Curriculum
 from tactile_cube.env.reward import REWARD_TERMS
-from tactile_cube.env.rotation import JOINTS, OBJECT_STATE, Moment, RotationEnv
+from tactile_cube.env.rotation import OBJECT, Moment, RotationEnv
 from tactile_cube.env.task import FAULTY, OUTCOMES
 
-FLOATS = {
-    "joint_position": JOINTS,
-    "control_error": JOINTS,
-    "object_state": OBJECT_STATE,
-    "theta": 1,
-    "reward_terms": len(REWARD_TERMS),
-}
-"""Keys and sizes of the real-valued observations, as Moment describes them."""
+
+def float_sizes(joints: int) -> dict[str, int]:
+    """Keys and sizes of the real-valued observations of a hand with so many joints, as Moment describes them."""
+    return {
+        "joint_position": joints,
+        "control_error": joints,
+        "object_state": OBJECT + joints,
+        "theta": 1,
+        "reward_terms": len(REWARD_TERMS),
+    }
 
 
 class WorldsEnv(EnvBase):  # type: ignore[misc]
     """Rotation tasks side by side, batch size `[worlds]`.
 
-    Keys: "joint_position" (12), "control_error" (12), "object_state" (25), "theta" (1), "reward_terms" (7),
-    "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1), "action" (12), "reward" (1), "done",
-    "terminated", "truncated" (1). Transitions whose "faulty" is true come from broken physics and must not be learned
-    from.
+    Keys, for a hand with 12 joints: "joint_position" (12), "control_error" (12), "object_state" (25), "theta" (1),
+    "reward_terms" (7), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1), "action" (12),
+    "reward" (1), "done", "terminated", "truncated" (1). Transitions whose "faulty" is true come from broken physics
+    and must not be learned from.
 
     Example:
         >>> env = WorldsEnv([RotationEnv(...), RotationEnv(...)])
@@ -51,13 +53,13 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         self._seed_tasks(0)
 
     def _make_specs(self) -> None:
-        n = len(self.tasks)
-        spec = Composite({key: Unbounded((n, size)) for key, size in FLOATS.items()}, shape=(n,))
+        n, joints = len(self.tasks), self.tasks[0].hand.joints
+        spec = Composite({key: Unbounded((n, size)) for key, size in float_sizes(joints).items()}, shape=(n,))
         spec["episode_step"] = Unbounded((n, 1), dtype=torch.int64)
         spec["outcome"] = Categorical(len(OUTCOMES), shape=(n, 1), dtype=torch.int64)
         spec["faulty"] = Categorical(2, shape=(n, 1), dtype=torch.bool)
         self.observation_spec = spec
-        self.action_spec = Bounded(-1.0, 1.0, (n, JOINTS))
+        self.action_spec = Bounded(-1.0, 1.0, (n, joints))
         self.reward_spec = Unbounded((n, 1))
         flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
         self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(n,))

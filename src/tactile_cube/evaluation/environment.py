@@ -19,6 +19,13 @@ PUBLISHED_SPINNING_FRICTION = 0.1
 PARTS = ("curriculum", "env", "randomization", "simulation", "transforms")
 """A policy file is data from somewhere: of the classes it names, only those that these packages list are made."""
 
+MAKERS = (
+    "tactile_cube.hand.hand_from_urdf",
+    "tactile_cube.hand.published_hand",
+    "tactile_cube.simulation.constants_of",
+)
+"""Functions that it may name besides: they make hands and constants of plain numbers."""
+
 
 def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None]) -> EnvConfig:
     """Return the environment of `source` with the overrides of the command line.
@@ -42,11 +49,10 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
         settings = OmegaConf.create(OmegaConf.to_container(config.untrained, resolve=True))
     else:
         settings = OmegaConf.create(_checked(dict(trained) | {"curriculum": None, "exploration": None}, source.label))
-        constants = {
-            "_target_": "tactile_cube.simulation.EpisodeConstants",
-            "tip_spinning_friction": PUBLISHED_SPINNING_FRICTION,
-        }
+        constants = {"tip_spinning_friction": PUBLISHED_SPINNING_FRICTION}
         settings.constants = OmegaConf.merge(constants, settings.get("constants") or {})
+        settings.constants["_target_"] = "tactile_cube.simulation.constants_of"
+        _set_hand_and_object(settings, config)
     if named:
         settings.model, settings.effects = config.model, config.effects or []
     for group in GROUPS:
@@ -57,15 +63,34 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
         settings, config.get("env") or {}, {} if source.stack is None else {"stack": source.stack}
     )
     _set_engine(settings, config.get("engine"))
+    made = _made(settings, source.label)
+    if source.joints not in (None, made.hand.joints):
+        raise InputError(
+            f"policy={source.label}: acts on {source.joints} joints, hand '{made.hand.name}' has {made.hand.joints}; "
+            "leave hand= out for the one it was trained on"
+        )
+    return made
+
+
+def _made(settings: Any, label: str) -> EnvConfig:
     try:
         made = hydra.utils.instantiate(settings)
     except hydra.errors.InstantiationException as error:
         if isinstance(error.__cause__, InputError):
             raise error.__cause__ from None
-        raise InputError(f"environment of policy={source.label}: {' '.join(str(error).split())}") from error
+        raise InputError(f"environment of policy={label}: {' '.join(str(error).split())}") from error
     if not isinstance(made, EnvConfig):
-        raise InputError(f"policy={source.label}: its configuration has no environment of this package")
+        raise InputError(f"policy={label}: its configuration has no environment of this package")
     return made
+
+
+def _set_hand_and_object(settings: Any, config: DictConfig) -> None:
+    """Those of the training unless others are asked for."""
+    for group in ("hand", "object"):
+        if group in config:
+            settings.constants[group] = config[group]
+    if "hand" in config:
+        settings.hand = config.hand
 
 
 def _set_engine(settings: Any, wanted: str | None) -> None:
@@ -87,7 +112,12 @@ def _checked(config: Mapping[str, Any], label: str) -> dict[str, Any]:
 
 
 def _is_part(target: str) -> bool:
-    """Whether it names a class that one of `PARTS` lists; by Hydra, tactile_cube.cli.os.system would be found too."""
+    """Whether it names one of `MAKERS` or a class that one of `PARTS` lists.
+
+    By Hydra, tactile_cube.cli.os.system would be found too.
+    """
+    if target in MAKERS:
+        return True
     module, _, name = target.rpartition(".")
     if module not in {f"tactile_cube.{part}" for part in PARTS}:
         return False

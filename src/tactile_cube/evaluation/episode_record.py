@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.hand.object_shape import ObjectShape
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ class ContactTable:
 
     Attributes:
         step: sample of the episode the row belongs to `(k,)`.
-        finger: 0 ring, 1 middle, 2 fore, 3 thumb `(k,)`.
+        finger: index into the record's `fingers` `(k,)`.
         position: where the finger touches the cube, world frame `(k, 3)` [m].
         force: contact force on the cube, friction included, world frame `(k, 3)` [N].
         normal_force: its part along the contact normal `(k,)` [N].
@@ -44,9 +45,9 @@ class EpisodeRecord:
     Attributes:
         time: `(n + 1,)` [s].
         theta: angle about the vertical, unwrapped, positive in the rewarded direction `(n + 1,)` [rad].
-        joint_position: q, true link angles `(n + 1, 12)` [rad].
-        filtered_target: q_f `(n + 1, 12)` [rad].
-        target: q_n that reached the hand in each step, in the encoders' coordinates `(n, 12)` [rad].
+        joint_position: q, true link angles `(n + 1, joints)` [rad].
+        filtered_target: q_f `(n + 1, joints)` [rad].
+        target: q_n that reached the hand in each step, in the encoders' coordinates `(n, joints)` [rad].
         cube_position: `(n + 1, 3)` [m].
         cube_quaternion: x, y, z, w `(n + 1, 4)`.
         reward: `(n,)`.
@@ -57,6 +58,9 @@ class EpisodeRecord:
         cube_size: edge lengths `(3,)` [m].
         constants: what was drawn for this episode and what the run was given (seed, T_s, gravity, ...).
         trace: signals at the physics rate, each `(m, ...)`, with "time" [s] among them.
+        fingers: of the hand, in the order of joint vectors; all have equally many joints.
+        object_shape: "box", "cylinder" or "capsule".
+        axis: of the rotation, in the world.
     """
 
     time: Array
@@ -74,6 +78,14 @@ class EpisodeRecord:
     cube_size: Array
     constants: dict[str, float | str] = field(default_factory=dict)
     trace: dict[str, Array] = field(default_factory=dict)
+    fingers: tuple[str, ...] = ("ring", "middle", "fore", "thumb")
+    object_shape: ObjectShape = "box"
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+
+    def of_finger(self, finger: int) -> slice:
+        """Where a finger's joints stand in joint vectors."""
+        count = self.joint_position.shape[1] // len(self.fingers)
+        return slice(count * finger, count * (finger + 1))
 
     @property
     def steps(self) -> int:
@@ -93,7 +105,9 @@ class EpisodeRecord:
         arrays |= {f"contacts.{name}": getattr(self.contacts, name) for name in CONTACT_FIELDS}
         arrays |= {f"reward.{name}": value for name, value in self.reward_terms.items()}
         arrays |= {f"trace.{name}": value for name, value in self.trace.items()}
-        arrays["meta"] = np.array(json.dumps([self.ending, self.direction, self.constants]))
+        arrays["meta"] = np.array(
+            json.dumps([self.ending, self.direction, self.constants, self.fingers, self.object_shape, self.axis])
+        )
         np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
 
     @classmethod
@@ -106,7 +120,8 @@ class EpisodeRecord:
         try:
             with np.load(path, allow_pickle=False) as archive:
                 data = dict(archive)
-            ending, direction, constants = json.loads(str(data["meta"]))
+            ending, direction, constants, *later = json.loads(str(data["meta"]))
+            hand = {"fingers": tuple(later[0]), "object_shape": later[1], "axis": tuple(later[2])} if later else {}
             contacts = ContactTable(**{name: data[f"contacts.{name}"] for name in CONTACT_FIELDS})
             return cls(
                 **{name: data[name] for name in ARRAY_FIELDS},
@@ -116,6 +131,7 @@ class EpisodeRecord:
                 direction=direction,
                 constants=constants,
                 trace=_with_prefix(data, "trace."),
+                **hand,
             )
         except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
             raise InputError(f"{path}: not an episode recorded by evaluate (*.npz): {error}") from error

@@ -17,6 +17,7 @@ from tactile_cube.evaluation.senses import NumbPolicy
 from tactile_cube.evaluation.summary import Summary, succeeded, summarise
 from tactile_cube.evaluation.variant import Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge
+from tactile_cube.hand import Hand
 from tactile_cube.transforms import EnvConfig, make_env
 
 Report = Callable[[str, EpisodeResult], None]
@@ -57,6 +58,11 @@ class Evaluation:
         self._config = _with_time_limit(config, protocol.seconds)
         self.protocol, self._policy, self._seed = protocol, policy, seed
 
+    @property
+    def hand(self) -> Hand:
+        """The hand that acts."""
+        return self._config.hand
+
     def run(self, report: Report) -> list[VariantResult]:
         """Run all episodes."""
         results = [self._run_variant(variant, report) for variant in self.protocol.conditions]
@@ -69,12 +75,12 @@ class Evaluation:
         config = variant.apply(self._config)
         traced = dataclasses.replace(config.simulation, trace=self.protocol.trace)
         env = make_env(dataclasses.replace(config, simulation=traced), 1, self._seed, evaluation=True)
-        policy = NumbPolicy(self._policy, variant.numb) if variant.numb else self._policy
+        policy = NumbPolicy(self._policy, variant.numb, self.hand) if variant.numb else self._policy
         return self._closing(env, policy, result.seed, variant.pull)
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
         env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
-        policy = NumbPolicy(self._policy, variant.numb) if variant.numb else self._policy
+        policy = NumbPolicy(self._policy, variant.numb, self.hand) if variant.numb else self._policy
         results = []
         for episode in range(self.protocol.episodes):
             seed = episode_seed(self._seed, episode)

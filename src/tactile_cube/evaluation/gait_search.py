@@ -87,7 +87,7 @@ def search_gait(
         book: takes the environment steps so far, after each generation and at the end.
     """
     options = {"seed": seed + 1, "popsize": population, "verbose": -9, "maxiter": generations}
-    strategy = cma.CMAEvolutionStrategy(_numbers(Gait()), 0.15, options)
+    strategy = cma.CMAEvolutionStrategy(_numbers(Gait().of(worlds[0].hand)), 0.15, options)
     trials: list[Trial] = []
     for generation in range(generations):
         asked = strategy.ask()

@@ -26,7 +26,7 @@ class Policy(Protocol):
         """Begin an episode that has just been reset."""
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
-        """Return the action `(12,)` in [-1, 1] for the stacked observation `(120,)`."""
+        """Return the action `(joints,)` in [-1, 1] for the stacked observation."""
 
 
 class ActorPolicy:
@@ -52,7 +52,8 @@ class HoldPolicy:
         """Aim the fingertips `SQUEEZE` inside the faces."""
         world = env.world
         size = np.asarray(env.constants.cube_size)
-        angles = grasp_angles(env.hand, size, world.cube_position, world.cube_quaternion, clearance=-SQUEEZE)
+        pose, shape = (world.cube_position, world.cube_quaternion), env.constants.object_shape
+        angles = grasp_angles(env.hand, size, *pose, clearance=-SQUEEZE, shape=shape)
         self._action = env.hand.action_of(angles)
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
@@ -65,11 +66,11 @@ class RandomPolicy:
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Seed the draws."""
-        self._rng = np.random.default_rng(seed)
+        self._rng, self._joints = np.random.default_rng(seed), env.hand.joints
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return a fresh draw."""
-        return self._rng.uniform(-1.0, 1.0, 12)
+        return self._rng.uniform(-1.0, 1.0, self._joints)
 
 
 class ReplayPolicy:

@@ -17,9 +17,6 @@ BASELINES: dict[str, type[HoldPolicy] | type[RandomPolicy] | type[ScriptedPolicy
     "random": RandomPolicy,
     "scripted": ScriptedPolicy,
 }
-READING = 24
-"""Numbers in one reading of the observation: q_m (12) and e_q (12)."""
-JOINTS = 12
 
 
 @dataclass(frozen=True)
@@ -32,6 +29,7 @@ class PolicySource:
         provenance: seed, steps, commit and the like of its training, for the results file.
         config: configuration of its training, or empty.
         stack: readings in its observation, or None when it reads none.
+        joints: that it acts on, or None when it takes those of any hand.
     """
 
     policy: Policy
@@ -39,6 +37,7 @@ class PolicySource:
     provenance: dict[str, Any] = field(default_factory=dict)
     config: Mapping[str, Any] = field(default_factory=dict)
     stack: int | None = None
+    joints: int | None = None
 
 
 def find_policy(name: str | None) -> PolicySource:
@@ -65,8 +64,10 @@ def find_policy(name: str | None) -> PolicySource:
 
 def _from_file(path: Path) -> PolicySource:
     actor, info = load_policy(path)
-    stack = max(1, info.observation_size // READING)
-    require_sizes(path, info, stack * READING, JOINTS)
+    joints = info.action_size
+    reading = 2 * joints  # q_m and e_q
+    stack = max(1, info.observation_size // reading)
+    require_sizes(path, info, stack * reading, joints)
     file = path.name if path.parent == SHIPPED else str(path)
     provenance = {"file": file, **info.model_dump(exclude={"config"})}
-    return PolicySource(ActorPolicy(actor), path.stem, provenance, info.config, stack)
+    return PolicySource(ActorPolicy(actor), path.stem, provenance, info.config, stack, joints)

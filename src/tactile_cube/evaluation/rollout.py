@@ -12,7 +12,6 @@ from torchrl.envs import TransformedEnv
 from tactile_cube.env import OUTCOMES, REWARD_TERMS, RotationEnv
 from tactile_cube.evaluation.episode_record import Array, ContactTable, EpisodeRecord
 from tactile_cube.evaluation.policies import Policy
-from tactile_cube.evaluation.touch import FINGERS
 from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.transforms import JointOffset
 
@@ -36,7 +35,7 @@ def run_episode(
     task: RotationEnv = env.base_env.tasks[0]
     policy.start(task, seed)
     offset = next(part.offset for part in env.transform if isinstance(part, JointOffset))
-    recorder = Recorder(task, np.broadcast_to(offset.double().numpy(), (1, 12))[0])
+    recorder = Recorder(task, np.broadcast_to(offset.double().numpy(), (1, task.hand.joints))[0])
     finished, step = False, 0
     while not finished:
         if interference is not None:
@@ -54,6 +53,7 @@ class Recorder:
 
     def __init__(self, task: RotationEnv, joint_offset: Array) -> None:
         self._task, self._joint_offset = task, joint_offset
+        self._fingers = tuple(finger.name for finger in task.hand.fingers)
         self._rows: dict[str, list[Array]] = {name: [] for name in WORLD_SIGNALS}
         self._contacts: list[tuple[int, int, Array, Array, float, float]] = []
         self._trace: list[dict[str, Array]] = []
@@ -84,7 +84,7 @@ class Recorder:
             theta=np.array(self._theta),
             joint_position=np.array(self._rows["q"]),
             filtered_target=np.array(self._rows["q_f"]),
-            target=np.array(self._targets).reshape(-1, 12),
+            target=np.array(self._targets).reshape(-1, task.hand.joints),
             cube_position=np.array(self._rows["cube_position"]),
             cube_quaternion=np.array(self._rows["cube_quaternion"]),
             reward=np.array(self._reward),
@@ -94,6 +94,9 @@ class Recorder:
             direction=task.task.direction,
             cube_size=np.array(task.constants.cube_size),
             constants={"seed": float(seed), **_numbers(task.constants)},
+            fingers=self._fingers,
+            object_shape=task.constants.object_shape,
+            axis=tuple(task.task.axis_vector().tolist()),
             trace={name: np.concatenate([piece[name] for piece in self._trace]) for name in names},
         )
 
@@ -102,9 +105,9 @@ class Recorder:
         for name, rows in self._rows.items():
             rows.append(np.array(getattr(world, name)))
         for contact in world.contacts():
-            if contact.other == "cube" and contact.finger in FINGERS:
+            if contact.other == "cube" and contact.finger in self._fingers:
                 force = contact.force * contact.normal + contact.friction
-                finger = FINGERS.index(contact.finger)
+                finger = self._fingers.index(contact.finger)
                 self._contacts.append((sample, finger, contact.position, force, contact.force, contact.distance))
 
     def _contact_table(self) -> ContactTable:
@@ -121,11 +124,12 @@ class Recorder:
         )
 
 
+NO_NUMBERS = ("effects", "joints", "object_shape")
 WORLD_SIGNALS = ("q", "q_f", "cube_position", "cube_quaternion")
 
 
 def _numbers(constants: EpisodeConstants) -> dict[str, float | str]:
     """Return the scalar constants of the episode for its label; vectors over the joints by their mean."""
-    fields = (field.name for field in dataclasses.fields(constants) if field.name != "effects")
+    fields = (field.name for field in dataclasses.fields(constants) if field.name not in NO_NUMBERS)
     values = {name: getattr(constants, name) for name in fields}
     return {name: float(np.mean(value)) for name, value in values.items() if value is not None}

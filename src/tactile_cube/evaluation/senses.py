@@ -11,22 +11,22 @@ from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.evaluation.policies import Policy
-from tactile_cube.evaluation.touch import FINGERS
+from tactile_cube.hand import DLR_HAND2, Hand
 
-_JOINT = np.arange(24) % 12
-SENSES: dict[str, NDArray[np.bool_]] = {
-    "q_m": np.arange(24) < 12,
-    "e_q": np.arange(24) >= 12,
-    **{finger: np.isin(_JOINT // 3, index) for index, finger in enumerate(FINGERS)},
-}
-"""Which of the 24 numbers of a reading belong to each sense: measured angles, control errors, all of one finger's."""
+
+def senses(hand: Hand) -> dict[str, NDArray[np.bool_]]:
+    """Which of the numbers of a reading belong to each sense: measured angles, control errors, all of one finger's."""
+    places = np.arange(2 * hand.joints)
+    finger = places % hand.joints // hand.joints_per_finger
+    own = {one.name: finger == index for index, one in enumerate(hand.fingers)}
+    return {"q_m": places < hand.joints, "e_q": places >= hand.joints, **own}
 
 
 class NumbPolicy:
     """Another policy whose senses are partly frozen at the first observation of the episode."""
 
-    def __init__(self, policy: Policy, numb: Sequence[str]) -> None:
-        self._policy, self._numb = policy, numb_reading(numb)
+    def __init__(self, policy: Policy, numb: Sequence[str], hand: Hand = DLR_HAND2) -> None:
+        self._policy, self._numb = policy, numb_reading(numb, hand)
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Begin an episode."""
@@ -40,13 +40,14 @@ class NumbPolicy:
         return self._policy.act(np.where(numb, self._first, observation), step)
 
 
-def numb_reading(numb: Sequence[str]) -> NDArray[np.bool_]:
-    """Return which of the 24 numbers of a reading are frozen.
+def numb_reading(numb: Sequence[str], hand: Hand = DLR_HAND2) -> NDArray[np.bool_]:
+    """Return which of the numbers of a reading are frozen.
 
     Raises:
         InputError: there is no such sense.
     """
+    known = senses(hand)
     for name in numb:
-        if name not in SENSES:
-            raise InputError(f"variant.numb has {name!r}; choose from {', '.join(SENSES)}")
-    return np.any([SENSES[name] for name in numb], axis=0) if numb else np.zeros(24, dtype=np.bool_)
+        if name not in known:
+            raise InputError(f"variant.numb has {name!r}; choose from {', '.join(known)}")
+    return np.any([known[name] for name in numb], axis=0) if numb else np.zeros(2 * hand.joints, dtype=np.bool_)

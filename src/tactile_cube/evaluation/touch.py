@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 
-FINGERS = ("ring", "middle", "fore", "thumb")
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 TOUCH_FORCE = 0.02
 """Smallest normal force that counts as touching [N]: a twenty-fifth of the cube's weight."""
@@ -35,9 +34,9 @@ class FingerHistory:
 
 
 def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
-    """Return which finger touches the cube at each sample `(n + 1, 4)`."""
+    """Return which finger touches the cube at each sample `(n + 1, fingers)`."""
     table = record.contacts
-    result = np.zeros((record.steps + 1, len(FINGERS)), dtype=bool)
+    result = np.zeros((record.steps + 1, len(record.fingers)), dtype=bool)
     firm = table.normal_force > TOUCH_FORCE
     result[table.step[firm], table.finger[firm]] = True
     return result

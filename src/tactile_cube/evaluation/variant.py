@@ -13,8 +13,7 @@ from tactile_cube.drivetrain.effects import Effect, resolve
 from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.senses import numb_reading
-from tactile_cube.evaluation.touch import FINGERS
-from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 from tactile_cube.transforms import EnvConfig
 
@@ -27,7 +26,7 @@ class Pull:
     """A force on one fingertip, as when somebody pulls at the finger.
 
     Attributes:
-        finger: ring, middle, fore or thumb.
+        finger: its name, of the DLR-Hand II ring, middle, fore or thumb.
         force: away from the cube's axis, horizontally [N].
         start: when it begins [s].
         duration: how long it lasts [s].
@@ -38,19 +37,21 @@ class Pull:
     start: float = 3.0
     duration: float = 1.0
 
-    def __post_init__(self) -> None:
-        """Refuse unknown fingers."""
-        if self.finger not in FINGERS:
-            raise InputError(f"pull.finger is {self.finger!r}; choose one of {', '.join(FINGERS)}")
-
     def __call__(self, env: RotationEnv, step: int) -> None:
         """Pull, or let go, before the policy step that comes."""
         time = step * env.world.options.policy_dt
-        finger = FINGERS.index(self.finger)
+        finger = self.check(env.hand)
         tip = env.world.tip_positions[finger]
         outward = tip * [1.0, 1.0, 0.0] / np.linalg.norm(tip[:2])
         acting = self.start <= time < self.start + self.duration
         env.world.pull_finger(finger, self.force * outward if acting else np.zeros(3))
+
+    def check(self, hand: Hand) -> int:
+        """Refuse fingers that a hand does not have; gives the finger's index."""
+        fingers = [finger.name for finger in hand.fingers]
+        if self.finger not in fingers:
+            raise InputError(f"pull.finger is {self.finger!r}; choose one of {', '.join(fingers)}")
+        return fingers.index(self.finger)
 
 
 @dataclass(frozen=True)
@@ -84,10 +85,16 @@ class Variant:
             for key in getattr(self, group):
                 if key not in known:
                     raise InputError(f"variant {self.name}: {group}.{key} is unknown; choose from {', '.join(known)}")
-        numb_reading(self.numb)
 
     def apply(self, config: EnvConfig) -> EnvConfig:
-        """Return the environment with this change."""
+        """Return the environment with this change.
+
+        Raises:
+            InputError: the hand has no such finger or sense.
+        """
+        numb_reading(self.numb, config.hand)
+        if self.pull is not None:
+            self.pull.check(config.hand)
         constants = {key: _plain(value) for key, value in self.constants.items()}
         values = {key: value for key, value in config.randomization.values.items() if key not in constants}
         return dataclasses.replace(
@@ -95,11 +102,14 @@ class Variant:
             constants=dataclasses.replace(config.constants, **constants),
             randomization=dataclasses.replace(config.randomization, values=values),
             simulation=dataclasses.replace(config.simulation, **self.simulation),
-            effects=[*config.effects, *(effect for name in self.effects for effect in typical_effects(name))],
+            effects=[
+                *config.effects,
+                *(effect for name in self.effects for effect in typical_effects(name, config.hand)),
+            ],
         )
 
 
-def typical_effects(name: str, hand: HandModel = DLR_HAND2) -> list[Effect]:
+def typical_effects(name: str, hand: Hand = DLR_HAND2) -> list[Effect]:
     """Return an effect at its typical size, one for each joint `name` matches (all of them without an `@`)."""
     return [
         effect(joint, **{parameter.name: parameter.typical for parameter in effect.parameters})

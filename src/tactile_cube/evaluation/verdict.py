@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.exploits import exploits, tilt
-from tactile_cube.evaluation.touch import FINGERS, finger_history
+from tactile_cube.evaluation.touch import finger_history
 
 REGRASP_ANGLE = 2.0
 """Final angle beyond which four fingers that never let go cannot have turned the cube [rad].
@@ -92,7 +92,7 @@ class EpisodeResult:
 
 def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResult:
     """Reduce an episode to its row."""
-    histories = [finger_history(record, finger) for finger in range(len(FINGERS))]
+    histories = [finger_history(record, finger) for finger in range(len(record.fingers))]
     angle = float(record.theta[-1] - record.theta[0])
     late = float(record.theta[-1] - record.theta[round((1.0 - LATE_SHARE) * record.steps)])
     changes = tuple(history.face_changes for history in histories)

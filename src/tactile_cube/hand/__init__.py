@@ -1,18 +1,24 @@
 """What the mechanism is: the hand's geometry, masses and limits, its kinematics and its URDF description."""
 
-from tactile_cube.hand.dlr_hand2 import DLR_HAND2
+from tactile_cube.hand.dlr_hand2 import DLR_HAND2, published_hand
 from tactile_cube.hand.gait import Gait
+from tactile_cube.hand.hand import Hand
 from tactile_cube.hand.kinematics import finger_angles, grasp_angles, tip_positions
 from tactile_cube.hand.model import HandModel
 from tactile_cube.hand.urdf import finger_urdf, hand_urdf
+from tactile_cube.hand.urdf_hand import UrdfHand, hand_from_urdf
 
 __all__ = [
     "DLR_HAND2",
     "Gait",
+    "Hand",
     "HandModel",
+    "UrdfHand",
     "finger_angles",
     "finger_urdf",
     "grasp_angles",
+    "hand_from_urdf",
     "hand_urdf",
+    "published_hand",
     "tip_positions",
 ]

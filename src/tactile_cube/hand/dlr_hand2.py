@@ -79,3 +79,8 @@ DLR_HAND2 = HandModel(
     start_angles=np.radians([14.4, -1.6, 28.0, -3.9, 16.7, 7.1, -16.0, 21.1, 25.9, 9.9, 7.8, 14.2]),
 )
 """The hand of the paper, palm down over a cube at the origin."""
+
+
+def published_hand() -> HandModel:
+    """The same, for conf/hand."""
+    return DLR_HAND2

@@ -7,21 +7,30 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.kinematics import finger_angles
-from tactile_cube.hand.model import HandModel
+from tactile_cube.hand.hand import Hand
 
 Array = NDArray[np.float64]
 
 PLACES = np.radians([-90.0, 0.0, 90.0, 180.0])
-"""Where ring, middle, fore and thumb stand around the cube."""
+"""Where ring, middle, fore and thumb of the DLR-Hand II stand around the cube."""
 SEARCH_KEYS = ("name", "steps", "cpu_hours", "wall_hours", "commit")
 """What is known of the search behind a range of gaits."""
+
+
+def places(hand: Hand) -> Array:
+    """Where the fingers of a hand stand around the object (fingers,) [rad]."""
+    return np.array([np.arctan2(finger.face[1], finger.face[0]) for finger in hand.fingers])
+
+
+def even_phases(fingers: int) -> tuple[float, ...]:
+    """Phases of fingers that go back one after the other."""
+    return tuple(finger / fingers for finger in range(fingers))
 
 
 @dataclass(frozen=True)
@@ -40,7 +49,7 @@ class Gait:
         lifted: the same in the air [m].
         height: of the tips' targets over the middle of the cube [m].
         closing: policy steps in which all fingers close around the cube before they begin to walk.
-        phases: part of the cycle by which ring, middle, fore and thumb are ahead; here opposing fingers move together.
+        phases: part of the cycle by which each finger is ahead; here, of four, opposing ones move together.
     """
 
     swing: float = 0.82
@@ -53,32 +62,47 @@ class Gait:
     closing: int = 6
     phases: tuple[float, ...] = (0.0, 0.5, 0.0, 0.5)
 
-    def tips(self, step: int, direction: int = -1) -> Array:
-        """Return the targets of the fingertips `(4, 3)` [m] at a policy step; direction +1 turns about +z."""
+    def of(self, hand: Hand) -> Gait:
+        """The same walk for a hand: where it has other fingers than there are phases, they go back in turn."""
+        fingers = len(hand.fingers)
+        return self if fingers == len(self.phases) else replace(self, phases=even_phases(fingers))
+
+    def tips(self, step: int, direction: int = -1, around: Array = PLACES) -> Array:
+        """Return the targets of the fingertips `(fingers, 3)` [m] at a policy step; direction +1 turns about +z.
+
+        Args:
+            step: policy steps since the start.
+            direction: of the turn.
+            around: where the fingers stand, see `places` (fingers,) [rad].
+        """
         holding = 1.0 - self.air_share
         cycle = ((step - self.closing) / self.period + np.array(self.phases)) % 1.0
-        phase = cycle if step >= self.closing else np.zeros(4)
+        phase = cycle if step >= self.closing else np.zeros(len(around))
         on_cube = phase < holding
         forth = 1.0 - 2.0 * phase / holding
         back = -1.0 + 2.0 * (phase - holding) / self.air_share
-        walk = -direction * self.swing * np.where(on_cube, forth, back) if step >= self.closing else np.zeros(4)
-        angle, radius = PLACES - direction * self.shift + walk, np.where(on_cube, self.pressed, self.lifted)
-        return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(4, self.height)], axis=1)
+        walk = (
+            -direction * self.swing * np.where(on_cube, forth, back) if step >= self.closing else np.zeros(len(around))
+        )
+        angle, radius = around - direction * self.shift + walk, np.where(on_cube, self.pressed, self.lifted)
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(len(around), self.height)], axis=1)
 
-    def action(self, hand: HandModel, step: int, direction: int = -1) -> Array:
-        """Return the action `(12,)` in [-1, 1] of a policy step."""
-        return hand.action_of(joint_angles(hand, self.tips(step, direction)))
+    def action(self, hand: Hand, step: int, direction: int = -1) -> Array:
+        """Return the action `(joints,)` in [-1, 1] of a policy step."""
+        return hand.action_of(joint_angles(hand, self.of(hand).tips(step, direction, places(hand))))
 
-    def actions(self, hand: HandModel, steps: int, direction: int = -1) -> Array:
-        """Return the actions `(steps, 12)` of an episode; a cycle's inverse kinematics is solved once."""
-        first = np.array([self.action(hand, step, direction) for step in range(min(steps, self.closing + self.period))])
+    def actions(self, hand: Hand, steps: int, direction: int = -1) -> Array:
+        """Return the actions `(steps, joints)` of an episode; a cycle's inverse kinematics is solved once."""
+        gait, around = self.of(hand), places(hand)
+        tips = [gait.tips(step, direction, around) for step in range(min(steps, self.closing + self.period))]
+        first = hand.action_of(hand.angles_at(np.array(tips)))
         cycle = self.closing + (np.arange(steps) - self.closing) % self.period
         return first[np.where(np.arange(steps) < self.closing, np.arange(steps), cycle)]
 
 
-def joint_angles(hand: HandModel, tips: Array) -> Array:
-    """Return the joint angles `(12,)` [rad] that bring the tips to their targets `(4, 3)` [m]."""
-    return np.concatenate([finger_angles(hand, finger, tip[None])[0] for finger, tip in enumerate(tips)])
+def joint_angles(hand: Hand, tips: Array) -> Array:
+    """Return the joint angles `(joints,)` [rad] that bring the tips to their targets `(fingers, 3)` [m]."""
+    return np.asarray(hand.angles_at(tips[None])[0])
 
 
 @dataclass(frozen=True)
@@ -116,7 +140,7 @@ class GaitRanges:
         return Gait(**values | whole, phases=tuple(self.phases))  # type: ignore[arg-type]
 
 
-def similar_gaits(hand: HandModel, ranges: GaitRanges, number: int, steps: int, direction: int, seed: int = 0) -> Array:
-    """Return actions `(number, steps, 12)` of gaits drawn from ranges."""
+def similar_gaits(hand: Hand, ranges: GaitRanges, number: int, steps: int, direction: int, seed: int = 0) -> Array:
+    """Return actions `(number, steps, joints)` of gaits drawn from ranges."""
     rng = np.random.default_rng(seed)
     return np.stack([ranges.draw(rng).actions(hand, steps, direction) for _ in range(number)])

@@ -1,13 +1,16 @@
-"""What a hand is: fingers on a palm, the geometry and mass of their links, joint limits, pose in the world."""
+"""Hands like the DLR-Hand II: identical fingers of three actuated joints, the last of which moves two links."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tactile_cube.hand import closed_form, urdf
+from tactile_cube.hand.hand import Array, FingerBase, Hand
+from tactile_cube.hand.shape import Shape
+
+__all__ = ["Array", "Capsule", "FingerBase", "HandModel", "Link"]
 
 JOINTS_PER_FINGER = 3
 LINKS_PER_FINGER = 4
@@ -27,6 +30,11 @@ class Capsule:
     radius: float
     start: float
     end: float
+
+    def shape(self) -> Shape:
+        """The same for an engine."""
+        middle = np.array([0.0, 0.0, 0.5 * (self.start + self.end)])
+        return Shape("capsule", (self.radius, self.end - self.start), middle)
 
 
 @dataclass(frozen=True)
@@ -55,62 +63,87 @@ class Link:
 
 
 @dataclass(frozen=True)
-class FingerBase:
-    """Where a finger sits on the palm.
-
-    Attributes:
-        name: ring, middle, fore or thumb.
-        position: Origin of q1's frame in the hand frame (3,) [m].
-        rotation: Axes of q1's frame in the hand frame (3, 3).
-        face: Outward normal of the cube face this finger touches, in the cube's frame (3,).
-    """
-
-    name: str
-    position: Array
-    rotation: Array
-    face: Array
-
-
-@dataclass(frozen=True)
-class HandModel:
+class HandModel(Hand):
     """A hand of identical fingers with three actuated joints each; q4 follows q3.
 
-    Joint vectors are ordered finger by finger, (q1, q2, q3) within a finger.
-
     Attributes:
-        fingers: The fingers in joint order.
         links: Knuckle, proximal, middle and distal link, the same for all fingers.
-        lower: Hardware limits of the joints (12,) [rad].
-        upper: Hardware limits of the joints (12,) [rad].
-        action_lower: Limits of the desired joint angles, which an action of -1 means (12,) [rad].
-        action_upper: Limits of the desired joint angles, which an action of +1 means (12,) [rad].
-        position: Hand frame in the world; the cube's nominal centre is the origin (3,) [m].
-        rotation: Hand frame in the world (3, 3).
-        start_angles: Fingers 1 mm off the faces of the nominal cube (12,) [rad].
         coupled_upper: Hardware limit of q4 [rad].
     """
 
-    fingers: tuple[FingerBase, ...]
     links: tuple[Link, ...]
-    lower: Array
-    upper: Array
-    action_lower: Array
-    action_upper: Array
-    position: Array
-    rotation: Array
-    start_angles: Array
     coupled_upper: float
+
+    @property
+    def name(self) -> str:
+        """See `Hand`."""
+        return "dlr_hand2"
 
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the actuated joints, e.g. `ring_q1`."""
         return tuple(f"{finger.name}_q{j}" for finger in self.fingers for j in range(1, JOINTS_PER_FINGER + 1))
 
-    def action_of(self, angles: Array) -> Array:
-        """Action in [-1, 1] that asks for joint angles `(..., 12)` [rad]; angles out of range are clipped."""
-        middle = 0.5 * (self.action_lower + self.action_upper)
-        half_range = 0.5 * (self.action_upper - self.action_lower)
-        return np.clip((angles - middle) / half_range, -1.0, 1.0)
+    @property
+    def joints_per_finger(self) -> int:
+        """See `Hand`."""
+        return JOINTS_PER_FINGER
+
+    @property
+    def links_per_finger(self) -> int:
+        """See `Hand`."""
+        return LINKS_PER_FINGER
+
+    def coupled(self) -> tuple[tuple[int, int], ...]:
+        """See `Hand`."""
+        return ((3, 2),)
+
+    def link_names(self, finger: int) -> tuple[str, ...]:
+        """See `Hand`."""
+        return LINK_NAMES
+
+    def shapes(self, finger: int) -> tuple[tuple[Shape, ...], ...]:
+        """See `Hand`."""
+        return tuple(() if link.capsule is None else (link.capsule.shape(),) for link in self.links)
+
+    def link_limits(self, finger: int) -> Array:
+        """See `Hand`."""
+        own = self.of_finger(finger)
+        lower, upper = self.lower[own], self.upper[own]
+        return np.stack([[*lower, lower[-1]], [*upper, self.coupled_upper]], axis=1)
+
+    def spin_axes(self) -> tuple[int, ...]:
+        """See `Hand`."""
+        return (2, 1, 1, 1)
+
+    def finger_urdf(self, finger: int) -> str:
+        """See `Hand`; all fingers are identical."""
+        return urdf.finger_urdf(self)
+
+    def urdf(self) -> str:
+        """See `Hand`."""
+        return urdf.hand_urdf(self)
+
+    def chain_joints(self, finger: int) -> tuple[str, ...]:
+        """See `Hand`."""
+        return tuple(f"{self.fingers[finger].name}_q{k + 1}" for k in range(LINKS_PER_FINGER))
+
+    def followed(self, joint: str) -> str:
+        """See `Hand`."""
+        return joint.removesuffix("_q4") + "_q3" if joint.endswith("_q4") else joint
+
+    def finger_tips(self, finger: int, q: Array) -> Array:
+        """See `Hand`."""
+        return closed_form.finger_tips(self, finger, q)
+
+    def finger_angles(self, finger: int, targets: Array) -> Array:
+        """See `Hand`; joint limits are not applied."""
+        return closed_form.finger_angles(self, finger, targets)
+
+    def angles_at(self, tips: Array) -> Array:
+        """See `Hand`."""
+        rows = [[closed_form.finger_angles(self, k, tip[None])[0] for k, tip in enumerate(row)] for row in tips]
+        return np.array(rows).reshape(len(tips), -1)
 
     @property
     def tip_radius(self) -> float:
@@ -121,11 +154,6 @@ class HandModel:
     def tip_reach(self) -> tuple[float, float, float]:
         """Distances q2-q3, q3-q4 and q4-centre of the fingertip's sphere [m]."""
         return self.links[1].length, self.links[2].length, self._tip.end
-
-    def base_in_world(self, finger: int) -> tuple[Array, Array]:
-        """Position (3,) [m] and rotation (3, 3) of q1's frame in the world."""
-        base = self.fingers[finger]
-        return self.position + self.rotation @ base.position, self.rotation @ base.rotation
 
     @property
     def _tip(self) -> Capsule:

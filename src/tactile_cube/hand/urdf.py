@@ -7,12 +7,18 @@ and its joint turns about y.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.model import Array, Capsule, HandModel, Link
+
+if TYPE_CHECKING:
+    from tactile_cube.hand.model import Capsule, HandModel, Link
+
+Array = NDArray[np.float64]
 
 _AXIS_Y, _AXIS_Z = '<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>'
 _ACROSS = f'<origin xyz="0 0 0" rpy="{np.pi} {-np.pi / 2.0} 0"/>'
@@ -29,7 +35,7 @@ def finger_urdf(hand: HandModel, prefix: str = "") -> str:
         prefix: Put before link and joint names, e.g. `ring_`.
     """
     root = f"{prefix}base"
-    return _robot(f"{prefix}finger", [_root(root), *_finger_parts(hand, prefix, root, "")])
+    return robot_element(f"{prefix}finger", [ROBOT_ROOT.format(name=root), *_finger_parts(hand, prefix, root, "")])
 
 
 def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, inertia: Array) -> str:
@@ -49,7 +55,7 @@ def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, iner
             raise InputError(f"URDF: no link '{name}' with an inertial element")
         upper = zip(["xx", "xy", "xz", "yy", "yz", "zz"], inertia[k][np.triu_indices(3)], strict=True)
         numbers = {
-            "origin": {"xyz": _numbers(com[k])},
+            "origin": {"xyz": number_list(com[k])},
             "mass": {"value": f"{mass[k]:.12g}"},
             "inertia": {f"i{axes}": f"{value:.12g}" for axes, value in upper},
         }
@@ -64,18 +70,20 @@ def hand_urdf(hand: HandModel) -> str:
     """The whole hand: `palm` and four fingers, joints `ring_q1` .. `thumb_q4`; the same links as `finger_urdf`."""
     parts = [_palm(hand)]
     for finger in hand.fingers:
-        parts += _finger_parts(hand, f"{finger.name}_", "palm", _origin(finger.position, finger.rotation))
-    return _robot("dlr_hand2", parts)
+        parts += _finger_parts(hand, f"{finger.name}_", "palm", origin_element(finger.position, finger.rotation))
+    return robot_element("dlr_hand2", parts)
 
 
-def _robot(name: str, parts: list[str]) -> str:
+ROBOT_ROOT = (
+    '<link name="{name}"><inertial><mass value="0.1"/>'
+    '<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+"""The fixed base; its numbers do nothing, but Bullet warns about links without any."""
+
+
+def robot_element(name: str, parts: list[str]) -> str:
+    """A whole description from its links and joints."""
     return "\n".join(['<?xml version="1.0"?>', f'<robot name="{name}">', *parts, "</robot>", ""])
-
-
-def _root(name: str) -> str:
-    """The fixed base; its numbers do nothing, but Bullet warns about links without any."""
-    inertia = '<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/>'
-    return f'<link name="{name}"><inertial><mass value="0.1"/>{inertia}</inertial></link>'
 
 
 def _finger_parts(hand: HandModel, prefix: str, parent: str, base: str) -> list[str]:
@@ -84,7 +92,7 @@ def _finger_parts(hand: HandModel, prefix: str, parent: str, base: str) -> list[
     lower, upper = hand.lower[:3], hand.upper[:3]
     mimic = f'<mimic joint="{prefix}q3" multiplier="1" offset="0"/>'
     name = [prefix + link.name for link in hand.links]
-    along = [_origin(np.array([0.0, 0.0, link.length])) for link in (proximal, middle)]
+    along = [origin_element(np.array([0.0, 0.0, link.length])) for link in (proximal, middle)]
     return [
         *(_link(prefix, link) for link in (knuckle, proximal, middle, distal)),
         _joint(f"{prefix}q1", parent, name[0], base, _AXIS_Z, lower[0], upper[0]),
@@ -135,18 +143,19 @@ def _palm(hand: HandModel) -> str:
     low, high = bases.min(axis=0), bases.max(axis=0)
     size = np.array([high[0] - low[0], high[1] - low[1] + 0.03, 0.10])
     centre = np.array([*(0.5 * (low + high))[:2], low[2] - 0.05])
-    geometry = f'<geometry><box size="{_numbers(size)}"/></geometry>'
+    geometry = f'<geometry><box size="{number_list(size)}"/></geometry>'
     material = f'<material name="palm"><color rgba="{_COLOURS["palm"]}"/></material>'
-    return f'<link name="palm"><visual>{_origin(centre)}{geometry}{material}</visual></link>'
+    return f'<link name="palm"><visual>{origin_element(centre)}{geometry}{material}</visual></link>'
 
 
 def _at(along: float) -> str:
     return f'<origin xyz="0 0 {along:.10g}"/>'
 
 
-def _origin(position: Array, rotation: Array | None = None) -> str:
+def origin_element(position: Array, rotation: Array | None = None) -> str:
+    """Place (3,) [m] and rotation (3, 3) as URDF's <origin>."""
     rpy = np.zeros(3) if rotation is None else roll_pitch_yaw(rotation)
-    return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(rpy)}"/>'
+    return f'<origin xyz="{number_list(position)}" rpy="{number_list(rpy)}"/>'
 
 
 def roll_pitch_yaw(rotation: Array) -> Array:
@@ -159,5 +168,6 @@ def roll_pitch_yaw(rotation: Array) -> Array:
     return np.array([roll, pitch, np.arctan2(rotation[1, 0], rotation[0, 0])])
 
 
-def _numbers(values: Array) -> str:
+def number_list(values: Array) -> str:
+    """Numbers with spaces between them."""
     return " ".join(f"{value:.12g}" for value in values)

@@ -125,10 +125,10 @@ def _joint(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
         kind=kind,
         parent=parent,
         link=child,
-        placement=_placement(element, f"joint '{name}'"),
+        placement=placement_of(element, f"joint '{name}'"),
         axis=_axis(element, name),
-        lower=_number(limit, "lower", f"joint '{name}'", 0.0) if bounded else -np.inf,
-        upper=_number(limit, "upper", f"joint '{name}'", 0.0) if bounded else np.inf,
+        lower=number(limit, "lower", f"joint '{name}'", 0.0) if bounded else -np.inf,
+        upper=number(limit, "upper", f"joint '{name}'", 0.0) if bounded else np.inf,
         coupling=_mimic(element, name),
         body=bodies[child],
     )
@@ -139,7 +139,7 @@ def _mimic(element: ElementTree.Element, name: str) -> Coupling | None:
     if mimic is None:
         return None
     where = f"the <mimic> of joint '{name}'"
-    ratio, offset = _number(mimic, "multiplier", where, 1.0), _number(mimic, "offset", where, 0.0)
+    ratio, offset = number(mimic, "multiplier", where, 1.0), number(mimic, "offset", where, 0.0)
     return Coupling(_attribute(mimic, "joint", where), ratio, offset)
 
 
@@ -226,21 +226,22 @@ def _body(link: ElementTree.Element) -> Body:
     inertial, where = link.find("inertial"), f"link '{link.get('name')}'"
     if inertial is None:
         return Body()
-    mass = _number(inertial.find("mass"), "value", f"the mass of {where}", 0.0)
+    mass = number(inertial.find("mass"), "value", f"the mass of {where}", 0.0)
     element = inertial.find("inertia")
     xx, yy, zz, xy, xz, yz = (
-        _number(element, key, f"the inertia of {where}", 0.0) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        number(element, key, f"the inertia of {where}", 0.0) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     body = Body(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    return body.seen_from(_placement(inertial, where))
+    return body.seen_from(placement_of(inertial, where))
 
 
-def _placement(element: ElementTree.Element, where: str) -> Placement:
+def placement_of(element: ElementTree.Element, where: str) -> Placement:
+    """The <origin> of an element."""
     origin = element.find("origin")
     if origin is None:
         return Placement()
-    roll, pitch, yaw = _triple(origin, "rpy", where)
-    return Placement(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), _triple(origin, "xyz", where))
+    roll, pitch, yaw = triple(origin, "rpy", where)
+    return Placement(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), triple(origin, "xyz", where))
 
 
 def _about(axis: int, angle: float) -> Array:
@@ -257,14 +258,15 @@ def _axis(element: ElementTree.Element, name: str) -> Array:
     axis = element.find("axis")
     if axis is None:
         return np.array([1.0, 0.0, 0.0])  # URDF's default
-    vector = _triple(axis, "xyz", f"the axis of joint '{name}'")
+    vector = triple(axis, "xyz", f"the axis of joint '{name}'")
     length = float(np.linalg.norm(vector))
     if length == 0.0:
         raise InputError(f"URDF: the axis of joint '{name}' is zero; give it a direction")
     return vector / length
 
 
-def _triple(element: ElementTree.Element, key: str, where: str) -> Array:
+def triple(element: ElementTree.Element, key: str, where: str) -> Array:
+    """Three numbers of an attribute (3,)."""
     text = element.get(key, "0 0 0")
     try:
         values = np.array([float(word) for word in text.split()])
@@ -275,7 +277,8 @@ def _triple(element: ElementTree.Element, key: str, where: str) -> Array:
     return values
 
 
-def _number(element: ElementTree.Element | None, key: str, where: str, default: float) -> float:
+def number(element: ElementTree.Element | None, key: str, where: str, default: float) -> float:
+    """One number of an attribute."""
     text = element.get(key) if element is not None else None
     try:
         value = default if text is None else float(text)

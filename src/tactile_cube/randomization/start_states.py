@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand import HandModel, grasp_angles
+from tactile_cube.hand import Hand, grasp_angles
 from tactile_cube.randomization.distributions import sample
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants, Start
@@ -38,14 +38,16 @@ class StartStates:
         if not 0.0 <= self.yaw_range < 0.25 * np.pi:
             raise InputError(f"start.yaw_range is {self.yaw_range} rad; give 0 to below pi/4, beyond it faces repeat")
 
-    def of(self, hand: HandModel) -> StartPoses:
-        """The start poses of `hand` with the nominal cube."""
-        if self.poses == 1:
+    def of(self, hand: Hand, constants: EpisodeConstants | None = None) -> StartPoses:
+        """The start poses of `hand` with the object of `constants`; None: the nominal cube."""
+        known = EpisodeConstants() if constants is None else constants
+        nominal = known.object_shape == "box" and np.array_equal(known.cube_size, EpisodeConstants().cube_size)
+        if self.poses == 1 and nominal:
             return StartPoses(hand, np.zeros(1), np.asarray(hand.start_angles, dtype=np.float64)[None])
-        yaws = np.linspace(-self.yaw_range, self.yaw_range, self.poses)
-        size = np.broadcast_to(EpisodeConstants().cube_size, 3)
+        yaws = np.linspace(-self.yaw_range, self.yaw_range, self.poses) if self.poses > 1 else np.zeros(1)
+        size, shape = np.asarray(known.cube_size), known.object_shape
         turned = Rotation.from_euler("z", yaws[:, None]).as_quat()
-        angles = [grasp_angles(hand, size, np.zeros(3), quaternion, self.clearance) for quaternion in turned]
+        angles = [grasp_angles(hand, size, np.zeros(3), turn, self.clearance, shape) for turn in turned]
         return StartPoses(hand, yaws, np.stack(angles))
 
 
@@ -56,10 +58,10 @@ class StartPoses:
     Attributes:
         hand: the hand.
         yaws: angles of the cube about the vertical `(poses,)` [rad].
-        angles: joint angles that go with them `(poses, 12)` [rad].
+        angles: joint angles that go with them `(poses, joints)` [rad].
     """
 
-    hand: HandModel
+    hand: Hand
     yaws: Array
     angles: Array
 
@@ -71,7 +73,7 @@ class StartPoses:
         pose = int(rng.integers(len(self.yaws)))
         position = np.array([float(sample(d, rng)) for d in randomization.cube_position])
         turn = np.array([float(sample(d, rng)) for d in randomization.cube_rotation])
-        angles = self.angles[pose] + sample(randomization.start_angles, rng, (12,))
+        angles = self.angles[pose] + sample(randomization.start_angles, rng, (self.hand.joints,))
         if constants.table_height is not None:
             position[2] = 0.0
             turn[:2] = 0.0

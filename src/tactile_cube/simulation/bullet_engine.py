@@ -8,8 +8,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from tactile_cube.hand import HandModel
-from tactile_cube.hand.model import LINKS_PER_FINGER
+from tactile_cube.hand import Hand
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.drive import HandDrive
@@ -24,11 +23,11 @@ Array = NDArray[np.float64]
 class BulletEngine:
     """See `Engine`. Sequential impulses; rotors and tendons are worked into the torques, see `spin_inertia`."""
 
-    def __init__(self, hand: HandModel, options: SimulationOptions, drive: HandDrive) -> None:
+    def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         """Builds the bodies and binds the drive's memory to the loop."""
         self._drive = drive
         self._scene = Scene(hand, options, drive.finger_urdfs())
-        self._joints = np.zeros((2, len(hand.fingers), LINKS_PER_FINGER))
+        self._joints = np.zeros((2, len(hand.fingers), hand.links_per_finger))
         self._loop = make_loop(options.loop, self._scene.client, drive.plant)
         q, v = self._joints.reshape(2, -1)
         self._loop.bind(self._scene.fingers, q, v, drive.memory)

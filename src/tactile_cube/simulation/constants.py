@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.errors import InputError
-from tactile_cube.hand import dlr_hand2
+from tactile_cube.hand import DLR_HAND2, Hand, dlr_hand2
+from tactile_cube.hand.object_shape import SHAPES, ObjectShape
 
 Array = NDArray[np.float64]
-_JOINTS = 12
+_JOINTS = "joints"
 
 
 @dataclass(frozen=True)
 class EpisodeConstants:
     """What stays constant during an episode; made anew for each one by randomisation.
 
-    Vectors over the joints are ordered ring, middle, fore, thumb x (q1, q2, q3); a float means the same for all.
+    Vectors over the joints are in the hand's order, for the DLR-Hand II ring, middle, fore, thumb x (q1, q2, q3); a
+    float means the same for all. `constants_of` gives those of a hand.
 
     Attributes:
         gravity: Acceleration of gravity [m/s^2].
@@ -38,7 +41,9 @@ class EpisodeConstants:
         friction_creep: How fast a joint held by dry friction gives way (12,) [rad/s per N m].
         reflected_inertia: Rotor inertia seen at the joint (12,) [kg m^2].
         joint_offset: What the position sensors read too much (12,) [rad]; targets are meant in what the sensors read.
-        cube_size: Edge lengths (3,) [m]; a float means a cube.
+        object_shape: `box`, `cylinder` or `capsule` (upright bar with half spheres at its ends; a sphere where it is as
+            high as wide). What is called cube is the object, whatever its shape.
+        cube_size: Edge lengths of its bounding box (3,) [m]; a float means a cube.
         cube_mass: [kg].
         cube_com: Centre of mass from the cube's centre, in the cube's frame (3,) [m].
         cube_friction: Lateral friction factor of the cube; that of a contact is the product of both bodies'.
@@ -57,6 +62,7 @@ class EpisodeConstants:
         force_interval: Time after which force and torque are redrawn [s].
         force_seed: Seed of these draws.
         effects: Numbers that effects of the world's drivetrain take in this episode; none: as the world was built.
+        joints: Number of the hand's joints, which the vectors have.
     """
 
     gravity: float = 9.81
@@ -91,8 +97,10 @@ class EpisodeConstants:
     force_interval: float = 0.5
     force_seed: int = 0
     effects: tuple[Effect, ...] = ()
+    joints: int = 12
+    object_shape: ObjectShape = "box"
 
-    _LENGTHS: ClassVar[dict[str, int]] = {
+    _LENGTHS: ClassVar[dict[str, int | str]] = {
         "gravity_direction": 3,
         "cube_size": 3,
         "cube_com": 3,
@@ -122,17 +130,30 @@ class EpisodeConstants:
         "cube_com",
         "table_height",
         "effects",
+        "object_shape",
     )
 
     def __post_init__(self) -> None:
         """Give every vector its length and refuse values without a physical meaning."""
         for name, length in self._LENGTHS.items():
-            object.__setattr__(self, name, _vector(name, getattr(self, name), length))
+            count = self.joints if isinstance(length, str) else length
+            object.__setattr__(self, name, _vector(name, getattr(self, name), count))
+        self._refuse_impossible_object()
         if self.elasticity_sign not in (1, -1):
             raise InputError(f"elasticity_sign is {self.elasticity_sign}; choose 1 (physical) or -1 (as printed)")
         for field in fields(self):
             if field.name not in self._ANY_SIGN:
                 _refuse_below_zero(field.name, getattr(self, field.name), field.name in self._POSITIVE)
+
+    def _refuse_impossible_object(self) -> None:
+        if self.object_shape not in SHAPES:
+            raise InputError(f"object_shape is {self.object_shape!r}; choose one of {', '.join(SHAPES)}")
+        x, y, z = np.asarray(self.cube_size).tolist()
+        if self.object_shape != "box" and (x != y or (self.object_shape == "capsule" and z < x)):
+            raise InputError(
+                f"cube_size of a {self.object_shape} is {[x, y, z]}; give diameter, diameter and height"
+                + (", not lower than the diameter" if self.object_shape == "capsule" else "")
+            )
 
     @property
     def down(self) -> Array:
@@ -151,7 +172,7 @@ class Start:
     """State in which an episode starts.
 
     Attributes:
-        angles: True joint angles (12,) [rad].
+        angles: True joint angles (joints,) [rad].
         cube_position: Centre of the cube in the world (3,) [m].
         cube_quaternion: Orientation of the cube (4,), xyzw.
         target: Initial filtered target q_f (12,) [rad] as the sensors would read it; None: where the sensors read now.
@@ -168,7 +189,7 @@ class Start:
     cube_linear_velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
     cube_angular_velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
 
-    _LENGTHS: ClassVar[dict[str, int]] = {
+    _LENGTHS: ClassVar[dict[str, int | str]] = {
         "angles": _JOINTS,
         "cube_position": 3,
         "cube_quaternion": 4,
@@ -179,14 +200,40 @@ class Start:
 
     def __post_init__(self) -> None:
         """Give every vector its length; normalise the quaternion."""
+        joints = np.size(self.angles)
         for name, length in self._LENGTHS.items():
-            object.__setattr__(self, name, _vector(f"start.{name}", getattr(self, name), length))
+            count = joints if isinstance(length, str) else length
+            object.__setattr__(self, name, _vector(f"start.{name}", getattr(self, name), count))
         if self.target is not None:
-            object.__setattr__(self, "target", _vector("start.target", self.target, _JOINTS))
+            object.__setattr__(self, "target", _vector("start.target", self.target, joints))
         norm = float(np.linalg.norm(self.cube_quaternion))
         if norm < 1e-9:
             raise InputError("start.cube_quaternion is zero; give a unit quaternion xyzw")
         object.__setattr__(self, "cube_quaternion", np.asarray(self.cube_quaternion) / norm)
+
+
+def constants_of(hand: Hand | None = None, object: Mapping[str, Any] | None = None, **values: Any) -> EpisodeConstants:
+    """Constants of an episode with a hand and an object.
+
+    Args:
+        hand: whose drives they are; None: the DLR-Hand II.
+        object: `shape`, `size` [m] and `mass` [kg] of the object; what is left out is as in EpisodeConstants.
+        values: further ones, which come before those of hand and object.
+
+    Raises:
+        InputError: a value without a physical meaning, a drive or an object that has what no constant names.
+    """
+    given, hand = dict(object or {}), hand or DLR_HAND2
+    for key in given.keys() - _OBJECT_KEYS.keys():
+        raise InputError(f"object.{key}: no such setting; give {', '.join(_OBJECT_KEYS)}")
+    known = {field.name for field in fields(EpisodeConstants)}
+    for key in hand.drive.keys() - known:
+        raise InputError(f"hand.drive.{key}: no such constant; choose from {', '.join(sorted(known))}")
+    named = {_OBJECT_KEYS[key]: value for key, value in given.items() if value is not None}
+    return EpisodeConstants(**{**hand.drive, **named, **values, "joints": hand.joints})
+
+
+_OBJECT_KEYS = {"shape": "object_shape", "size": "cube_size", "mass": "cube_mass"}
 
 
 def _vector(name: str, value: object, length: int) -> Array:

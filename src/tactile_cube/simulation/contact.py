@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.hand.model import LINK_NAMES
-
 Array = NDArray[np.float64]
 
 
@@ -39,17 +37,18 @@ class Contact:
     friction: Array
 
 
-def read_contact(row: Sequence[Any], names: Mapping[int, str]) -> Contact:
+def read_contact(row: Sequence[Any], names: Mapping[int, str], links: Mapping[int, Sequence[str]]) -> Contact:
     """A contact from one row of PyBullet's answer.
 
     Args:
         row: One row of `getContactPoints`.
         names: Name of each body: of a finger, `cube` or `table`.
+        links: Names of the links of each finger.
     """
     friction_on_first = row[10] * np.array(row[11]) + row[12] * np.array(row[13])
     return named_contact(
         bodies=(names[row[1]], names[row[2]]),
-        links=(_link(row[3]), _link(row[4])),
+        links=(_link(row[3], links.get(row[1], ())), _link(row[4], links.get(row[2], ()))),
         middle=0.5 * (np.array(row[5]) + np.array(row[6])),
         normal=-np.array(row[7]),
         distance=row[8],
@@ -85,5 +84,5 @@ def named_contact(
     return Contact(first, link, second, middle + 0.5 * distance * normal, normal, distance, force, friction)
 
 
-def _link(index: int) -> str:
-    return LINK_NAMES[index] if index >= 0 else ""
+def _link(index: int, names: Sequence[str]) -> str:
+    return names[index] if 0 <= index < len(names) else ""

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant, check_damping_stability
 from tactile_cube.drivetrain.effects import Effect
-from tactile_cube.hand import HandModel, finger_urdf
-from tactile_cube.hand.model import JOINTS_PER_FINGER
+from tactile_cube.hand import Hand
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import with_inertias
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.options import SimulationOptions
-from tactile_cube.simulation.spin_inertia import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia
+from tactile_cube.simulation.spin_inertia import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia, spin_shares
 
 Array = NDArray[np.float64]
 
@@ -29,13 +28,16 @@ class HandDrive:
         memory: The numbers it works on; the same array for good.
     """
 
-    def __init__(self, hand: HandModel, options: SimulationOptions, effects: Sequence[Effect]) -> None:
+    def __init__(self, hand: Hand, options: SimulationOptions, effects: Sequence[Effect]) -> None:
         """Compiles the control step, or finds it in the cache."""
         self._hand, self._engine = hand, options.single_engine
         self._effects = list(effects)
-        self._tree = RigidBodyTree.from_urdf(finger_urdf(hand))
+        self._urdfs = [hand.finger_urdf(k) for k in range(len(hand.fingers))]
+        known = {text: RigidBodyTree.from_urdf(text) for text in dict.fromkeys(self._urdfs)}
+        self._trees = [known[text] for text in self._urdfs]
+        self._shares = spin_shares(self._trees[0])
         self.plant = Plant(
-            trees=[self._tree] * len(hand.fingers),
+            trees=self._trees,
             dt=options.dt,
             effects=tuple(dict.fromkeys(type(effect) for effect in effects)),
             joint_names=hand.joint_names,
@@ -45,13 +47,12 @@ class HandDrive:
 
     def finger_urdfs(self) -> list[str]:
         """URDF text of each finger, with the masses that effects on the mechanism have changed."""
-        text = finger_urdf(self._hand)
         mass, com, inertia = (self.view(key) for key in ("mass", "com", "inertia"))
-        names = [link.name for link in self._hand.links]
         texts = []
-        for k in range(len(self._hand.fingers)):
-            same = np.array_equal(mass[k], self._tree.mass) and np.array_equal(com[k], self._tree.com)
-            texts.append(text if same else with_inertias(text, names, mass[k], com[k], inertia[k]))
+        for k, (text, tree) in enumerate(zip(self._urdfs, self._trees, strict=True)):
+            same = np.array_equal(mass[k], tree.mass) and np.array_equal(com[k], tree.com)
+            changed = (self._hand.link_names(k), mass[k], com[k], inertia[k])
+            texts.append(text if same else with_inertias(text, *changed))
         return texts
 
     def reset(self, c: EpisodeConstants, start: Start) -> None:
@@ -83,10 +84,10 @@ class HandDrive:
     def _set_rotors(self, inertia: Array) -> None:
         """Rotors and tendons as the engine has them: its own, or numerical aids that the torques know of."""
         if self._engine == "mujoco":
-            rotors = self.view("reflected_inertia").reshape(-1, JOINTS_PER_FINGER)
+            rotors = self.view("reflected_inertia").reshape(-1, self._hand.joints_per_finger)
             self.view("armature")[:, list(self.plant.topology.leader)] = rotors
             return
-        self.view("spin_inertia")[:] = spin_inertia(inertia)
+        self.view("spin_inertia")[:] = spin_inertia(self._hand, self._shares, inertia)
         self.view("tendon_stiffness")[:] = TENDON_STIFFNESS
         self.view("tendon_damping")[:] = TENDON_DAMPING
 
@@ -95,7 +96,7 @@ class HandDrive:
         return self.plant.view(self.memory, key)
 
     def signal(self, row: int) -> Array:
-        """A signal of the last physics step (12,)."""
+        """A signal of the last physics step (joints,)."""
         return self.plant.signal(self.memory, row)
 
     def set_engine_gravity(self, acceleration: Array) -> None:
@@ -106,8 +107,8 @@ class HandDrive:
         """Computes what the sensors read at rest, without moving anything or changing any state.
 
         Args:
-            q: All joints (16,) [rad].
-            v: All joints (16,) [rad/s].
+            q: All joints (all joints,) [rad].
+            v: All joints (all joints,) [rad/s].
         """
         trial = self.memory.copy()
         self.plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), trial)
@@ -116,12 +117,13 @@ class HandDrive:
     def _refuse_unstable(self, c: DrivetrainConstants) -> None:
         """Raises InputError if a finger with the largest damping and smallest inertia of each joint would diverge."""
         of_fingers = {
-            name: np.reshape(getattr(c, name), (-1, JOINTS_PER_FINGER))
+            name: np.reshape(getattr(c, name), (-1, self._hand.joints_per_finger))
             for name in ("kp", "kd", "stiffness", "reflected_inertia")
         }
         weakest = {name: values.max(axis=0) for name, values in of_fingers.items()}
         weakest |= {name: of_fingers[name].min(axis=0) for name in ("stiffness", "reflected_inertia")}
-        check_damping_stability(self._tree, replace(c, static_friction=0.0, **weakest), self.plant.dt)
+        for tree in {id(tree): tree for tree in self._trees}.values():
+            check_damping_stability(tree, replace(c, static_friction=0.0, **weakest), self.plant.dt)
 
     def _in_bases(self, vector: Array) -> Array:
         """A world vector in the frame of each finger's base (fingers, 3)."""

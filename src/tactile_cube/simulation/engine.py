@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.hand import HandModel
+from tactile_cube.hand import Hand
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.drive import HandDrive
@@ -20,7 +20,7 @@ OBJECT_STATE = 13
 
 
 class Engine(Protocol):
-    """One hand, one object and perhaps a table. Joint arrays are (fingers, 4), q1..q4 of each finger."""
+    """One hand, one object and perhaps a table. Joint arrays are (fingers, links), from the palm to the tip."""
 
     @property
     def loop(self) -> Literal["c", "python"]:
@@ -29,12 +29,12 @@ class Engine(Protocol):
 
     @property
     def q(self) -> Array:
-        """Positions of all joints (fingers, 4) [rad]."""
+        """Positions of all joints (fingers, links) [rad]."""
         ...
 
     @property
     def v(self) -> Array:
-        """Velocities of all joints (fingers, 4) [rad/s]."""
+        """Velocities of all joints (fingers, links) [rad/s]."""
         ...
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
@@ -43,8 +43,8 @@ class Engine(Protocol):
         Args:
             constants: Sizes, masses and friction.
             start: Pose and velocity of the cube.
-            q: Positions of all joints (fingers, 4) [rad].
-            v: Their velocities (fingers, 4) [rad/s].
+            q: Positions of all joints (fingers, links) [rad].
+            v: Their velocities (fingers, links) [rad/s].
         """
         ...
 
@@ -82,7 +82,7 @@ class Engine(Protocol):
         ...
 
 
-def make_engine(hand: HandModel, options: SimulationOptions, drive: HandDrive) -> Engine:
+def make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
     """The engine that the options name.
 
     Raises:

@@ -24,16 +24,23 @@ BOUNDS = (
 )
 
 
-def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float]) -> str:
+TENDON = np.array([[3, 2]])
+"""The coupling of the DLR-Hand II: q4 follows q3."""
+
+
+def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float], coupled: NDArray[np.int64] = TENDON) -> str:
     """What is wrong with a state, in a few words; "" if nothing.
 
     Args:
-        q: Angles of all joints (fingers, 4) [rad].
-        v: Their velocities (fingers, 4) [rad/s].
+        q: Angles of all joints (fingers, links) [rad].
+        v: Their velocities (fingers, links) [rad/s].
         cube: Position, quaternion, linear and angular velocity (13,).
         distances: Gaps of the contact points [m], negative where bodies overlap.
+        coupled: Links that follow another one of their finger, and which (pairs, 2).
     """
-    for (name, bound, unit), value in zip(BOUNDS, (*_extremes(q, v, cube), -min(distances, default=0.0)), strict=True):
+    for (name, bound, unit), value in zip(
+        BOUNDS, (*_extremes(q, v, cube, coupled), -min(distances, default=0.0)), strict=True
+    ):
         if not isfinite(value):
             return f"{name} is not a number"
         if value > bound:
@@ -42,11 +49,12 @@ def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float]) -> s
 
 
 @compiled_once
-def _extremes(q: Array, v: Array, cube: Array) -> tuple[float, float, float, float]:
+def _extremes(q: Array, v: Array, cube: Array, coupled: NDArray[np.int64]) -> tuple[float, float, float, float]:
     """Largest joint speed, cube speed, cube spin and tendon stretch; infinite where a number is none."""
     speed = stretch = linear = angular = 0.0
     for finger in range(q.shape[0]):
-        stretch = max(stretch, abs(q[finger, 3] - q[finger, 2]))
+        for pair in range(coupled.shape[0]):
+            stretch = max(stretch, abs(q[finger, coupled[pair, 0]] - q[finger, coupled[pair, 1]]))
         for joint in range(q.shape[1]):
             speed = max(speed, abs(v[finger, joint]))
             if not np.isfinite(q[finger, joint] + v[finger, joint]):

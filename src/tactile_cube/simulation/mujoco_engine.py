@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand import HandModel
-from tactile_cube.hand.model import LINKS_PER_FINGER
+from tactile_cube.hand import Hand
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
@@ -24,11 +23,12 @@ Array = NDArray[np.float64]
 class MujocoEngine:
     """See `Engine`. Newton's method on soft contacts; rotors are native, tendons are equality constraints."""
 
-    def __init__(self, hand: HandModel, options: SimulationOptions, drive: HandDrive) -> None:
+    def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         """Describes the bodies; the model comes with each episode."""
         self._mujoco = load_mujoco()
         self._spec = HandSpec(self._mujoco, hand, options, drive)
-        self._dofs = LINKS_PER_FINGER * len(hand.fingers)
+        self._links = hand.links_per_finger
+        self._dofs = self._links * len(hand.fingers)
         self._loop = make_mujoco_loop(options.loop, self._mujoco, drive)
 
     @property
@@ -39,12 +39,12 @@ class MujocoEngine:
     @property
     def q(self) -> Array:
         """See `Engine.q`."""
-        return np.asarray(self._data.qpos[: self._dofs].reshape(-1, LINKS_PER_FINGER))
+        return np.asarray(self._data.qpos[: self._dofs].reshape(-1, self._links))
 
     @property
     def v(self) -> Array:
         """See `Engine.v`."""
-        return np.asarray(self._data.qvel[: self._dofs].reshape(-1, LINKS_PER_FINGER))
+        return np.asarray(self._data.qvel[: self._dofs].reshape(-1, self._links))
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
         """See `Engine.place`."""
@@ -93,7 +93,7 @@ class MujocoEngine:
         names = [self._model.geom(shape).name.partition(" ") for shape in contact.geom]
         return named_contact(
             bodies=(names[0][0], names[1][0]),
-            links=(names[0][2], names[1][2]),
+            links=(names[0][2].partition("#")[0], names[1][2].partition("#")[0]),
             middle=np.array(contact.pos),
             normal=np.array(frame[0]),
             distance=float(contact.dist),

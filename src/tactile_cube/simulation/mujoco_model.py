@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.model import LINKS_PER_FINGER, HandModel
+from tactile_cube.hand import Hand
+from tactile_cube.hand.object_shape import ObjectShape, straight_half, unit_inertia
+from tactile_cube.hand.shape import Shape
 from tactile_cube.simulation.constants import EpisodeConstants
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.mujoco_contact import CONDIM, IMPRATIO, friction, set_contact
@@ -47,7 +49,7 @@ class HandSpec:
     The joints come first in the state, finger by finger, q1..q4 each; the cube's free joint is last.
     """
 
-    def __init__(self, mujoco: ModuleType, hand: HandModel, options: SimulationOptions, drive: HandDrive) -> None:
+    def __init__(self, mujoco: ModuleType, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         """Describes the fingers; their masses are the drive's."""
         self._mujoco, self._hand, self._drive = mujoco, hand, drive
         self.spec = mujoco.MjSpec()
@@ -88,51 +90,55 @@ class HandSpec:
         parent = self.spec.worldbody.add_body(name=f"{finger.name} base", pos=position, quat=_wxyz(rotation))
         rigid = [2.0 * self.spec.option.timestep, 1.0]
         parts = []
-        for i, link in enumerate(self._hand.links):
+        names, shapes, limits = self._hand.link_names(k), self._hand.shapes(k), self._hand.link_limits(k)
+        for i, link in enumerate(names):
             place = {
                 "pos": view("placement_translation")[k, i],
                 "quat": _wxyz(view("placement_rotation")[k, i]),
             }
-            body = parent.add_body(name=f"{finger.name} {link.name}", explicitinertial=True, **place)
+            body = parent.add_body(name=f"{finger.name} {link}", explicitinertial=True, **place)
             joint = body.add_joint(
                 name=f"{finger.name}_q{i + 1}",
                 type=self._mujoco.mjtJoint.mjJNT_HINGE,
                 axis=view("axis")[k, i],
                 limited=self._mujoco.mjtLimited.mjLIMITED_TRUE,
-                range=self._range(k, i),
+                range=limits[i].tolist(),
                 solref_limit=rigid,
                 solimp_limit=RIGID,
             )
-            if link.capsule is not None:
-                capsule = link.capsule
-                name = f"{finger.name} {link.name}"
-                body.add_geom(
-                    name=name,
-                    type=self._mujoco.mjtGeom.mjGEOM_CAPSULE,
-                    size=[capsule.radius, 0.5 * (capsule.end - capsule.start), 0.0],
-                    pos=[0.0, 0.0, 0.5 * (capsule.start + capsule.end)],
-                    contype=0,
-                    conaffinity=0,
-                )
-                self._shapes[name] = "tip" if i == LINKS_PER_FINGER - 1 else "link"
+            for number, shape in enumerate(shapes[i]):
+                name = f"{finger.name} {link}" + (f"#{number}" if number else "")
+                self._add_shape(body, name, shape)
+                self._shapes[name] = "tip" if link == names[-1] else "link"
             parts.append((body, joint))
             parent = body
-        self._add_tendon(finger.name, rigid)
+        for follower, leader in self._hand.coupled():
+            self._add_tendon(finger.name, follower, leader, rigid)
         return parts
 
-    def _range(self, finger: int, joint: int) -> list[float]:
-        """Hardware limits [rad]."""
-        actuated = 3 * finger + min(joint, 2)
-        upper = self._hand.coupled_upper if joint == LINKS_PER_FINGER - 1 else self._hand.upper[actuated]
-        return [float(self._hand.lower[actuated]), float(upper)]
+    def _add_shape(self, body: Any, name: str, shape: Shape) -> None:
+        """A link's collision shape; capsules and cylinders have half their length in MuJoCo."""
+        kinds, size = self._mujoco.mjtGeom, shape.size
+        kind, numbers = {
+            "capsule": (kinds.mjGEOM_CAPSULE, [size[0], 0.5 * size[-1], 0.0]),
+            "cylinder": (kinds.mjGEOM_CYLINDER, [size[0], 0.5 * size[-1], 0.0]),
+            "sphere": (kinds.mjGEOM_SPHERE, [size[0], 0.0, 0.0]),
+            "box": (kinds.mjGEOM_BOX, [0.5 * edge for edge in size]),
+            "mesh": (kinds.mjGEOM_MESH, [0.0, 0.0, 0.0]),
+        }[shape.kind]
+        more: dict[str, Any] = {"quat": _wxyz(shape.rotation)} if not np.array_equal(shape.rotation, np.eye(3)) else {}
+        if shape.kind == "mesh":
+            self.spec.add_mesh(name=name, file=shape.file, scale=list(size))
+            more["meshname"] = name
+        body.add_geom(name=name, type=kind, size=numbers, pos=shape.position, contype=0, conaffinity=0, **more)
 
-    def _add_tendon(self, finger: str, rigid: list[float]) -> None:
-        """Holds q4 at q3."""
+    def _add_tendon(self, finger: str, follower: int, leader: int, rigid: list[float]) -> None:
+        """Holds a coupled joint at the one it follows."""
         tendon = self.spec.add_equality(
             type=self._mujoco.mjtEq.mjEQ_JOINT,
             objtype=self._mujoco.mjtObj.mjOBJ_JOINT,
-            name1=f"{finger}_q4",
-            name2=f"{finger}_q3",
+            name1=f"{finger}_q{follower + 1}",
+            name2=f"{finger}_q{leader + 1}",
             solref=rigid,
             solimp=RIGID,
         )
@@ -168,11 +174,25 @@ class HandSpec:
         """Size and mass of the cube; without a table it lies too far away to be met."""
         body, shape = self._cube
         size, mass = np.asarray(constants.cube_size), constants.cube_mass
-        shape.size = 0.5 * size
+        shape.type, shape.size = self._object_geometry(constants.object_shape, 0.5 * size)
         body.mass, body.ipos = mass, np.asarray(constants.cube_com)
-        body.inertia = mass / 12.0 * (np.sum(size**2) - size**2)
+        if constants.object_shape == "box":
+            body.inertia = mass / 12.0 * (np.sum(size**2) - size**2)
+        else:
+            body.inertia = mass * unit_inertia(constants.object_shape, size)
         height = -1e3 if constants.table_height is None else constants.table_height
         self._table.pos = [0.0, 0.0, height - TABLE_HALF_SIZE[2]]
+
+    def _object_geometry(self, kind: ObjectShape, half: Array) -> tuple[Any, Array]:
+        """MuJoCo's type and size of an object with half edges (3,) [m]."""
+        kinds = self._mujoco.mjtGeom
+        if kind == "box":
+            return kinds.mjGEOM_BOX, half
+        if kind == "cylinder":
+            return kinds.mjGEOM_CYLINDER, np.array([half[0], half[2], 0.0])
+        straight = straight_half(half)
+        known = kinds.mjGEOM_CAPSULE if straight > 0.0 else kinds.mjGEOM_SPHERE
+        return known, np.array([half[0], straight, 0.0])
 
 
 def _wxyz(rotation: Array) -> Array:

@@ -9,13 +9,15 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand.model import LINKS_PER_FINGER, HandModel
+from tactile_cube.hand import Hand
+from tactile_cube.hand.object_shape import ObjectShape, straight_half, unit_inertia
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact, read_contact
 from tactile_cube.simulation.options import SimulationOptions
@@ -23,9 +25,8 @@ from tactile_cube.simulation.surface import SKIN_RELAXATION
 
 Array = NDArray[np.float64]
 
-_TIP = LINKS_PER_FINGER - 1
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
-_ALL_GROUPS = 0xFF
+_ALL_GROUPS = 0xFFFF
 _FIRST_FINGER_GROUP = 0x10
 """Collision group of the first finger, one bit for each; Bullet gives bits below to bodies of its own accord."""
 _URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
@@ -83,7 +84,7 @@ class Scene:
         table: Body id of the table, -1 without one.
     """
 
-    def __init__(self, hand: HandModel, options: SimulationOptions, finger_urdfs: Sequence[str]) -> None:
+    def __init__(self, hand: Hand, options: SimulationOptions, finger_urdfs: Sequence[str]) -> None:
         """Builds the fingers from their descriptions; cube and table come with each episode."""
         self.hand = hand
         self.client = connect(options)
@@ -93,10 +94,14 @@ class Scene:
         )
         self._cube_shape = -1
         self._cube_size = self._cube_com = np.zeros(3)
+        self._cube_kind: ObjectShape = "box"
+        self._links = range(hand.links_per_finger)
+        self._axes = hand.spin_axes()
+        self._bare = [[link for link in self._links if not hand.shapes(k)[link]] for k in range(len(hand.fingers))]
         self.table, self.cube = self._new_table(0.0), self._new_table(0.0)  # hold the places before the fingers'
         bases = [hand.base_in_world(k) for k in range(len(hand.fingers))]
         self.fingers = [load_chain(self.client, urdf, *base) for urdf, base in zip(finger_urdfs, bases, strict=True)]
-        self._inertias = [[self._inertia(body, link) for link in range(LINKS_PER_FINGER)] for body in self.fingers]
+        self._inertias = [[self._inertia(body, link) for link in self._links] for body in self.fingers]
         self._spare_links_without_a_shape()
 
     def place(self, constants: EpisodeConstants, start: Start, angles: Array, velocities: Array) -> None:
@@ -112,7 +117,7 @@ class Scene:
         self._set_table(constants)
         self._set_cube(constants, start)
         for body, q, v in zip(self.fingers, angles, velocities, strict=True):
-            for joint in range(LINKS_PER_FINGER):
+            for joint in self._links:
                 pybullet.resetJointState(body, joint, q[joint], v[joint], physicsClientId=self.client)
         self._set_friction(constants)
         self._forget_contacts()
@@ -124,19 +129,17 @@ class Scene:
     def set_spin_inertia(self, spin_inertia: Array) -> None:
         """Adds inertia about the joint axis to each link, for numerical stability (fingers, links) [kg m^2]."""
         for body, inertias, spins in zip(self.fingers, self._inertias, spin_inertia, strict=True):
-            for link, ((ixx, iyy, izz), spin) in enumerate(zip(inertias, spins, strict=True)):
-                pybullet.changeDynamics(
-                    body,
-                    link,
-                    localInertiaDiagonal=[ixx, iyy + spin, izz] if link else [ixx, iyy, izz + spin],
-                    physicsClientId=self.client,
-                )
+            for link, (diagonal, spin) in enumerate(zip(inertias, spins, strict=True)):
+                spinning = list(diagonal)
+                spinning[self._axes[link]] += spin
+                pybullet.changeDynamics(body, link, localInertiaDiagonal=spinning, physicsClientId=self.client)
 
     def contacts(self) -> list[Contact]:
         """Contacts with the cube and between fingers in the last physics step."""
         names = {body: finger.name for body, finger in zip(self.fingers, self.hand.fingers, strict=True)}
         names |= {self.cube: "cube", self.table: "table"}
-        return [read_contact(row, names) for row in pybullet.getContactPoints(physicsClientId=self.client)]
+        links = {body: self.hand.link_names(k) for k, body in enumerate(self.fingers)}
+        return [read_contact(row, names, links) for row in pybullet.getContactPoints(physicsClientId=self.client)]
 
     def close(self) -> None:
         """Ends the physics server."""
@@ -182,7 +185,7 @@ class Scene:
         self.cube = int(
             pybullet.createMultiBody(
                 constants.cube_mass,
-                self._shape_of(np.asarray(constants.cube_size), np.asarray(constants.cube_com)),
+                self._shape_of(constants),
                 basePosition=list(np.asarray(start.cube_position) + arm),
                 baseOrientation=list(np.asarray(start.cube_quaternion)),
                 useMaximalCoordinates=True,
@@ -199,6 +202,12 @@ class Scene:
             **_NO_DAMPING,
             physicsClientId=self.client,
         )
+        if (
+            constants.object_shape == "capsule"
+        ):  # Bullet takes that of a box for it; without its mass it would lose that
+            moments = constants.cube_mass * unit_inertia("capsule", np.asarray(constants.cube_size))
+            heavy = {"mass": constants.cube_mass, "localInertiaDiagonal": moments.tolist()}
+            pybullet.changeDynamics(self.cube, -1, **heavy, physicsClientId=self.client)
         if constants.tip_compliance > 0.0:
             skin = {
                 "contactStiffness": 1.0 / constants.tip_compliance,
@@ -209,24 +218,25 @@ class Scene:
         linear = np.asarray(start.cube_linear_velocity) + np.cross(turning, arm)
         pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), physicsClientId=self.client)
 
-    def _shape_of(self, size: Array, com: Array) -> int:
-        """The box of the last cube if it had this size and centre of mass, else a new one.
+    def _shape_of(self, constants: EpisodeConstants) -> int:
+        """The shape of the last object if it had this kind, size and centre of mass, else a new one.
 
-        Only a box off its centre of mass pays for a compound shape around it.
+        Only one off its centre of mass pays for a compound shape around it.
         """
-        if not (np.array_equal(size, self._cube_size) and np.array_equal(com, self._cube_com)):
+        kind, size, com = constants.object_shape, np.asarray(constants.cube_size), np.asarray(constants.cube_com)
+        same = kind == self._cube_kind and np.array_equal(size, self._cube_size)
+        if not (same and np.array_equal(com, self._cube_com)):
             place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX, halfExtents=(0.5 * size).tolist(), **place, physicsClientId=self.client
-            )
-            self._cube_shape, self._cube_size, self._cube_com = int(shape), size.copy(), com.copy()
+            shape = pybullet.createCollisionShape(**_geometry(kind, size), **place, physicsClientId=self.client)
+            self._cube_shape, self._cube_kind = int(shape), kind
+            self._cube_size, self._cube_com = size.copy(), com.copy()
         return self._cube_shape
 
     def _set_friction(self, constants: EpisodeConstants) -> None:
         """Friction of the links; Bullet multiplies the factors of the two bodies that touch."""
         for body in self.fingers:
-            for link in range(LINKS_PER_FINGER):
-                tip = link == _TIP
+            for link in self._links:
+                tip = link == self._links[-1]
                 pybullet.changeDynamics(
                     body,
                     link,
@@ -237,8 +247,8 @@ class Scene:
 
     def _spare_links_without_a_shape(self) -> None:
         """Bullet boxes them too, and would compare them with their neighbours at every step."""
-        for body in self.fingers:
-            for link in (-1, *(k for k, link in enumerate(self.hand.links) if link.capsule is None)):
+        for body, bare in zip(self.fingers, self._bare, strict=True):
+            for link in (-1, *bare):
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
 
     def _forget_contacts(self) -> None:
@@ -249,8 +259,22 @@ class Scene:
         """
         for k, body in enumerate(self.fingers):
             group = _FIRST_FINGER_GROUP << k
-            for link, shape in enumerate(self.hand.links):
-                if shape.capsule is not None:
+            for link in self._links:
+                if link not in self._bare[k]:
                     pybullet.setCollisionFilterGroupMask(
                         body, link, group, _ALL_GROUPS & ~group, physicsClientId=self.client
                     )
+
+
+def _geometry(kind: ObjectShape, size: Array) -> dict[str, Any]:
+    """Bullet's words for an object of a kind with a bounding box (3,) [m]."""
+    half = 0.5 * size
+    if kind == "box":
+        return {"shapeType": pybullet.GEOM_BOX, "halfExtents": half.tolist()}
+    radius = float(half[0])
+    if kind == "cylinder":
+        return {"shapeType": pybullet.GEOM_CYLINDER, "radius": radius, "height": float(size[2])}
+    length = 2.0 * straight_half(half)
+    if length == 0.0:
+        return {"shapeType": pybullet.GEOM_SPHERE, "radius": radius}
+    return {"shapeType": pybullet.GEOM_CAPSULE, "radius": radius, "height": length}

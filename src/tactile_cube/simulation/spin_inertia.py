@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.hand import Hand
+from tactile_cube.hand.rigid_body import RigidBodyTree
+
 Array = NDArray[np.float64]
 
-SHARES = np.array([1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 6.0])
-"""Share of a joint's reflected inertia that its link spins with; q2, q3, q4 turn about parallel axes and share it."""
 LEAST_INERTIA = 1e-3
 """Reflected inertia below which spin inertia is not lowered further [kg m^2]."""
 TENDON_STIFFNESS = 15.0
@@ -21,7 +22,29 @@ TENDON_DAMPING = 0.02
 """Its damping [N m s/rad]; stable while k dt^2 w + 2 d dt w < 4 with w = (J3 + 4 J4) / (J3 J4)."""
 
 
-def spin_inertia(reflected_inertia: Array) -> Array:
-    """Spin inertia of each link about its joint (fingers, 4) [kg m^2], from I_a of the joints (12,) [kg m^2]."""
-    per_finger = np.maximum(np.asarray(reflected_inertia).reshape(-1, 3), LEAST_INERTIA)
-    return np.asarray(per_finger[:, [0, 1, 2, 2]] * SHARES)
+PARALLEL = 0.99
+"""Cosine of the angle between axes from which on they count as parallel."""
+
+
+def spin_inertia(hand: Hand, shares: Array, reflected_inertia: Array) -> Array:
+    """Spin inertia of each link about its joint (fingers, links), from I_a of the joints (joints,) [kg m^2]."""
+    return np.asarray(np.maximum(hand.all_angles(reflected_inertia), LEAST_INERTIA) * shares)
+
+
+def spin_shares(tree: RigidBodyTree) -> Array:
+    """Share of a joint's reflected inertia that its link spins with (links,).
+
+    Joints in a row with parallel axes share it, for all further links turn with the first of them: three of them take
+    1/2, 1/3 and 1/6.
+    """
+    groups: list[int] = []
+    turn, before = np.eye(3), np.zeros(3)
+    for k in range(tree.dofs):
+        turn = turn @ tree.placement_rotation[k]
+        axis = turn @ tree.axis[k]
+        if groups and abs(float(axis @ before)) > PARALLEL:
+            groups[-1] += 1
+        else:
+            groups.append(1)
+        before = axis
+    return np.concatenate([np.arange(count, 0, -1) / (count * (count + 1) // 2) for count in groups])

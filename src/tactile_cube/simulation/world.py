@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, TORQUE
-from tactile_cube.hand import DLR_HAND2, HandModel, tip_positions
-from tactile_cube.hand.model import JOINTS_PER_FINGER
+from tactile_cube.errors import InputError
+from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.disturbance import Disturbance
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class World:
-    """Hand and cube in the engine of the options. Joint vectors are ordered ring, middle, fore, thumb x (q1, q2, q3).
+    """Hand and cube in the engine of the options. Joint vectors (joints,) are in the hand's order.
 
     An episode is a function of constants, start and actions alone: equal to the bit, whatever the world did before.
 
@@ -42,7 +42,7 @@ class World:
 
     def __init__(
         self,
-        hand: HandModel = DLR_HAND2,
+        hand: Hand = DLR_HAND2,
         options: SimulationOptions | None = None,
         effects: Sequence[Effect] = (),
     ) -> None:
@@ -65,6 +65,7 @@ class World:
         self._engine = make_engine(hand, self.options, self._drive)
         self._cube = np.zeros(OBJECT_STATE)
         self._push = np.zeros(6)
+        self._coupled = np.array(hand.coupled(), dtype=np.int64).reshape(-1, 2)
 
     # --- running -------------------------------------------------------------------------------------------------
 
@@ -78,25 +79,28 @@ class World:
         Raises:
             InputError: The torque loop would be unstable with these constants and this time step.
         """
+        self._require_its_joints(constants, start)
         self.constants = constants
         self.steps, self.fault, self.trace = 0, "", {}
         self._push[:] = 0.0
         self._disturbance = Disturbance(constants)
         self._drive.reset(constants, start)
-        self._engine.place(constants, start, _all_joints(start.angles), _all_joints(start.velocities))
+        self._engine.place(constants, start, self.hand.all_angles(start.angles), self.hand.all_angles(start.velocities))
         self.set_weight(constants.gravity_scale if constants.gravity_onset == 0 else 0.0)
         self._drive.sense(self._engine.q.ravel(), self._engine.v.ravel())
         self._cube = self._engine.cube_state()
 
     def step(self, q_n: Array) -> None:
-        """One policy step: `options.substeps` physics steps with the desired joint angles q_n (12,) [rad]."""
+        """One policy step: `options.substeps` physics steps with the desired joint angles q_n (joints,) [rad]."""
         if self.steps == self.constants.gravity_onset:
             self.set_weight(self.constants.gravity_scale)
         self._drive.view("goal")[:] = q_n - self.constants.joint_offset
         self._run()
         self.steps += 1
         self._cube = self._engine.cube_state()
-        self.fault = self.fault or find_fault(self._engine.q, self._engine.v, self._cube, self._engine.gaps())
+        self.fault = self.fault or find_fault(
+            self._engine.q, self._engine.v, self._cube, self._engine.gaps(), self._coupled
+        )
 
     def set_weight(self, scale: float) -> None:
         """Gives the cube a share of its weight until changed or reset: the engine's gravity.
@@ -113,8 +117,7 @@ class World:
 
     def pull_finger(self, finger: int, force: Array) -> None:
         """Pulls a fingertip with a force (3,) [N] in the world until changed or reset."""
-        joints = slice(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1))
-        self._drive.view("external_torque")[joints] = self._tip_jacobian(finger).T @ force
+        self._drive.view("external_torque")[self.hand.of_finger(finger)] = self._tip_jacobian(finger).T @ force
 
     def close(self) -> None:
         """Ends the simulation."""
@@ -124,37 +127,37 @@ class World:
 
     @property
     def q(self) -> Array:
-        """True joint angles (12,) [rad]."""
-        return np.asarray(self._engine.q[:, :JOINTS_PER_FINGER].ravel())
+        """True joint angles (joints,) [rad]."""
+        return self.hand.actuated(self._engine.q)
 
     @property
     def dq(self) -> Array:
-        """True joint velocities (12,) [rad/s]."""
-        return np.asarray(self._engine.v[:, :JOINTS_PER_FINGER].ravel())
+        """True joint velocities (joints,) [rad/s]."""
+        return self.hand.actuated(self._engine.v)
 
     @property
     def all_joint_angles(self) -> Array:
-        """Angles of all joints (16,) [rad], q1..q4 of each finger: the joints of `hand_urdf`."""
+        """Angles of all joints [rad], finger by finger, coupled ones included: the joints of the hand's URDF."""
         return np.array(self._engine.q.ravel())
 
     @property
     def q_m(self) -> Array:
-        """Measured joint angles (12,) [rad]: motor side of the elasticity, joint offset included, without noise."""
+        """Measured joint angles (joints,) [rad]: motor side of the elasticity, joint offset included, without noise."""
         return np.asarray(self._drive.signal(MOTOR_POSITION) + self.constants.joint_offset)
 
     @property
     def q_f(self) -> Array:
-        """Target after the low-pass (12,) [rad], in what the sensors read."""
+        """Target after the low-pass (joints,) [rad], in what the sensors read."""
         return np.asarray(self._drive.view("filtered") + self.constants.joint_offset)
 
     @property
     def q_d(self) -> Array:
-        """Target of the impedance law after rate and torque limits (12,) [rad], in what the sensors read."""
+        """Target of the impedance law after rate and torque limits (joints,) [rad], in what the sensors read."""
         return np.asarray(self._drive.signal(COMMAND) + self.constants.joint_offset)
 
     @property
     def torque(self) -> Array:
-        """Joint torques of the last physics step (12,) [N m]."""
+        """Joint torques of the last physics step (joints,) [N m]."""
         return self._drive.signal(TORQUE)
 
     @property
@@ -179,7 +182,7 @@ class World:
 
     @property
     def tip_positions(self) -> Array:
-        """Centres of the fingertip spheres in the world (4, 3) [m]."""
+        """Centres of the fingertip spheres in the world (fingers, 3) [m]."""
         return tip_positions(self.hand, self.q)
 
     @property
@@ -201,6 +204,13 @@ class World:
         """Contacts of the last physics step."""
         return self._engine.contacts()
 
+    def _require_its_joints(self, constants: EpisodeConstants, start: Start) -> None:
+        if not constants.joints == start.angles.size == self.hand.joints:
+            raise InputError(
+                f"hand '{self.hand.name}' has {self.hand.joints} joints; the constants are of {constants.joints} and "
+                f"the start of {start.angles.size}: take them from `constants_of(hand)` and the hand's start poses"
+            )
+
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
     def _run(self) -> None:
@@ -219,16 +229,10 @@ class World:
         return random + self._push
 
     def _tip_jacobian(self, finger: int) -> Array:
-        """Velocity of a fingertip's centre per joint velocity (3, 3), by central differences."""
+        """Velocity of a fingertip's centre per velocity of its finger's joints (3, n), by central differences."""
         columns, q, width = [], self.q, 1e-6
-        for joint in range(JOINTS_PER_FINGER * finger, JOINTS_PER_FINGER * (finger + 1)):
+        for joint in range(q.size)[self.hand.of_finger(finger)]:
             delta = np.where(np.arange(q.size) == joint, width, 0.0)
             ahead, behind = tip_positions(self.hand, q + delta), tip_positions(self.hand, q - delta)
             columns.append((ahead - behind)[finger] / (2.0 * width))
         return np.stack(columns, axis=1)
-
-
-def _all_joints(values: Array | float) -> Array:
-    """Values of all joints (fingers, 4) from those of the actuated ones (12,): q4 follows q3."""
-    actuated = np.asarray(values).reshape(-1, JOINTS_PER_FINGER)
-    return np.concatenate([actuated, actuated[:, -1:]], axis=1)

@@ -13,7 +13,7 @@ from torchrl.envs import TransformedEnv
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.env import OUTCOMES, REWARD_TERMS
-from tactile_cube.env.rotation import JOINTS, OBJECT_STATE
+from tactile_cube.env.rotation import OBJECT
 from tactile_cube.training.collection import MakeEnv
 from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.transforms.finger_exploration import Teacher
@@ -42,9 +42,10 @@ class Environment:
 
 def rotation_environment(config: EnvConfig) -> Environment:
     """The rotation task as configured."""
+    joints = config.hand.joints
     return Environment(
         make=functools.partial(_make, config),
-        sizes=Sizes(2 * JOINTS * config.stack, OBJECT_STATE, JOINTS),
+        sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
         reward_terms=len(REWARD_TERMS),
         reward_weights=functools.partial(_weights, config),
         outcomes=tuple(OUTCOMES),
@@ -62,7 +63,7 @@ def _teacher(config: EnvConfig) -> Teacher | None:
         return None
     path = Path(config.exploration.teacher)
     actor, info = load_policy(path)
-    require_sizes(path, info, 2 * JOINTS * config.stack, JOINTS)
+    require_sizes(path, info, 2 * config.hand.joints * config.stack, config.hand.joints)
     return actor.deterministic
 
 

@@ -15,19 +15,19 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand.gait import GaitRanges
 from tactile_cube.transforms.partial_reset import reset_mask
 
-GROUPS = torch.tensor(
-    [
-        *[[finger == one for finger in range(4)] for one in range(4)],
-        [True, False, True, False],
-        [False, True, False, True],
-        *[[True] * 4] * 2,
-    ]
-)
-"""Fingers that move together (8, 4): each alone, the opposing pairs ring-fore and middle-thumb, all (twice)."""
+
+def finger_groups(fingers: int) -> Tensor:
+    """Fingers that move together (groups, fingers): each alone, every second one where there are four, all (twice).
+
+    Of four fingers those are the opposing pairs: ring and fore, middle and thumb.
+    """
+    pairs = [[finger % 2 == first for finger in range(fingers)] for first in (0, 1)] if fingers == 4 else []
+    alone = [[finger == one for finger in range(fingers)] for one in range(fingers)]
+    return torch.tensor([*alone, *pairs, *[[True] * fingers] * 2])
 
 
 Teacher = Callable[[Tensor], Tensor]
-"""From the stacked observation (..., 120) to the action (..., 12)."""
+"""From the stacked observation (..., readings) to the action (..., joints)."""
 
 
 @dataclass(frozen=True)
@@ -84,24 +84,35 @@ class FingerExploration(Transform):  # type: ignore[misc]
 
     In others a scripted gait or a teacher acts. Adds "exploring" (1), constant in an episode, so that statistics can
     leave such episodes out, "demonstrated" (1), true after a step in which gait or teacher acted, and "action_taken"
-    (12), the action after this transform: the one that a replay must store. Draws from torch's global generator, the
-    same number of draws at every step.
+    (joints), the action after this transform: the one that a replay must store. Draws from torch's global generator,
+    the same number of draws at every step.
 
     Example:
         >>> env = TransformedEnv(worlds, FingerExploration(Exploration(episodes=0.3)))
     """
 
-    def __init__(self, exploration: Exploration, gaits: Tensor | None = None, teacher: Teacher | None = None) -> None:
+    def __init__(
+        self,
+        exploration: Exploration,
+        gaits: Tensor | None = None,
+        teacher: Teacher | None = None,
+        fingers: int = 4,
+        joints_per_finger: int = 3,
+    ) -> None:
         """Explores as `exploration` says.
 
         Args:
             exploration: how much of it.
-            gaits: actions (gaits, steps, 12) that demonstrations play.
+            gaits: actions (gaits, steps, joints) that demonstrations play.
             teacher: what acts in demonstrations instead.
+            fingers: of the hand.
+            joints_per_finger: of it.
         """
         super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
-        self._gaits = torch.zeros(1, 1, 12) if gaits is None else gaits
+        self._groups, self._per_finger = finger_groups(fingers), joints_per_finger
+        self._joints = fingers * joints_per_finger
+        self._gaits = torch.zeros(1, 1, self._joints) if gaits is None else gaits
         self._teacher = teacher
         self._exploring = self._demonstrating = self._demonstrated = self._held = torch.zeros(0)
         self._gait = self._clock = self._target = self._fingers = self._taken = torch.zeros(0)
@@ -116,9 +127,9 @@ class FingerExploration(Transform):  # type: ignore[misc]
             self._held = torch.zeros_like(mask, dtype=torch.int64)
             self._gait = torch.zeros_like(mask, dtype=torch.int64)
             self._clock = torch.zeros_like(mask, dtype=torch.int64)
-            self._target = torch.zeros(*worlds, 12)
-            self._fingers = torch.zeros(*worlds, 12, dtype=torch.bool)
-            self._taken = torch.zeros(*worlds, 12)
+            self._target = torch.zeros(*worlds, self._joints)
+            self._fingers = torch.zeros(*worlds, self._joints, dtype=torch.bool)
+            self._taken = torch.zeros(*worlds, self._joints)
         draw = torch.rand(mask.shape)
         demonstrating = (draw >= self.settings.episodes) & (draw < self.settings.extra)
         self._exploring = torch.where(mask, draw < self.settings.extra, self._exploring)
@@ -143,7 +154,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         return tensordict.set("action", self._taken)
 
     def _shown(self, tensordict: TensorDictBase) -> Tensor:
-        """What demonstrations do at this step, (..., 12)."""
+        """What demonstrations do at this step, (..., joints)."""
         if self._teacher is not None:
             with torch.no_grad():
                 return self._teacher(tensordict.get("observation"))
@@ -153,8 +164,8 @@ class FingerExploration(Transform):  # type: ignore[misc]
         """Lets exploring worlds that hold nothing begin to hold, with the probability of a step."""
         begins = (torch.rand(*worlds, 1) < self.settings.probability) & self._exploring & (self._held == 0)
         steps = torch.randint(self.settings.shortest, self.settings.longest + 1, (*worlds, 1))
-        fingers = GROUPS[torch.randint(len(GROUPS), worlds)].repeat_interleave(3, dim=-1)
-        target = 2.0 * torch.rand(*worlds, 12) - 1.0
+        fingers = self._groups[torch.randint(len(self._groups), worlds)].repeat_interleave(self._per_finger, dim=-1)
+        target = 2.0 * torch.rand(*worlds, self._joints) - 1.0
         self._held = torch.where(begins, steps, self._held)
         self._fingers = torch.where(begins, fingers, self._fingers)
         self._target = torch.where(begins, target, self._target)
@@ -169,5 +180,5 @@ class FingerExploration(Transform):  # type: ignore[misc]
         worlds = observation_spec.shape
         observation_spec["exploring"] = Categorical(2, shape=(*worlds, 1), dtype=torch.bool)
         observation_spec["demonstrated"] = Categorical(2, shape=(*worlds, 1), dtype=torch.bool)
-        observation_spec["action_taken"] = Unbounded((*worlds, 12))
+        observation_spec["action_taken"] = Unbounded((*worlds, self._joints))
         return observation_spec

@@ -16,7 +16,7 @@ from tactile_cube.drivetrain.model_file import as_model
 from tactile_cube.env import Curriculum, Reward, RotationEnv, Task
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, HandModel
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
@@ -24,7 +24,7 @@ from tactile_cube.simulation.resolution import unresolved
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
 from tactile_cube.transforms.joint_offset import JointOffset
 from tactile_cube.transforms.observation_stack import ObservationStack
-from tactile_cube.transforms.privileged_state import SCALE, PrivilegedState
+from tactile_cube.transforms.privileged_state import PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
 
@@ -39,6 +39,7 @@ class EnvConfig:
 
     Attributes:
         task: what to do.
+        hand: who does it; its number of joints gives the sizes of observations and actions.
         reward: weights.
         randomization: what differs between episodes.
         start: start poses.
@@ -65,13 +66,20 @@ class EnvConfig:
     model: Any = None
     stack: int = 5
     privileged: bool = True
+    hand: Hand = DLR_HAND2
 
     def __post_init__(self) -> None:
         """Makes the effects, puts the model in place, and refuses values without a meaning."""
-        effects = [one for effect in self.effects for one in placed_effects(effect)]
+        object.__setattr__(self, "hand", self.hand or DLR_HAND2)  # null in the configuration
+        effects = [one for effect in self.effects for one in placed_effects(effect, self.hand)]
+        if self.constants.joints != self.hand.joints:
+            raise InputError(
+                f"env.constants are of {self.constants.joints} joints, hand '{self.hand.name}' has {self.hand.joints}; "
+                "take them from tactile_cube.simulation.constants_of(hand)"
+            )
         if self.model is not None:
             model = as_model(self.model)
-            known = identified(model, self.constants, self.randomization, DLR_HAND2.joint_names)
+            known = identified(model, self.constants, self.randomization, self.hand.joint_names)
             for key, value in zip(("constants", "randomization"), known[:2], strict=True):
                 object.__setattr__(self, key, value)
             effects += known[2]
@@ -94,17 +102,17 @@ def make_env(
     worlds: int,
     seed: int,
     evaluation: bool = False,
-    hand: HandModel = DLR_HAND2,
     teacher: Teacher | None = None,
 ) -> TransformedEnv:
-    """Environment with batch size [worlds] and the keys "observation" (120), "privileged" (25), "action" (12).
+    """Environment with batch size [worlds] and the keys "observation", "privileged" and "action".
+
+    For a hand with 12 joints and a stack of 5 they have 120, 25 and 12 numbers.
 
     Args:
         config: what the environment is.
         worlds: number of worlds that this process hosts; with `simulation.engine` mixed, engines alternate among them.
         seed: seed of the worlds and, through torch's global generator, of the transforms.
         evaluation: leaves out the extra exploration and the curriculum; everything else stays as configured.
-        hand: the hand.
         teacher: what acts in demonstrations instead of gaits.
 
     Raises:
@@ -112,10 +120,10 @@ def make_env(
     """
     if worlds < 1:
         raise InputError(f"number of worlds is {worlds}; give at least 1")
-    poses = config.start.of(hand)
-    tasks = [rotation_env(_of_world(config, seed + index), hand, poses) for index in range(worlds)]
+    poses = config.start.of(config.hand, config.constants)
+    tasks = [rotation_env(_of_world(config, seed + index), poses) for index in range(worlds)]
     base = WorldsEnv(tasks, None if evaluation else config.curriculum)
-    env = TransformedEnv(base, Compose(*transforms(config, hand, explore=not evaluation, teacher=teacher)))
+    env = TransformedEnv(base, Compose(*transforms(config, explore=not evaluation, teacher=teacher)))
     env.set_seed(seed)
     return env
 
@@ -125,45 +133,50 @@ def _of_world(config: EnvConfig, index: int) -> EnvConfig:
     return replace(config, simulation=config.simulation.of_world(index))
 
 
-def rotation_env(config: EnvConfig, hand: HandModel = DLR_HAND2, poses: StartPoses | None = None) -> RotationEnv:
+def rotation_env(config: EnvConfig, poses: StartPoses | None = None) -> RotationEnv:
     """The task in one new world, without transforms; `poses` are the start poses where they are at hand already."""
-    world = World(hand, config.simulation, config.effects)
-    start = config.start.of(hand) if poses is None else poses
-    return RotationEnv(world, config.task, config.reward, config.randomization, start, config.constants, hand)
+    world = World(config.hand, config.simulation, config.effects)
+    start = config.start.of(config.hand, config.constants) if poses is None else poses
+    return RotationEnv(world, config.task, config.reward, config.randomization, start, config.constants, config.hand)
 
 
-def transforms(config: EnvConfig, hand: HandModel, explore: bool, teacher: Teacher | None = None) -> list[Transform]:
+def transforms(config: EnvConfig, explore: bool, teacher: Teacher | None = None) -> list[Transform]:
     """The transforms, from the world to the policy: readings pass them downwards, actions upwards."""
-    disturbances = config.randomization
+    disturbances, hand = config.randomization, config.hand
     half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)
     chain: list[Transform] = [
         JointOffset(disturbances.joint_offset, half_range),
         SensorNoise(disturbances.sensor_noise),
         ObservationStack(config.stack),
-        PrivilegedState(SCALE if config.privileged else (0.0,) * len(SCALE)),
+        PrivilegedState(hand.joints, config.privileged),
         StickyAction(disturbances.sticky_probability),
     ]
     if explore and config.exploration.extra > 0.0:
-        gaits = None if teacher is not None else demonstrated_gaits(config, hand)
-        chain.append(FingerExploration(config.exploration, gaits, teacher))
+        gaits = None if teacher is not None else demonstrated_gaits(config)
+        size = (len(hand.fingers), hand.joints_per_finger)
+        chain.append(FingerExploration(config.exploration, gaits, teacher, *size))
     return chain
 
 
-def placed_effects(effect: Effect | str) -> list[Effect]:
+def placed_effects(effect: Effect | str, hand: Hand = DLR_HAND2) -> list[Effect]:
     """The effects that a text such as `backlash@q2: play=0.02` names, one for each joint that matches."""
     if isinstance(effect, Effect):
         return [effect]
     name, values = parse_effect(effect)
-    return [kind(joint, **values) for kind, joint in resolve([name], DLR_HAND2.joint_names)]
+    return [kind(joint, **values) for kind, joint in resolve([name], hand.joint_names)]
 
 
-def demonstrated_gaits(config: EnvConfig, hand: HandModel) -> torch.Tensor | None:
-    """Actions (gaits, steps, 12) of whole episodes; None without demonstrations."""
+def demonstrated_gaits(config: EnvConfig) -> torch.Tensor | None:
+    """Actions (gaits, steps, joints) of whole episodes; None without demonstrations."""
     if config.exploration.demonstrations == 0.0:
         return None
     if config.exploration.gaits is None:
         raise InputError(
             "exploration.demonstrations has neither gaits nor a teacher; choose exploration=demonstrations or teacher"
         )
-    gaits = similar_gaits(hand, config.exploration.gaits, GAITS, config.task.episode_steps, config.task.direction)
+    if config.task.axis_vector()[2] < 1.0:
+        raise InputError(f"task.axis is {config.task.axis}: gaits turn about z; choose exploration=fingers or none")
+    gaits = similar_gaits(
+        config.hand, config.exploration.gaits, GAITS, config.task.episode_steps, config.task.direction
+    )
     return torch.tensor(gaits, dtype=torch.float32)

@@ -14,7 +14,9 @@ TILT = 1.0 / 0.1
 """It tilts by about 0.1 rad."""
 VELOCITY = 1.0 / 0.05
 """It moves at some centimetres a second."""
-SCALE = (POSITION,) * 3 + (1.0, 1.0) + (TILT,) * 2 + (VELOCITY,) * 3 + (1.0,) * 3 + (1.0,) * 12
+OBJECT_SCALE = (POSITION,) * 3 + (1.0, 1.0) + (TILT,) * 2 + (VELOCITY,) * 3 + (1.0,) * 3
+SCALE = OBJECT_SCALE + (1.0,) * 12
+"""With the joints' angles q_f of the DLR-Hand II behind them, which are taken as they are."""
 
 
 class PrivilegedState(Transform):  # type: ignore[misc]
@@ -27,10 +29,10 @@ class PrivilegedState(Transform):  # type: ignore[misc]
         >>> env = TransformedEnv(worlds, PrivilegedState())  # privileged (25,)
     """
 
-    def __init__(self, scale: tuple[float, ...] = SCALE) -> None:
-        """Multiplies the entries by `scale`."""
+    def __init__(self, joints: int = 12, visible: bool = True) -> None:
+        """Scales the entries of a hand with `joints` joints; all are zero where they are not `visible`."""
         super().__init__(in_keys=["object_state"], out_keys=["privileged"])
-        self.scale: Tensor = torch.tensor(scale)
+        self.scale: Tensor = torch.tensor(OBJECT_SCALE + (1.0,) * joints) * float(visible)
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
         return next_tensordict.set("privileged", next_tensordict.pop("object_state") * self.scale)

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import rerun.blueprint as rrb
 
-from tactile_cube.evaluation.touch import FINGERS
-
 TIMELINE = "time"
-COLLISION_SHAPES = "- /hand/dlr_hand2/collision_geometries/**"
-"""Rerun's URDF importer logs them beside the visual ones; seen together they flicker."""
 LEGEND = rrb.PlotLegend(corner="LeftTop")
 
 
-def episode_blueprint() -> rrb.Blueprint:
-    """Return the layout: the hand in 3D on the left, the task's signals and the 500 Hz joint signals on the right."""
+def episode_blueprint(fingers: Sequence[str], hand_name: str) -> rrb.Blueprint:
+    """Return the layout: the hand in 3D on the left, the task's signals and the 500 Hz joint signals on the right.
+
+    Args:
+        fingers: names of the hand's fingers.
+        hand_name: of the robot in the hand's URDF.
+    """
+    # Rerun's URDF importer logs collision shapes beside the visual ones; seen together they flicker.
+    collision_shapes = f"- /hand/{hand_name}/collision_geometries/**"
     hand = rrb.Spatial3DView(
         name="Hand and cube",
         origin="/",
-        contents=["/hand/**", COLLISION_SHAPES, "/cube/**", "/contacts/**", "/trail", "/support/**"],
+        contents=["/hand/**", collision_shapes, "/cube/**", "/contacts/**", "/trail", "/support/**"],
         eye_controls=rrb.EyeControls3D(position=(0.30, -0.34, -0.10), look_target=(0.0, 0.0, 0.04), eye_up=(0, 0, 1)),
         line_grid=False,
     )
@@ -30,7 +35,7 @@ def episode_blueprint() -> rrb.Blueprint:
         rrb.TimeSeriesView(name="curriculum: T_s [s], gravity", origin="/curriculum"),
         rrb.TextDocumentView(name="Episode", origin="/episode"),
     )
-    joints = rrb.Tabs(*(_finger_view(finger) for finger in FINGERS), name="Joints at the physics rate")
+    joints = rrb.Tabs(*(_finger_view(finger) for finger in fingers), name="Joints at the physics rate")
     return rrb.Blueprint(
         rrb.Horizontal(hand, rrb.Vertical(task, joints), column_shares=[5, 4]),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -12,8 +13,8 @@ from rerun.urdf import UrdfTree
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
-from tactile_cube.evaluation.touch import FINGERS, TOUCH_FORCE
-from tactile_cube.hand import DLR_HAND2, HandModel, hand_urdf
+from tactile_cube.evaluation.touch import TOUCH_FORCE
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.visualization.blueprint import TIMELINE, episode_blueprint
 from tactile_cube.visualization.scene import FACE_COLOURS, FACE_NORMALS, STICKER, STICKER_HEIGHT
 from tactile_cube.visualization.solid_links import fill_shapes
@@ -22,15 +23,15 @@ ARROW_LENGTH = 0.03
 """Length of a contact arrow [m/N]."""
 POSE_RATE = 50.0
 """Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
-FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215))
+FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215), (150, 90, 200), (90, 190, 200))
 SIGNALS = {"q": 1.0, "q_m": 0.75, "q_f": 0.6, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
 TRAIL = 50
 """Policy steps for which the way of the cube's corner stays visible: 5 s."""
-JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255))
+JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255), (240, 190, 80), (190, 120, 230), (130, 210, 220))
 
 
-def write_recording(record: EpisodeRecord, path: Path, hand: HandModel = DLR_HAND2, summary: str = "") -> None:
+def write_recording(record: EpisodeRecord, path: Path, hand: Hand = DLR_HAND2, summary: str = "") -> None:
     """Write one episode with its blueprint; open it with `rerun FILE.rrd`.
 
     Args:
@@ -40,7 +41,7 @@ def write_recording(record: EpisodeRecord, path: Path, hand: HandModel = DLR_HAN
         summary: Markdown shown beside the episode.
     """
     stream = rr.RecordingStream("tactile_cube", recording_id=path.stem)
-    stream.save(path, default_blueprint=episode_blueprint())
+    stream.save(path, default_blueprint=episode_blueprint(record.fingers, hand.name))
     _log_hand(stream, record, hand)
     _log_cube(stream, record)
     _log_trail(stream, record)
@@ -70,9 +71,9 @@ def _at(time: Array) -> list[rr.TimeColumn]:
     return [rr.TimeColumn(TIMELINE, duration=time)]
 
 
-def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: HandModel) -> None:
+def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: Hand) -> None:
     """Log the URDF once and each joint's transform over time, the coupled joint with the angle of its neighbour."""
-    urdf = hand_urdf(hand)
+    urdf = hand.urdf()
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "hand.urdf"
         file.write_text(urdf, encoding="utf-8")
@@ -90,10 +91,23 @@ def _log_hand(stream: rr.RecordingStream, record: EpisodeRecord, hand: HandModel
     time, q, _, _ = _pose_samples(record)
     columns = {name: index for index, name in enumerate(hand.joint_names)}
     for joint in tree.joints():
-        actuated = joint.name.replace("_q4", "_q3")
+        actuated = hand.followed(joint.name)
         if actuated in columns:
             transform = joint.compute_transform_columns(q[:, columns[actuated]].tolist(), clamp=False)
             stream.send_columns(f"hand/joint_transforms/{joint.name}", _at(time), transform)
+
+
+def _log_round_body(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
+    """Log a round object's body; the stripes on it tell how it is turned."""
+    radius = 0.5 * float(record.cube_size[0])
+    capsule = record.object_shape == "capsule"
+    length = float(record.cube_size[2]) - (2.0 * radius if capsule else 0.0)
+    grey = [(90, 90, 96)]
+    look: dict[str, Any] = {"colors": grey, "fill_mode": "solid"}
+    stream.log("cube/body", rr.Cylinders3D(lengths=[length], radii=[radius], **look), static=True)
+    if capsule:
+        ends = [[0.0, 0.0, 0.5 * length], [0.0, 0.0, -0.5 * length]]
+        stream.log("cube/ends", rr.Ellipsoids3D(centers=ends, half_sizes=[[radius] * 3] * 2, **look), static=True)
 
 
 def _log_cube(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
@@ -101,10 +115,15 @@ def _log_cube(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     normals = np.array(list(FACE_NORMALS.values()), dtype=np.float64)
     half = record.cube_size / 2
     stickers = np.where(np.abs(normals) == 1, STICKER_HEIGHT, STICKER * half)
-    colours = [tuple(round(255 * part) for part in colour) for colour in FACE_COLOURS.values()]
+    frame, colours = half, [tuple(round(255 * part) for part in colour) for colour in FACE_COLOURS.values()]
+    if record.object_shape != "box":
+        _log_round_body(stream, record)
+        stripes = np.abs(normals[:, :2]).sum(axis=1) == 1
+        stickers = np.where(np.abs(normals) == 1, 0.03 * half[0], (0.1, 0.1, 0.4) * half) * stripes[:, None]
+        frame = np.zeros(3)
     boxes = rr.Boxes3D(
         centers=np.vstack([np.zeros((1, 3)), normals * half]),
-        half_sizes=np.vstack([half[None], stickers]),
+        half_sizes=np.vstack([frame[None], stickers]),
         colors=[(40, 40, 40), *colours],
         fill_mode="solid",
     )
@@ -134,7 +153,7 @@ def _log_contacts(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
         arrows = rr.Arrows3D(
             origins=table.position[rows] - vectors,
             vectors=vectors,
-            colors=[FINGER_COLOURS[finger] for finger in table.finger[rows].tolist()],
+            colors=[FINGER_COLOURS[finger % len(FINGER_COLOURS)] for finger in table.finger[rows].tolist()],
             radii=0.0012,
         )
         stream.log("contacts", arrows)
@@ -143,9 +162,9 @@ def _log_contacts(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
 
 def _log_task(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     _send(stream, "task/theta", record.time, record.theta, ["theta"])
-    forces = np.zeros((record.steps + 1, len(FINGERS)))
+    forces = np.zeros((record.steps + 1, len(record.fingers)))
     np.add.at(forces, (record.contacts.step, record.contacts.finger), record.contacts.normal_force)
-    _send(stream, "task/force", record.time, forces, list(FINGERS), FINGER_COLOURS)
+    _send(stream, "task/force", record.time, forces, list(record.fingers), FINGER_COLOURS[: len(record.fingers)])
     for name, values in record.reward_terms.items():
         _send(stream, f"task/reward/{name}", record.time[1:], values, [name])
     _send(stream, "task/reward/sum", record.time[1:], record.reward, ["sum"])
@@ -156,15 +175,16 @@ def _log_task(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
 
 def _log_joints(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     """Send the joint signals of each finger at the physics rate in one piece each."""
-    for index, finger in enumerate(FINGERS):
-        mine = slice(3 * index, 3 * index + 3)
+    for index, finger in enumerate(record.fingers):
+        mine = record.of_finger(index)
         entity = f"joints/{finger}"
         for signal, brightness in SIGNALS.items():
             if signal in record.trace:
                 colours = [tuple(round(brightness * part) for part in colour) for colour in JOINT_COLOURS]
-                time, values = record.trace["time"], record.trace[signal][:, mine]
-                _send(stream, f"{entity}/{signal}", time, values, _joint_labels(signal), colours)
-        _send(stream, f"{entity}/q_n", record.time[:-1], record.target[:, mine], _joint_labels("q_n"))
+                _send_joints(
+                    stream, f"{entity}/{signal}", record.trace["time"], record.trace[signal][:, mine], signal, colours
+                )
+        _send_joints(stream, f"{entity}/q_n", record.time[:-1], record.target[:, mine], "q_n")
 
 
 def _log_readings(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
@@ -176,15 +196,25 @@ def _log_readings(stream: rr.RecordingStream, record: EpisodeRecord) -> None:
     last = np.maximum(stride * np.arange(record.steps) - 1, 0)  # the physics step that ends where the policy is asked
     q_m = record.trace["q_m"][last]
     e_q = record.trace["q_f"][last] - q_m
-    for index, finger in enumerate(FINGERS):
-        mine = slice(3 * index, 3 * index + 3)
+    for index, finger in enumerate(record.fingers):
+        mine = record.of_finger(index)
         for name, values in (("q_m", q_m), ("e_q", e_q)):
             entity = f"policy/{finger}/{name}"
-            _send(stream, entity, record.time[:-1], values[:, mine], _joint_labels(name), JOINT_COLOURS)
+            _send_joints(stream, entity, record.time[:-1], values[:, mine], name, JOINT_COLOURS)
 
 
-def _joint_labels(signal: str) -> list[str]:
-    return [f"{signal}, joint {joint}" for joint in (1, 2, 3)]
+def _send_joints(
+    stream: rr.RecordingStream,
+    entity: str,
+    time: Array,
+    values: Array,
+    signal: str,
+    colours: Sequence[tuple[int, ...]] | None = None,
+) -> None:
+    """A signal (n, joints) of one finger; colours go round where it has more joints than there are."""
+    count = values.shape[1]
+    painted = None if colours is None else [colours[joint % len(colours)] for joint in range(count)]
+    _send(stream, entity, time, values, [f"{signal}, joint {joint + 1}" for joint in range(count)], painted)
 
 
 def _send(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -9,7 +10,8 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from tactile_cube.evaluation.episode_record import EpisodeRecord
-from tactile_cube.evaluation.touch import FINGERS, touching
+from tactile_cube.evaluation.touch import touching
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
 MAX_BYTES = 3_000_000
@@ -21,7 +23,7 @@ CAPTION_HEIGHT = 22
 TOUCH, FREE = (40, 160, 70), (205, 205, 205)
 
 
-def write_film(record: EpisodeRecord, path: Path, *, view: int = 256) -> None:
+def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand = DLR_HAND2) -> None:
     """Write an animated GIF: the hand from the side and from below, at most 3 MB.
 
     It runs in real time up to 40 s; longer episodes run faster.
@@ -30,10 +32,11 @@ def write_film(record: EpisodeRecord, path: Path, *, view: int = 256) -> None:
         record: the episode.
         path: file to write, `.gif`.
         view: edge of each of the two pictures [pixels].
+        hand: the hand that acted.
     """
     stride = max(STRIDE, -(-record.steps // MAX_FRAMES))
     samples = list(range(0, record.steps + 1, stride))
-    frames = _frames(record, samples, view)
+    frames = _frames(record, samples, view, hand)
     duration = STRIDE * float(record.time[1] - record.time[0])
     for colours in (96, 48, 24):
         _save_gif(frames, path, duration, colours)
@@ -42,9 +45,11 @@ def write_film(record: EpisodeRecord, path: Path, *, view: int = 256) -> None:
     _save_gif([frame.resize((frame.width * 2 // 3, frame.height * 2 // 3)) for frame in frames], path, duration, 24)
 
 
-def write_stills(record: EpisodeRecord, path: Path, *, every: int = 5, columns: int = 6, view: int = 160) -> None:
+def write_stills(
+    record: EpisodeRecord, path: Path, *, every: int = 5, columns: int = 6, view: int = 160, hand: Hand = DLR_HAND2
+) -> None:
     """Write a PNG sheet with one pair of pictures every `every` policy steps, read row by row."""
-    frames = _frames(record, list(range(0, record.steps + 1, every)), view)
+    frames = _frames(record, list(range(0, record.steps + 1, every)), view, hand)
     width, height = frames[0].size
     rows = -(-len(frames) // columns)
     sheet = Image.new("RGB", (columns * width, rows * height), "white")
@@ -53,27 +58,27 @@ def write_stills(record: EpisodeRecord, path: Path, *, every: int = 5, columns: 
     sheet.save(path, optimize=True)
 
 
-def _frames(record: EpisodeRecord, samples: list[int], view: int) -> list[Image.Image]:
+def _frames(record: EpisodeRecord, samples: list[int], view: int, hand: Hand) -> list[Image.Image]:
     contact = touching(record)
     frames = []
-    with closing(Scene(record.cube_size)) as scene:
+    with closing(Scene(record.cube_size, hand, record.object_shape)) as scene:
         for sample in samples:
             scene.pose(record.joint_position[sample], record.cube_position[sample], record.cube_quaternion[sample])
             frame = Image.new("RGB", (2 * view, view + CAPTION_HEIGHT), "white")
             frame.paste(scene.picture(SIDE, view, view), (0, CAPTION_HEIGHT))
             frame.paste(scene.picture(BELOW, view, view), (view, CAPTION_HEIGHT))
             angle = record.theta[sample] - record.theta[0]
-            _caption(frame, float(record.time[sample]), float(angle), contact[sample].tolist())
+            _caption(frame, float(record.time[sample]), float(angle), record.fingers, contact[sample].tolist())
             frames.append(frame)
     return frames
 
 
-def _caption(frame: Image.Image, time: float, angle: float, contact: list[bool]) -> None:
+def _caption(frame: Image.Image, time: float, angle: float, fingers: Sequence[str], contact: list[bool]) -> None:
     """Write time and angle, and a lamp for each finger: green while it touches the cube."""
     draw = ImageDraw.Draw(frame)
     draw.text((4, 5), f"{time:4.1f} s  {np.degrees(angle):5.0f} deg", fill="black")
-    spacing = frame.width // 2 // len(FINGERS)
-    for index, (finger, on) in enumerate(zip(FINGERS, contact, strict=True)):
+    spacing = frame.width // 2 // len(fingers)
+    for index, (finger, on) in enumerate(zip(fingers, contact, strict=True)):
         left = frame.width // 2 + index * spacing
         draw.rectangle((left, 3, left + spacing - 3, CAPTION_HEIGHT - 3), fill=TOUCH if on else FREE)
         draw.text((left + 3, 5), finger[:6], fill="white" if on else "black")

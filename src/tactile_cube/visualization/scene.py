@@ -13,7 +13,8 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.evaluation.episode_record import Array
-from tactile_cube.hand import DLR_HAND2, HandModel, hand_urdf
+from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.hand.object_shape import ObjectShape, straight_half
 
 FACE_COLOURS = {
     "+x": (0.85, 0.15, 0.15),
@@ -55,6 +56,33 @@ SIDE = Camera(yaw=35.0, pitch=-10.0, distance=0.33, height=0.03)
 BELOW = Camera(yaw=0.0, pitch=72.0, distance=0.30)
 
 
+def object_urdf(size: Array, shape: ObjectShape = "box") -> str:
+    """Return the object: a cube with a coloured sticker on each face, a round one with four coloured stripes.
+
+    Both have a bar on the lower side.
+
+    Args:
+        size: edge lengths of its bounding box `(3,)` [m].
+        shape: what it is.
+    """
+    return cube_urdf(size) if shape == "box" else _round_urdf(size, shape)
+
+
+def _round_urdf(size: Array, shape: ObjectShape) -> str:
+    radius, length = 0.5 * float(size[0]), 2.0 * straight_half(0.5 * size) if shape == "capsule" else float(size[2])
+    ends = [0.5 * length, -0.5 * length] if shape == "capsule" else []
+    grey = (0.30, 0.30, 0.32)
+    shapes = [_part(f'<cylinder radius="{radius:.6f}" length="{length:.6f}"/>', (0.0, 0.0, 0.0), "body", grey)]
+    shapes += [_part(f'<sphere radius="{radius:.6f}"/>', (0.0, 0.0, z), f"end{z:+.4f}", grey) for z in ends]
+    for face in ("+x", "-x", "+y", "-y"):
+        normal = np.array(FACE_NORMALS[face])
+        extent = np.where(np.abs(normal) == 1, 0.06, 0.22) * size[0]
+        extent[2] = max(0.9 * length, 0.2 * radius)
+        shapes.append(_box(extent, normal * radius * 0.96, f"stripe{face}", FACE_COLOURS[face]))
+    shapes.append(_box(size * [0.40, 0.10, 0.03], size * [0.20, 0.0, -0.5], "bar", (0.85, 0.15, 0.15)))
+    return _urdf(shapes)
+
+
 def cube_urdf(size: Array) -> str:
     """Return a cube with a dark frame, a coloured sticker on each face, and a bar on the lower face.
 
@@ -74,10 +102,14 @@ def cube_urdf(size: Array) -> str:
 
 def _box(extent: Array, centre: Array | tuple[float, ...], name: str, colour: tuple[float, ...]) -> tuple[str, str]:
     numbers = " ".join(f"{value:.6f}" for value in extent)
+    return _part(f'<box size="{numbers}"/>', centre, name, colour)
+
+
+def _part(geometry: str, centre: Array | tuple[float, ...], name: str, colour: tuple[float, ...]) -> tuple[str, str]:
     place = " ".join(f"{value:.6f}" for value in centre)
     rgb = " ".join(str(value) for value in colour)
     link = (
-        f'<link name="{name}">{WEIGHT}<visual><geometry><box size="{numbers}"/></geometry>'
+        f'<link name="{name}">{WEIGHT}<visual><geometry>{geometry}</geometry>'
         f'<material name="{name}"><color rgba="{rgb} 1"/></material></visual></link>'
     )
     joint = (
@@ -95,13 +127,14 @@ def _urdf(shapes: list[tuple[str, str]]) -> str:
 class Scene:
     """Poses hand and cube and takes pictures; owns one PyBullet client until `close`."""
 
-    def __init__(self, cube_size: Array, hand: HandModel = DLR_HAND2) -> None:
+    def __init__(self, cube_size: Array, hand: Hand = DLR_HAND2, shape: ObjectShape = "box") -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
-        self._hand = self._load(hand_urdf(hand))
-        self._cube = self._load(cube_urdf(cube_size))
+        self._hand = self._load(hand.urdf())
+        self._cube = self._load(object_urdf(cube_size, shape))
         orientation = Rotation.from_matrix(hand.rotation).as_quat()
         pybullet.resetBasePositionAndOrientation(self._hand, hand.position, orientation, physicsClientId=self._client)
         self._columns = self._joint_columns(hand)
+        self._tips = {hand.link_names(k)[-1] for k in range(len(hand.fingers))}
         self._paint()
 
     def close(self) -> None:
@@ -109,7 +142,7 @@ class Scene:
         pybullet.disconnect(self._client)
 
     def pose(self, joint_position: Array, cube_position: Array, cube_quaternion: Array) -> None:
-        """Place the hand's 12 joints (the coupled ones follow) and the cube."""
+        """Place the hand's joints (the coupled ones follow) and the cube."""
         for joint, column in self._columns.items():
             pybullet.resetJointState(self._hand, joint, joint_position[column], physicsClientId=self._client)
         pybullet.resetBasePositionAndOrientation(
@@ -144,12 +177,12 @@ class Scene:
             path.write_text(urdf.replace('<link name="palm">', f'<link name="palm">{WEIGHT}'), encoding="utf-8")
             return int(pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self._client))
 
-    def _joint_columns(self, hand: HandModel) -> dict[int, int]:
-        """Map PyBullet's joint index to the column of q; `<finger>_q4` reads the column of `<finger>_q3`."""
+    def _joint_columns(self, hand: Hand) -> dict[int, int]:
+        """Map PyBullet's joint index to the column of q; a coupled joint reads that of the one it follows."""
         columns = {}
         for index in range(pybullet.getNumJoints(self._hand, physicsClientId=self._client)):
             name = pybullet.getJointInfo(self._hand, index, physicsClientId=self._client)[1].decode()
-            actuated = name.replace("_q4", "_q3")
+            actuated = hand.followed(name)
             if actuated in hand.joint_names:
                 columns[index] = list(hand.joint_names).index(actuated)
         return columns
@@ -159,5 +192,5 @@ class Scene:
             name = "palm"
             if index >= 0:
                 name = pybullet.getJointInfo(self._hand, index, physicsClientId=self._client)[12].decode()
-            colour = TIP_COLOUR if name.endswith("distal") else LINK_COLOUR
+            colour = TIP_COLOUR if name.endswith(tuple(self._tips)) else LINK_COLOUR
             pybullet.changeVisualShape(self._hand, index, rgbaColor=colour, physicsClientId=self._client)

@@ -24,9 +24,10 @@ def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path
         record = evaluation.record(first.variant, result)
         file = folder / f"episode{result.episode}"
         record.save(file.with_suffix(".npz"))
-        write_film(record, file.with_suffix(".gif"))
-        write_stills(record, file.with_suffix(".png"), every=max(5, record.steps // 30))
-        write_recording(record, file.with_suffix(".rrd"), summary=description(result))
+        hand = evaluation.hand
+        write_film(record, file.with_suffix(".gif"), hand=hand)
+        write_stills(record, file.with_suffix(".png"), every=max(5, record.steps // 30), hand=hand)
+        write_recording(record, file.with_suffix(".rrd"), hand, summary=description(result))
         print(f"episode {result.episode}: {file}.gif, stills {file}.png; look inside: rerun {file}.rrd")
 
 

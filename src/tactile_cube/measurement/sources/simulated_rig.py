@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
+from tactile_cube.hand.urdf_hand import DESCRIPTIONS
 from tactile_cube.measurement.bench import BENCH_KINDS, Bench, bench_trials
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig, read_rig
@@ -26,7 +27,7 @@ class SimulatedRig:
     """Simulates a bench session.
 
     Attributes:
-        urdf: `finger`, `hand` or the path of a URDF.
+        urdf: `finger`, `hand` (of the DLR-Hand II), the path of a URDF, or the name of one that the package ships.
         gravity: (3,) in the base frame [m/s^2].
         controller: kp [N m/rad], kd [N m s/rad], torque_limit [N m].
         nominal: what the owner is to believe: stiffness, static_friction, reflected_inertia.
@@ -101,7 +102,8 @@ class SimulatedRig:
     def _rig(self) -> Rig:
         if self.urdf in BUILT_IN:
             return parse_rig(BUILT_IN[self.urdf](), Path(f"{self.urdf}.urdf"))
-        return read_rig(Path(self.urdf))
+        shipped = DESCRIPTIONS / self.urdf
+        return read_rig(shipped if shipped.is_file() and not Path(self.urdf).is_file() else Path(self.urdf))
 
     def _description(self, rig: Rig) -> Description:
         followers = {name: joint.mimics for name, joint in rig.joints.items() if joint.mimics is not None}

@@ -1,0 +1,200 @@
+"""One finger of any URDF, cut out as a chain whose links have their joint's axis along z."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tactile_cube.errors import InputError
+from tactile_cube.hand.chain import Chain
+from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.hand.shape import Array, Shape
+from tactile_cube.hand.urdf import number_list, origin_element
+from tactile_cube.hand.urdf_shapes import collision_element, moved, read_shapes, visual_elements
+from tactile_cube.hand.urdf_tree import Placement, placement_of
+
+_COLOURS = ("0.72 0.74 0.78 1", "0.13 0.15 0.18 1")
+"""Of links and of the last one."""
+
+
+@dataclass(frozen=True)
+class UrdfFinger:
+    """A chain of L revolute joints, of which J are actuated.
+
+    Attributes:
+        joints: names of its joints (L).
+        links: names of the links they carry (L).
+        columns: the actuated joint that each joint moves with (L,).
+        limits: of the joints (L, 2) [rad].
+        base: frame of the first joint in the root link of the URDF.
+        places: frame of each further joint in that of the joint before it (L - 1).
+        mass: of the links (L,) [kg].
+        com: their centres of mass (L, 3) [m].
+        inertia: their principal moments, about the frame's axes (L, 3) [kg m^2].
+        shapes: what can be touched of each link.
+        tip: middle of the fingertip in the last link's frame (3,) [m].
+    """
+
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+    columns: tuple[int, ...]
+    limits: Array
+    base: Placement
+    places: tuple[Placement, ...]
+    mass: Array
+    com: Array
+    inertia: Array
+    shapes: tuple[tuple[Shape, ...], ...]
+    tip: Array
+
+    def chain(self, position: Array, rotation: Array) -> Chain:
+        """Its kinematics with the base at a place in the world."""
+        rotations = [rotation, *(place.rotation for place in self.places)]
+        translations = [position, *(place.translation for place in self.places)]
+        return Chain(np.array(rotations), np.array(translations), self.columns, self.tip)
+
+    def parts(self, parent: str, base: str) -> str:
+        """Its links and joints as URDF, below the link `parent` at `base`, an origin element."""
+        origins = [base, *(origin_element(place.translation, place.rotation) for place in self.places)]
+        parents = [parent, *self.links]
+        return "\n".join(self._link(k) + self._joint(k, parents[k], origins[k]) for k in range(len(self.links)))
+
+    def _link(self, k: int) -> str:
+        ixx, iyy, izz = (f"{value:.10g}" for value in self.inertia[k])
+        inertia = f'<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/>'
+        centre = f'<origin xyz="{number_list(self.com[k])}"/>'
+        name = self.links[k]
+        colour = f'<material name="{name}"><color rgba="{_COLOURS[k == len(self.links) - 1]}"/></material>'
+        drawn = "".join(collision_element(shape) + visual_elements(shape, colour) for shape in self.shapes[k])
+        inertial = f'<inertial>{centre}<mass value="{self.mass[k]:.10g}"/>{inertia}</inertial>'
+        return f'<link name="{name}">{inertial}{drawn}</link>'
+
+    def _joint(self, k: int, parent: str, origin: str) -> str:
+        leader = self.columns.index(self.columns[k])
+        mimic = "" if leader == k else f'<mimic joint="{self.joints[leader]}" multiplier="1" offset="0"/>'
+        lower, upper = self.limits[k]
+        ends = f'<parent link="{parent}"/><child link="{self.links[k]}"/>{origin}<axis xyz="0 0 1"/>'
+        limit = f'<limit lower="{lower:.10g}" upper="{upper:.10g}" effort="10" velocity="50"/>'
+        return f'<joint name="{self.joints[k]}" type="revolute">{ends}{limit}{mimic}</joint>'
+
+
+def read_finger(text: str, joints: tuple[str, ...], tip: str, folder: Path, where: str) -> UrdfFinger:
+    """Cut a finger out of a URDF.
+
+    Products of inertia about a joint's axis are left out: beside the rotor's inertia, which acts there, they vanish.
+
+    Args:
+        text: the URDF.
+        joints: its actuated joints, from the palm to the tip.
+        tip: link whose origin is the middle of the fingertip.
+        folder: of the URDF.
+        where: what to call the finger in errors.
+
+    Raises:
+        InputError: joints that form no chain of revolute joints, a tip elsewhere, links without mass.
+    """
+    tree = RigidBodyTree.from_urdf(text, joints)
+    _require_chain(tree, joints, where)
+    carried = _carried_links(text, tree.dof_names)
+    if carried.get(tip, ("", None))[0] != tree.dof_names[-1]:
+        raise InputError(f"{where}.tip is '{tip}', no link that joint '{tree.dof_names[-1]}' carries; name one")
+    turns = [_principal(tree.axis[k], tree.inertia[k]) for k in range(tree.dofs)]
+    before = [np.eye(3), *turns]
+    places = [
+        Placement(before[k].T @ tree.placement_rotation[k] @ turns[k], before[k].T @ tree.placement_translation[k])
+        for k in range(tree.dofs)
+    ]
+    shapes = _shapes(text, carried, tree.dof_names, turns, folder)
+    place = carried[tip][1]
+    return UrdfFinger(
+        joints=tree.dof_names,
+        links=tuple(_child(text, name) for name in tree.dof_names),
+        columns=tuple(int(column) for column in tree.follow),
+        limits=np.stack([tree.lower, tree.upper], axis=1),
+        base=places[0],
+        places=tuple(places[1:]),
+        mass=tree.mass,
+        com=np.stack([turn.T @ com for turn, com in zip(turns, tree.com, strict=True)]),
+        inertia=np.stack([np.diag(turn.T @ own @ turn) for turn, own in zip(turns, tree.inertia, strict=True)]),
+        shapes=shapes,
+        tip=turns[-1].T @ place.translation,
+    )
+
+
+def _require_chain(tree: RigidBodyTree, joints: tuple[str, ...], where: str) -> None:
+    actuated = tuple(name for k, name in enumerate(tree.dof_names) if name in joints)
+    if list(tree.parent) != list(range(-1, tree.dofs - 1)) or actuated != joints:
+        raise InputError(f"{where}.joints are {', '.join(joints)}; list a chain, from the palm to the tip")
+    for k, name in enumerate(tree.dof_names):
+        if tree.prismatic[k]:
+            raise InputError(f"{where}: joint '{name}' slides; fingers have revolute joints")
+        if not np.all(np.isfinite([tree.lower[k], tree.upper[k]])):
+            raise InputError(f"{where}: joint '{name}' has no limits; give it <limit lower= upper=> [rad]")
+        if not (tree.ratio[k] == 1.0 and tree.offset[k] == 0.0):
+            raise InputError(
+                f"{where}: joint '{name}' follows another with a ratio other than 1; that is not simulated"
+            )
+        if not tree.mass[k] > 0.0:
+            raise InputError(f"{where}: what joint '{name}' carries has no mass; give its link <inertial>")
+
+
+def _principal(axis: Array, inertia: Array) -> Array:
+    """Axes (3, 3) of which z is `axis` (3,) and x, y are principal for `inertia` (3, 3) seen along it."""
+    least = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(least, axis)
+    x /= np.linalg.norm(x)
+    frame = np.stack([x, np.cross(axis, x), axis], axis=1)
+    seen = frame.T @ inertia @ frame
+    angle = 0.5 * np.arctan2(2.0 * seen[0, 1], seen[0, 0] - seen[1, 1])
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def _carried_links(text: str, moving: tuple[str, ...]) -> dict[str, tuple[str, Placement]]:
+    """The moving joint that carries each link ("" for the root's), and where the link's frame is in that joint's."""
+    joints = {}
+    for element in ElementTree.fromstring(text).findall("joint"):
+        name = str(element.get("name"))
+        ends = [found.get("link") for end in ("parent", "child") if (found := element.find(end)) is not None]
+        joints[ends[1]] = name, ends[0], placement_of(element, f"joint '{name}'")
+
+    def find(link: str | None) -> tuple[str, Placement]:
+        if link not in joints:
+            return "", Placement()
+        name, parent, place = joints[link]
+        if name in moving:
+            return name, Placement()
+        carrier, above = find(parent)
+        return carrier, above.then(place)
+
+    links = [str(link.get("name")) for link in ElementTree.fromstring(text).findall("link")]
+    return {link: find(link) for link in links}
+
+
+def _shapes(
+    text: str, carried: dict[str, tuple[str, Placement]], joints: tuple[str, ...], turns: list[Array], folder: Path
+) -> tuple[tuple[Shape, ...], ...]:
+    """Collision shapes of what each joint carries, in the turned frames."""
+    found: list[list[Shape]] = [[] for _ in joints]
+    for link in ElementTree.fromstring(text).findall("link"):
+        joint, place = carried[str(link.get("name"))]
+        if joint in joints:
+            k = joints.index(joint)
+            found[k] += [moved(shape, turns[k]) for shape in read_shapes(link, place, folder)]
+    return tuple(map(tuple, found))
+
+
+def palm_shapes(text: str, moving: tuple[str, ...], folder: Path) -> list[Shape]:
+    """Collision shapes of what no joint moves, in the root link's frame: for pictures only."""
+    carried = _carried_links(text, moving)
+    links = ElementTree.fromstring(text).findall("link")
+    placed = [(link, *carried[str(link.get("name"))]) for link in links]
+    return [shape for link, joint, place in placed if not joint for shape in read_shapes(link, place, folder)]
+
+
+def _child(text: str, joint: str) -> str:
+    child = ElementTree.fromstring(text).find(f"joint[@name='{joint}']/child")
+    return str(child.get("link")) if child is not None else ""

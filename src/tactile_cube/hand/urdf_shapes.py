@@ -1,0 +1,94 @@
+"""Collision shapes of a URDF, and the elements that say them."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+
+from tactile_cube.errors import InputError
+from tactile_cube.hand.shape import Array, Shape
+from tactile_cube.hand.urdf import origin_element
+from tactile_cube.hand.urdf_tree import Placement, number, placement_of, triple
+
+
+def read_shapes(link: ElementTree.Element, place: Placement, folder: Path) -> list[Shape]:
+    """Collision shapes of a link whose frame sits at `place`, in the frame that `place` is given in.
+
+    Args:
+        link: element of the URDF.
+        place: where its frame is.
+        folder: of the URDF; file names of meshes are relative to it, `package://NAME/` too.
+
+    Raises:
+        InputError: a shape that no engine has, a mesh that is not there.
+    """
+    found, where = [], f"link '{link.get('name')}'"
+    for collision in link.findall("collision"):
+        geometry = collision.find("geometry")
+        kinds = list(geometry) if geometry is not None else []
+        if len(kinds) != 1:
+            raise InputError(f"URDF: a <collision> of {where} has {len(kinds)} geometries; give one")
+        at = place.then(placement_of(collision, where))
+        found.append(_shape(kinds[0], at, folder, where))
+    return found
+
+
+def _shape(element: ElementTree.Element, at: Placement, folder: Path, where: str) -> Shape:
+    kind = element.tag
+    if kind == "box":
+        return Shape("box", tuple(triple(element, "size", where).tolist()), at.translation, at.rotation)
+    if kind == "sphere":
+        return Shape("sphere", (number(element, "radius", where, 0.0),), at.translation, at.rotation)
+    if kind == "cylinder" or kind == "capsule":
+        size = (number(element, "radius", where, 0.0), number(element, "length", where, 0.0))
+        return Shape("cylinder" if kind == "cylinder" else "capsule", size, at.translation, at.rotation)
+    if kind == "mesh":
+        scale = tuple(triple(element, "scale", where).tolist()) if element.get("scale") else (1.0, 1.0, 1.0)
+        return Shape("mesh", scale, at.translation, at.rotation, _mesh_file(element, folder, where))
+    raise InputError(f"URDF: {where} has the shape <{kind}>; use box, sphere, cylinder, capsule or mesh")
+
+
+def _mesh_file(element: ElementTree.Element, folder: Path, where: str) -> str:
+    name = element.get("filename", "")
+    relative = name.removeprefix("package://").partition("/")[2] if name.startswith("package://") else name
+    file = (folder / relative.removeprefix("file://")).resolve()
+    if not file.is_file():
+        raise InputError(f"URDF: {where} has the mesh '{name}'; there is no {file}")
+    return str(file)
+
+
+def collision_element(shape: Shape) -> str:
+    """A shape as URDF's <collision>."""
+    return f"<collision>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}</collision>"
+
+
+def visual_elements(shape: Shape, material: str) -> str:
+    """A shape as <visual> elements that every reader can draw: a capsule as a cylinder and two spheres."""
+    if shape.kind != "capsule":
+        return f"<visual>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}{material}</visual>"
+    radius, length = shape.size
+    along = 0.5 * length * shape.rotation[:, 2]
+    parts = [
+        Shape("cylinder", (radius, length), shape.position, shape.rotation),
+        *(Shape("sphere", (radius,), shape.position + end, np.eye(3)) for end in (along, -along)),
+    ]
+    return "".join(visual_elements(part, material) for part in parts)
+
+
+def _geometry(shape: Shape) -> str:
+    size = [f"{value:.10g}" for value in shape.size]
+    inside = {
+        "box": f'<box size="{" ".join(size)}"/>',
+        "sphere": f'<sphere radius="{size[0]}"/>',
+        "cylinder": f'<cylinder radius="{size[0]}" length="{size[-1]}"/>',
+        "capsule": f'<capsule radius="{size[0]}" length="{size[-1]}"/>',
+        "mesh": f'<mesh filename="{shape.file}" scale="{" ".join(size)}"/>',
+    }
+    return f"<geometry>{inside[shape.kind]}</geometry>"
+
+
+def moved(shape: Shape, rotation: Array) -> Shape:
+    """A shape seen from axes that are turned by `rotation` (3, 3) in those it is given in."""
+    return Shape(shape.kind, shape.size, rotation.T @ shape.position, rotation.T @ shape.rotation, shape.file)
