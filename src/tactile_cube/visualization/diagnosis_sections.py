@@ -25,8 +25,7 @@ COLUMNS = {
     "gain": "share of the squared error it takes off",
     "p_value": "p (no better than without)",
 }
-
-
+INTERVALS = "Values and 95 % intervals, each on a scale of its own; effects that the model lacks are not allowed for."
 HELD = "How the error with an object falls"
 
 
@@ -82,7 +81,7 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
     blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
-    blocks.append(Figure(interval_chart(intervals), "Values and 95 % intervals, each on a scale of its own."))
+    blocks.append(Figure(interval_chart(intervals), INTERVALS))
     return [Section("What was found, and how sure that is", (), blocks)]
 
 
