@@ -2,8 +2,9 @@
 
 import pytest
 
-from tactile_cube.cli import CONFIG, sweep_folder
+from tactile_cube.cli import CONFIG
 from tactile_cube.did_you_mean import did_you_mean
+from tactile_cube.sweep import sweep_folder
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import ast
 import contextlib
 import errno
 import functools
-import hashlib
 import os
 import re
 import sys
@@ -23,6 +22,7 @@ from tactile_cube.console_log import console_kept_in
 from tactile_cube.did_you_mean import did_you_mean
 from tactile_cube.errors import InputError
 from tactile_cube.run_folder import USAGE_ERROR, configuration_in
+from tactile_cube.sweep import INTERRUPTED, Jobs
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -38,9 +38,6 @@ RECIPE = {"train": "curriculum"}
 
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-LONGEST = 180
-"""Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
-INTERRUPTED = 130
 NOT_AN_OPTION = "Config group override must be"
 """What Hydra says to `task=1`, as a ValueError like any other."""
 
@@ -97,40 +94,33 @@ def _run(name: str, function: Callable[["DictConfig"], None], after_sweep: Calla
 
     wants_traceback = os.environ.get("HYDRA_FULL_ERROR", "0") != "0"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # else Hydra prints errors in its own way and exits with status 1
-
-    swept: dict[Path, bool] = {}
-
-    @functools.wraps(function)
-    def guarded(config: "DictConfig") -> None:
-        from hydra.core.hydra_config import HydraConfig
-        from hydra.types import RunMode
-
-        folder = Path(HydraConfig.get().runtime.output_dir)
-        # errors inside Hydra, which otherwise adds lines of its own
-        log = folder / f"{name}.log"
-        configuration = configuration_in(folder, config, log.name)
-        try:
-            with configuration, console_kept_in(log), _errors_in_one_line(wants_traceback):
-                function(config)
-        except SystemExit as end:
-            if HydraConfig.get().mode != RunMode.MULTIRUN or end.code == INTERRUPTED:
-                raise
-            swept[folder] = False  # one run that fails does not keep the others from running
-        else:
-            if HydraConfig.get().mode == RunMode.MULTIRUN:
-                swept[folder] = True
-
-    from omegaconf import OmegaConf
-
-    OmegaConf.register_new_resolver("sweep_folder", sweep_folder, replace=True)
     with _errors_in_one_line(wants_traceback):
-        hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(guarded)()
+        jobs = Jobs(functools.partial(_guarded, name, function, wants_traceback))
+
+        @functools.wraps(function)
+        def task(config: "DictConfig") -> None:
+            jobs(config)
+
+        try:
+            hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(task)()
+        finally:
+            swept = jobs.ended()
         if swept:
             after_sweep([folder for folder, good in swept.items() if good])
         failed = [str(folder) for folder, good in swept.items() if not good]
         if failed:
             print(f"{len(failed)} of {len(swept)} runs failed: {', '.join(failed)}", file=sys.stderr)
             sys.exit(1)
+
+
+def _guarded(
+    name: str, function: Callable[["DictConfig"], None], wants_traceback: bool, config: "DictConfig", folder: Path
+) -> None:
+    """One job, its errors in one line: inside Hydra, which otherwise adds lines of its own."""
+    log = folder / f"{name}.log"
+    configuration = configuration_in(folder, config, log.name)
+    with configuration, console_kept_in(log), _errors_in_one_line(wants_traceback):
+        function(config)
 
 
 @contextlib.contextmanager
@@ -145,19 +135,6 @@ def _errors_in_one_line(wants_traceback: bool) -> Iterator[None]:
         if message is None:
             raise
         fail(message)
-
-
-def sweep_folder(overrides: str, seed: int) -> str:
-    """Folder of one run of a sweep: what it overrides beside the seed, and the seed.
-
-    Example:
-        >>> sweep_folder("task=table-agent.gamma=0.9", 1), sweep_folder("", 1)
-        ('task=table-agent.gamma=0.9-seed1', 'seed1')
-    """
-    setting = overrides.replace("/", "_")  # no folders within folders where a value is a path
-    if len(setting) > LONGEST:
-        setting = f"{setting[:LONGEST]}~{hashlib.sha256(setting.encode()).hexdigest()[:8]}"
-    return f"{setting}-seed{seed}" if setting else f"seed{seed}"
 
 
 def usage_error(error: BaseException) -> str | None:

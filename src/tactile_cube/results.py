@@ -14,12 +14,18 @@ def main(config: DictConfig) -> None:
 
     from tactile_cube.evaluation.paper_rows import read_comparison
     from tactile_cube.evaluation.paper_table import paper_page, read_all
-    from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
+    from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table, unfinished
     from tactile_cube.evaluation.training_curve import read_curve
-    from tactile_cube.visualization.curves import write_learning_curves
+    from tactile_cube.visualization.curves import write_learning_curves, write_sweep_curves
 
     if config.sweep is not None:
-        print(f"{config.sweep}\n\n{sweep_table(read_sweep(Path(config.sweep)))}")
+        runs = read_sweep(Path(config.sweep))
+        print(f"{config.sweep}\n\n{sweep_table(runs, intervals=True)}\n")
+        left = unfinished(Path(config.sweep))
+        print(f"not finished: {', '.join(left)}" if left else "all runs finished")
+        Path(config.picture).parent.mkdir(parents=True, exist_ok=True)
+        write_sweep_curves(runs, Path(config.picture), config.title)
+        print(f"learning curves: {config.picture}")
         return
     for sweep in config.sweeps:
         print(f"{sweep}\n\n{sweep_table(read_sweep(Path(sweep)))}\n")

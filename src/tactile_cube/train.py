@@ -19,8 +19,8 @@ def sweep_summary(folders: list[Path]) -> None:
     from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
 
     for sweep in dict.fromkeys(folder.parent for folder in folders):
-        print(f"\n{sweep}\n\n{sweep_table(read_sweep(sweep))}\n")
-        print(f"this table again: python -m tactile_cube.results sweep={sweep}")
+        print(f"\n{sweep}\n\n{sweep_table(read_sweep(sweep), intervals=True)}\n")
+        print(f"this table again, and its curves: python -m tactile_cube.results sweep={sweep}")
 
 
 @verb("train", after_sweep=sweep_summary)

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1, read_sweep, sweep_table
+from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1, median_interval, read_sweep, sweep_table, unfinished
 
 
 def run(folder: Path, name: str, angle: float, hours: float = 0.1) -> None:
@@ -49,6 +49,27 @@ def test_run_folders_are_read_like_copies(folder: Path) -> None:
     (folder / "n_step=3-seed4").mkdir()
     (folder / "n_step=3-seed4" / "metrics.csv").write_text("steps,final_angle\n1500,0.5\n")
     assert list(read_sweep(folder)["n_step=3"]) == [4]
+
+
+def test_medians_over_seeds_have_an_interval_and_runs_that_never_regrasp_count(folder: Path) -> None:
+    line = next(row for row in sweep_table(read_sweep(folder), intervals=True).splitlines() if "task=table" in row)
+    cells = [cell.strip() for cell in line.strip("|").split("|")]
+    assert cells[-3:] == ["0.030 (0.030 to never)", "3.10 (2.50 to 3.50)", "0.500"]
+
+
+@pytest.mark.parametrize(
+    ("runs", "low", "high"), [(1, 0, 0), (3, 0, 2), (5, 0, 4), (6, 0, 5), (8, 0, 7), (9, 1, 7), (20, 5, 14)]
+)
+def test_the_interval_of_a_median_is_the_sign_tests(runs: int, low: int, high: int) -> None:
+    # ranks from the table of the sign test at 5 %, counted from zero
+    assert median_interval([float(k) for k in reversed(range(runs))])[1:] == (low, high)
+
+
+def test_runs_that_did_not_finish_are_named(tmp_path: Path) -> None:
+    for name in ("a-seed0", "a-seed1", "other"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "a-seed0" / "finished.json").write_text("{}")
+    assert unfinished(tmp_path) == ["a-seed1"]
 
 
 def test_a_folder_without_runs_is_refused(tmp_path: Path) -> None:

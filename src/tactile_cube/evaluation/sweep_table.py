@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from math import comb
 from pathlib import Path
 from statistics import median
 
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, cpu_hours, read_curve, regrasping_begins
+from tactile_cube.training.finished import FILE as FINISHED
 
 PAPER_TABLE_1 = {
     "task=table, T_s 0.5 s": "0.3, 0.4, 0.3, 0.4",
@@ -19,6 +21,7 @@ PAPER_TABLE_1 = {
     "task=full, T_s 0.1 s": "5.1, 1.7, 6.0, 3.9",
 }
 """Million steps until regrasping of four runs; -: not within 6.5. Source: paper, Table I."""
+INTERVALS = ("million steps: median (interval)", "angle at the end [rad]: median (interval)", "CPU hours of all runs")
 _RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
 _FILTER_TIME = re.compile(r"task\.filter_time=(?P<time>[\d.]+)-(?P<task>task=\w+)$")
 
@@ -44,12 +47,13 @@ def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
     return runs
 
 
-def sweep_table(runs: Mapping[str, Mapping[int, Curve]], settings: Sequence[str] = ()) -> str:
+def sweep_table(runs: Mapping[str, Mapping[int, Curve]], settings: Sequence[str] = (), intervals: bool = False) -> str:
     """Return the table, with the paper's column where a setting is one of its Table I.
 
     Args:
         runs: from `read_sweep`.
         settings: lines to show, those without a run as such; all that there are by default.
+        intervals: add columns of medians over the seeds, each with the interval of `median_interval`.
     """
     shown = list(settings) or sorted(runs)
     paper = any(setting in PAPER_TABLE_1 for setting in shown)
@@ -58,14 +62,53 @@ def sweep_table(runs: Mapping[str, Mapping[int, Curve]], settings: Sequence[str]
         *(["paper, million steps"] if paper else []),
         "million steps, seed by seed",
         "CPU hours (median)",
+        *(INTERVALS if intervals else []),
     ]
     lines = [head, ["---"] * len(head)]
     for setting in shown:
         known = [PAPER_TABLE_1.get(setting, "")] if paper else []
         curves = runs.get(setting, {})
         steps = ", ".join(_until(curves[seed]) for seed in sorted(curves))
-        lines.append([setting, *known, steps or "not run", _median_cost(list(curves.values()))])
+        more = _over_seeds(list(curves.values())) if intervals else []
+        lines.append([setting, *known, steps or "not run", _median_cost(list(curves.values())), *more])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """The median of some runs, and between which of them that of all runs lies with 95 % probability or more.
+
+    Ranks of the sample alone: nothing is assumed of the distribution, and a run that never got there is infinite. Of
+    fewer than six runs all are needed; the probability is then 1 - 2^(1 - n), 75 % for three.
+
+    Source: the sign test's interval; Conover, Practical Nonparametric Statistics, section 3.2.
+    """
+    ordered, n = sorted(values), len(values)
+    outside = 0
+    while 2 * sum(comb(n, k) for k in range(outside + 1)) <= 0.05 * 2**n:
+        outside += 1
+    first = max(outside - 1, 0)
+    return median(ordered), ordered[first], ordered[n - 1 - first]
+
+
+def unfinished(folder: Path) -> list[str]:
+    """Names of the run folders of a multirun that failed or were stopped before their end."""
+    runs = (path for path in sorted(folder.glob("*seed*")) if path.is_dir() and _RUN.match(path.name))
+    return [run.name for run in runs if not (run / FINISHED).is_file()]
+
+
+def _over_seeds(curves: Sequence[Curve]) -> list[str]:
+    if not curves:
+        return [""] * len(INTERVALS)
+    begun = [(curve, regrasping_begins(curve)) for curve in curves]
+    steps = [float("inf") if row is None else curve.columns[STEPS][row] / 1e6 for curve, row in begun]
+    angles = [curve.columns[ANGLE][-1] for curve in curves]
+    hours = [cpu_hours(curve, -1) for curve in curves]
+    return [_interval(steps, 3), _interval(angles, 2), f"{sum(hours):.3f}"]
+
+
+def _interval(values: Sequence[float], digits: int) -> str:
+    middle, low, high = (f"{value:.{digits}f}".replace("inf", "never") for value in median_interval(values))
+    return f"{middle} ({low} to {high})"
 
 
 def _until(curve: Curve) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 
@@ -50,6 +51,32 @@ def write_learning_curves(curves: Sequence[Curve], path: Path, title: str) -> No
     schedule.set(xlabel="environment steps [million]", ylabel="T_s [s] (solid),\ngravity (dotted)", ylim=(0, None))
     for axis in (angle, schedule):
         axis.grid(alpha=0.3)
+    figure.savefig(path, dpi=110)
+
+
+def write_sweep_curves(runs: Mapping[str, Mapping[int, Curve]], path: Path, title: str) -> None:
+    """Draw the mean final angle over environment steps: a thin line each run, a thick one the median of a setting.
+
+    Args:
+        runs: setting -> seed -> learning curve; the median goes as far as the shortest of them.
+        path: file to write; its ending (.png, .svg) chooses the format.
+        title: of the picture.
+    """
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    axis = figure.subplots()
+    for number, (setting, curves) in enumerate(sorted(runs.items())):
+        color, every = f"C{number % 10}", list(curves.values())
+        for curve in every:
+            axis.plot(np.divide(curve.columns[STEPS], 1e6), curve.columns[ANGLE], color=color, linewidth=0.6, alpha=0.6)
+        steps = np.linspace(0, min(curve.columns[STEPS][-1] for curve in every), 200)
+        angles = [np.interp(steps, curve.columns[STEPS], curve.columns[ANGLE]) for curve in every]
+        label = f"{setting} ({len(every)} {'run' if len(every) == 1 else 'runs'})"
+        axis.plot(steps / 1e6, np.median(angles, axis=0), color=color, linewidth=2.0, label=label)
+    axis.axhline(REGRASPING, color="grey", linestyle="--", linewidth=0.8)
+    axis.annotate("regrasping", (0, REGRASPING), xycoords=("axes fraction", "data"), ha="left", va="bottom", size=8)
+    axis.set(xlabel="environment steps [million]", ylabel="mean final angle [rad]", title=title)
+    axis.grid(alpha=0.3)
+    figure.legend(loc="outside lower center", fontsize=7, ncols=1 if len(runs) < 5 else 2)
     figure.savefig(path, dpi=110)
 
 

@@ -1,0 +1,81 @@
+"""The jobs of a sweep, in this process or wherever a launcher runs them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+INTERRUPTED = 130
+LONGEST = 180
+"""Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
+
+
+class Jobs:
+    """Runs the jobs of one command; launchers send it to other processes and machines.
+
+    Args:
+        job: what a job does with its configuration and its folder; SystemExit says that it failed.
+    """
+
+    def __init__(self, job: Callable[[DictConfig, Path], None]):
+        self._job = job
+        self._record = Path.cwd() / f".sweep-{secrets.token_hex(8)}"  # machines that share a sweep share the folder
+        register_sweep_folder()
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Arrive in another process, which knows nothing of this package yet."""
+        self.__dict__.update(state)
+        register_sweep_folder()
+
+    def __call__(self, config: DictConfig) -> None:
+        """Run one job; in a sweep, one that fails does not keep the others from running."""
+        from hydra.core.hydra_config import HydraConfig
+        from hydra.types import RunMode
+
+        folder = Path(HydraConfig.get().runtime.output_dir)
+        sweeping = HydraConfig.get().mode == RunMode.MULTIRUN
+        good = True
+        try:
+            self._job(config, folder)
+        except SystemExit as end:
+            if not sweeping or end.code == INTERRUPTED:
+                raise
+            good = False
+        if sweeping:
+            with self._record.open("a") as file:
+                file.write(json.dumps([str(folder), good]) + "\n")
+
+    def ended(self) -> dict[Path, bool]:
+        """Folder -> whether its job succeeded, of all that ended; asked once, when all have."""
+        if not self._record.is_file():
+            return {}
+        lines = [json.loads(line) for line in self._record.read_text().splitlines()]
+        self._record.unlink()
+        return {Path(folder): good for folder, good in lines}
+
+
+def register_sweep_folder() -> None:
+    """Let configurations say `${sweep_folder:...}`."""
+    from omegaconf import OmegaConf
+
+    OmegaConf.register_new_resolver("sweep_folder", sweep_folder, replace=True)
+
+
+def sweep_folder(overrides: str, seed: int) -> str:
+    """Folder of one run of a sweep: what it overrides beside the seed, and the seed.
+
+    Example:
+        >>> sweep_folder("task=table-agent.gamma=0.9", 1), sweep_folder("", 1)
+        ('task=table-agent.gamma=0.9-seed1', 'seed1')
+    """
+    setting = overrides.replace("/", "_")  # no folders within folders where a value is a path
+    if len(setting) > LONGEST:
+        setting = f"{setting[:LONGEST]}~{hashlib.sha256(setting.encode()).hexdigest()[:8]}"
+    return f"{setting}-seed{seed}" if setting else f"seed{seed}"
