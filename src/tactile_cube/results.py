@@ -22,7 +22,8 @@ def main(config: DictConfig) -> None:
         runs = read_sweep(Path(config.sweep))
         print(f"{config.sweep}\n\n{sweep_table(runs, intervals=True)}\n")
         left = unfinished(Path(config.sweep))
-        print(f"not finished: {', '.join(left)}" if left else "all runs finished")
+        if left:
+            print(f"not finished: {', '.join(left)}")
         Path(config.picture).parent.mkdir(parents=True, exist_ok=True)
         write_sweep_curves(runs, Path(config.picture), config.title)
         print(f"learning curves: {config.picture}")
