@@ -48,6 +48,10 @@ def test_name_and_joint_of_an_effect() -> None:
         ("[1, 2]", "expected a mapping"),
         ("joints: !!python/object/apply:os.system [ls]", "only plain data is read"),
         ("joints: [q1", "not valid YAML"),
+        ("joints: &a [*a]", "aliases"),
+        ("\n".join(f"k{n}: &k{n} [{', '.join([f'*k{n - 1}' if n else 'x'] * 9)}]" for n in range(9)), "aliases"),
+        (f"joints: {'[' * 3000}", "not usable YAML"),
+        (f"format: {'9' * 5000}", "not usable YAML"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:

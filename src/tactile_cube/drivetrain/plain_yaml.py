@@ -8,6 +8,8 @@ from pydantic import BaseModel, ValidationError
 
 from tactile_cube.errors import InputError
 
+LARGEST = 1_000_000
+"""Values in a file; aliases could make a few lines into more than any memory holds."""
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
@@ -19,6 +21,8 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        if _size(data, {}) >= LARGEST:
+            raise ValueError(f"its aliases (*name) make more than {LARGEST} values of it")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -33,6 +37,18 @@ def read_yaml(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping of keys to values, received {type(data).__name__}")
     return data
+
+
+def _size(value: Any, known: dict[int, int]) -> int:
+    """Values within a value, those that aliases repeat each time; a value within itself counts as `LARGEST`."""
+    if not isinstance(value, dict | list):
+        return 1
+    if id(value) not in known:
+        known[id(value)] = LARGEST  # until it is known: within itself
+        known[id(value)] = 1 + sum(
+            _size(part, known) for part in (value.values() if isinstance(value, dict) else value)
+        )
+    return known[id(value)]
 
 
 def read_schema(path: Path, schema: type[Schema]) -> Schema:
