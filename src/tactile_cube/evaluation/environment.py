@@ -8,6 +8,7 @@ from typing import Any
 
 import hydra.utils
 from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_source import PolicySource
@@ -75,7 +76,7 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
 def _made(settings: Any, label: str) -> EnvConfig:
     try:
         made = hydra.utils.instantiate(settings)
-    except hydra.errors.InstantiationException as error:
+    except (hydra.errors.InstantiationException, OmegaConfBaseException) as error:
         if isinstance(error.__cause__, InputError):
             raise error.__cause__ from None
         raise InputError(f"environment of policy={label}: {' '.join(str(error).split())}") from error

@@ -102,6 +102,8 @@ class Checkpoints:
 
     def _load(self, path: Path) -> dict[str, Any]:
         state = load_checkpoint(path)
+        if not {"learner", "best_angle", "config"} <= state.keys() or "replay" not in state["learner"]:
+            raise InputError(f"{path}: damaged checkpoint (it lacks parts of what a run saves)")
         replay = state["learner"]["replay"]
         if "segments" in replay:
             segments = [(int(first), int(count), str(digest)) for first, count, digest in replay["segments"]]
