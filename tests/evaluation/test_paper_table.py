@@ -134,11 +134,11 @@ def test_what_breaks_the_policy_is_named_the_worst_first() -> None:
 
 
 def test_what_training_cost_is_read_from_the_shipped_card() -> None:
-    card = read_card(SHIPPED / "default.md")
+    card = read_card(SHIPPED / "published.md")
     assert float(card["CPU hours"].split()[0]) > 0
     cost = f"{card['CPU hours']}; teacher: {card['teacher']}"
     assert f"| 600, without a teacher | {cost} | default, 0 |" in line(
-        paper_page([results("paper", "default")], []), "CPU hours"
+        paper_page([results("paper", "published")], []), "CPU hours"
     )
 
 
