@@ -85,7 +85,7 @@ def fit(
 def full_step(problem: Problem, model: Model, unknowns: Sequence[Unknown]) -> Array:
     """Values (P,) of the unknowns one step from a model: the best ones, were the problem linear."""
     near = _linearised(problem, model, unknowns, tuple(unknowns), None)
-    return read_all(_stepped(problem, near, 1.0, DAMPING), unknowns)
+    return read_all(_stepped(problem, near, 1.0, DAMPING), tuple(unknowns))
 
 
 def _linearised(
