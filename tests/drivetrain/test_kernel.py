@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect
+from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect, import_own_effects
 from tactile_cube.drivetrain.kernel import cache_directory, load_kernel
 from tactile_cube.errors import InputError
 from tests.drivetrain.rigs import finger, wheel
@@ -56,6 +56,7 @@ def test_a_changed_law_gets_a_new_kernel(tmp_path, monkeypatch) -> None:
         (tmp_path / "my_changing_rig.py").write_text(LAW.format(factor=factor))
         importlib.invalidate_caches()
         sys.modules.pop("my_changing_rig", None)
+        import_own_effects(["my_changing_rig.Pull"])
         plant = Plant([wheel()], dt=0.002, effects=[find_effect("my_changing_rig.Pull")])
         names.append(load_kernel(plant.topology, plant.effects, plant.layout).__name__)
     assert names[0] != names[1]
