@@ -14,7 +14,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
 from tactile_cube.hand.model import FingerBase
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.simulation import EpisodeConstants, RigWorld, SimulationOptions, Start, World, drive, mujoco_model
+from tactile_cube.simulation import EpisodeConstants, RigWorld, SimulationOptions, Start, World, mujoco_model
 
 ENGINES = ("bullet", "mujoco")
 NOWHERE, FLOATS = (0.0, 0.0, 9.0), 10**6
@@ -89,7 +89,7 @@ OF_PLAIN = {
 def test_mujoco_follows_a_measured_finger_to_a_milliradian(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four trials of finger_plain at once, one by each finger of a hand whose fingers are that finger."""
     rig = (PLAIN / "rig.urdf").read_text()
-    monkeypatch.setattr(drive, "finger_urdf", lambda hand: rig)
+    monkeypatch.setattr(HandModel, "finger_urdf", lambda hand, finger: rig)
     world = World(fingers_apart(), SimulationOptions("mujoco", dt=5e-4, substeps=4))
     known = {key: np.tile(values, 4) for key, values in OF_PLAIN.items()}
     constants = EpisodeConstants(filter_time=1e-9, gravity_onset=FLOATS, **known)
