@@ -45,7 +45,7 @@ def read_table(path: Path, only_numbers: bool = True) -> Table:
 def _parquet(path: Path) -> polars.DataFrame:
     try:
         return polars.read_parquet(path)
-    except (polars.exceptions.PolarsError, OSError) as error:
+    except (polars.exceptions.PolarsError, polars.exceptions.PanicException, OSError) as error:
         raise InputError(f"{path}: not a complete Parquet file (truncated?): {_first_line(error)}") from None
 
 
@@ -60,7 +60,7 @@ def _csv(path: Path) -> polars.DataFrame:
             decimal_comma=decimal_comma,
             encoding="utf8-lossy",
         )
-    except (polars.exceptions.PolarsError, OSError) as error:
+    except (polars.exceptions.PolarsError, polars.exceptions.PanicException, OSError) as error:
         raise InputError(f"{path}: not a CSV table: {_first_line(error)}") from None
     return frame.rename({name: name.strip().strip("\ufeff") for name in frame.columns})
 
@@ -130,5 +130,5 @@ def _numbers(frame: polars.DataFrame, path: Path) -> Table:
     return table
 
 
-def _first_line(error: Exception) -> str:
+def _first_line(error: BaseException) -> str:
     return str(error).strip().partition("\n")[0] or type(error).__name__
