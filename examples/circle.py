@@ -93,15 +93,15 @@ class Circle:
         """A progress line."""
         print(f"[{time.perf_counter() - self.begin:6.0f} s] {line}", flush=True)
 
-    def run(self, verb: str, result: str, title: str, *words: str) -> Path:
-        """Run a verb into the folder that `result` names first, unless the result is there; gives the result's path."""
+    def run(self, name: str, result: str, title: str, *words: str) -> Path:
+        """The path of a result; the command that makes it runs into the folder named first, unless it is there."""
         path = self.folder / result
         finished = self.folder / Path(result).parts[0] / "finished"  # a training writes its policy many times before
         if finished.exists():
             self.say(f"{title}: {path} is there")
             return path
-        where = [f"out={path.parent}"] if verb == "record" else [f"hydra.run.dir={self.folder / Path(result).parts[0]}"]
-        command = ["python", "-m", f"tactile_cube.{verb}", *words, *where]
+        where = [f"out={path.parent}"] if name == "record" else [f"hydra.run.dir={self.folder / Path(result).parts[0]}"]
+        command = ["python", "-m", f"tactile_cube.{name}", *words, *where]
         self.say(f"{title}\n           {shlex.join(command)}")
         done = subprocess.run([sys.executable, *command[1:]], check=False)
         if done.returncode or not path.exists():

@@ -28,12 +28,12 @@ NAMED = {
 """Effects that the literature on a machine names, fitted beside what the diagnosis finds by itself."""
 
 
-def stage(verb: str, result: Path, *words: str) -> None:
-    """Run a verb unless its result is there."""
+def stage(name: str, result: Path, *words: str) -> None:
+    """Run a command unless its result is there."""
     if result.exists():
         return
-    where = f"out={result.parent}" if verb == "record" else f"hydra.run.dir={result.parent}"
-    command = ["python", "-m", f"tactile_cube.{verb}", *words, where]
+    where = f"out={result.parent}" if name == "record" else f"hydra.run.dir={result.parent}"
+    command = ["python", "-m", f"tactile_cube.{name}", *words, where]
     print(shlex.join(command), flush=True)
     subprocess.run([sys.executable, *command[1:]], check=True)
 

@@ -10,6 +10,7 @@ from hydra.utils import instantiate
 from tactile_cube import cli
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.sac import Sac
+from tactile_cube.composition import composed
 from tactile_cube.errors import InputError
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
@@ -45,6 +46,15 @@ def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:
     wrapped = RuntimeError("Error in call to target")
     wrapped.__cause__ = InputError("row 3: NaN")
     assert cli.usage_error(wrapped) == "row 3: NaN"
+
+
+@pytest.mark.parametrize("choice", ["task=1", "task=[1]"])
+def test_a_choice_that_is_no_name_is_told_in_one_line(choice: str) -> None:
+    with pytest.raises((TypeError, ValueError)) as info:
+        composed("train", [choice])
+    message = cli.usage_error(info.value)
+    assert message is not None
+    assert message.startswith("a choice from a group of conf/ is the name of a file there")
 
 
 def test_errors_of_the_program_are_not_the_users() -> None:

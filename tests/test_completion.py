@@ -1,4 +1,4 @@
-"""Completion of `python -m tactile_cube.<verb>` in bash."""
+"""Completion of `python -m tactile_cube.<command>` in bash."""
 
 import os
 import shutil

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("benchmark")
+@command("benchmark")
 def main(config: DictConfig) -> None:
     """Run the sections one by one; print each as it is done; write benchmark.json, .md and .png after each."""
     import os

@@ -1,7 +1,7 @@
-"""The wrapper that all verbs share: quick help, configuration by Hydra, and errors in one line.
+"""The wrapper that all commands share: quick help, configuration by Hydra, and errors in one line.
 
-A verb is a module of this package with a function decorated by `verb`; it imports nothing slow at its top, so that
-`--help` and `--cfg job` answer at once.
+A command is a module of this package with a function decorated by `command`; it imports nothing slow at its top, so
+that `--help` and `--cfg job` answer at once.
 """
 
 import ast
@@ -11,6 +11,7 @@ import functools
 import os
 import re
 import sys
+import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -34,31 +35,31 @@ ADDED = ("experiment", "without")
 """Groups of training that no default chooses from: `+experiment=option`, and `without=option` beside ablations."""
 
 RECIPE = {"train": "curriculum"}
-"""The experiment that a verb takes where the command line names none."""
+"""The experiment that a command takes where the command line names none."""
 
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-NOT_AN_OPTION = "Config group override must be"
-"""What Hydra says to `task=1`, as a ValueError like any other."""
+NOT_AN_OPTION = Path("hydra", "_internal", "defaults_list.py")
+"""Where Hydra fails at `task=1` (a ValueError) and `task=[1]` (a TypeError), with errors that are none of its own."""
 
 
-def verb(
+def command(
     name: str, after_sweep: Callable[[list[Path]], None] = lambda folders: None
 ) -> Callable[[Callable[["DictConfig"], None]], Callable[[], None]]:
     """Make a function of a configuration a command line of its own.
 
     Args:
-        name: of the verb; its configuration is conf/<name>.yaml.
+        name: of the command; its configuration is conf/<name>.yaml.
         after_sweep: says what came of a sweep, given its folders.
 
     Example:
-        >>> @verb("train")
+        >>> @command("train")
         ... def main(config: DictConfig) -> None: ...
     """
 
     def decorate(function: Callable[["DictConfig"], None]) -> Callable[[], None]:
         @functools.wraps(function)
-        def command() -> None:
+        def main() -> None:
             if {"--help", "-h"} & set(sys.argv[1:]):
                 print(help_text(name))
                 return
@@ -70,13 +71,13 @@ def verb(
             sys.argv = with_recipe(name, sys.argv)
             _run(name, function, after_sweep)
 
-        return command
+        return main
 
     return decorate
 
 
 def with_recipe(name: str, words: list[str]) -> list[str]:
-    """The words of a verb's command line, with its recipe in front of the first `key=value` unless they choose one.
+    """The words of a command line, with the command's recipe in front of the first `key=value` unless they choose one.
 
     Example:
         >>> with_recipe("train", ["train", "seed=1", "--cfg", "job"])
@@ -148,9 +149,9 @@ def usage_error(error: BaseException) -> str | None:
         if cause is not None:
             message = _one_line(cause)
             return message + did_you_mean(message, CONFIG)
-    plain = _find(error, ValueError)
-    if plain is not None and str(plain).startswith(NOT_AN_OPTION):
-        return _one_line(plain)
+    plain = _find(error, (TypeError, ValueError))
+    if plain is not None and _raised_in(plain, NOT_AN_OPTION):
+        return f"a choice from a group of conf/ is the name of a file there, e.g. task=table: {_one_line(plain)}"
     full = _find(error, OSError)
     if isinstance(full, OSError) and full.errno in FULL:
         return (
@@ -174,6 +175,11 @@ def _find(error: BaseException | None, kinds: Kinds) -> BaseException | None:
     return None
 
 
+def _raised_in(error: BaseException, file: Path) -> bool:
+    frames = traceback.extract_tb(error.__traceback__)
+    return bool(frames) and Path(frames[-1].filename).parts[-len(file.parts) :] == file.parts
+
+
 def _one_line(error: BaseException) -> str:
     from pydantic import ValidationError
 
@@ -195,8 +201,8 @@ def _describe(title: str, entry: dict[str, Any]) -> str:
 
 
 def help_text(name: str) -> str:
-    """What `--help` prints: the verbs, and the groups and keys of this one."""
-    lines = [f"python -m tactile_cube.{name}: {commands().get(name, '')}", "", "Verbs:"]
+    """What `--help` prints: the commands, and the groups and keys of this one."""
+    lines = [f"python -m tactile_cube.{name}: {commands().get(name, '')}", "", "Commands:"]
     lines += [f"  python -m tactile_cube.{other:<10} {summary}" for other, summary in commands().items()]
     path = CONFIG / f"{name}.yaml"
     if path.is_file():
@@ -211,11 +217,11 @@ def help_text(name: str) -> str:
 
 
 def commands() -> dict[str, str]:
-    """Verbs of the package and the first line of what they say about themselves, without importing them."""
+    """Commands of the package and the first line of what they say about themselves, without importing them."""
     result = {}
     for path in sorted(Path(__file__).parent.glob("*.py")):
         text = path.read_text()
-        if f'@verb("{path.stem}"' in text:
+        if f'@command("{path.stem}"' in text:
             docstring = ast.get_docstring(ast.parse(text)) or ""
             result[path.stem] = docstring.partition("\n")[0]
     return result
@@ -263,7 +269,7 @@ def _groups(path: Path) -> dict[str, str | None]:
 
 
 def _key_lines(path: Path) -> list[str]:
-    """Top-level keys of a verb's file with the comments behind them, as written there."""
+    """Top-level keys of a command's file with the comments behind them, as written there."""
     lines = path.read_text().splitlines()
     inside = False
     kept = []

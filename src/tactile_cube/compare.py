@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("compare")
+@command("compare")
 def main(config: DictConfig) -> None:
     """Write comparison.json, report.html and comparison.rrd; print the errors and where the model fails."""
     from tactile_cube.api.comparison import modelled, opened, run_comparison

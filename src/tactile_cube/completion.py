@@ -1,6 +1,6 @@
-"""Completion in bash of `python -m tactile_cube.<verb> ...`; Hydra itself completes scripts only, not modules.
+"""Completion in bash of `python -m tactile_cube.<command> ...`; Hydra itself completes scripts only, not modules.
 
-`eval "$(python -m tactile_cube.train -sc install=bash)"` switches it on for all verbs.
+`eval "$(python -m tactile_cube.train -sc install=bash)"` switches it on for all commands.
 """
 
 import os
@@ -26,7 +26,7 @@ def install_script(arguments: list[str]) -> str | None:
 
 
 def prepare_query() -> None:
-    """Make the line to complete look to Hydra as if the verb were an executable."""
+    """Make the line to complete look to Hydra as if the command were an executable."""
     line = os.environ.get("COMP_LINE")
     if line:
         os.environ["COMP_LINE"] = re.sub(r"^\S+ -m (tactile_cube\.\w+)", r"\1", line)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("deploy")
+@command("deploy")
 def main(config: DictConfig) -> None:
     """Home the fingers, let the policy decide, stop; write the loop's log as a recording."""
     import functools

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 FILES = {"report": "report.html", "model": "model.yaml", "diagnosis": "diagnosis.json"}
 
 
-@verb("diagnose")
+@command("diagnose")
 def main(config: DictConfig) -> None:
     """Write diagnosis.json, model.yaml, report.html and diagnosis.rrd; print the answer in plain words."""
     from tactile_cube.api.comparison import modelled, opened

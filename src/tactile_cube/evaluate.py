@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("evaluate")
+@command("evaluate")
 def main(config: DictConfig) -> None:
     """Run the episodes of a protocol, print and write the verdicts, film the best episode."""
     import functools

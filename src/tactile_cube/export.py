@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("export")
+@command("export")
 def main(config: DictConfig) -> None:
     """Export the policy and say what was written."""
     from pathlib import Path

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("identify")
+@command("identify")
 def main(config: DictConfig) -> None:
     """Write model.yaml, identification.json and report.html; print the error after each stage."""
     from tactile_cube.api.comparison import opened

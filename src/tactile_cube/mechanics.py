@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("mechanics")
+@command("mechanics")
 def main(config: DictConfig) -> None:
     """Run the cases and write the page."""
     import shlex

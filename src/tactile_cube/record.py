@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("record")
+@command("record")
 def main(config: DictConfig) -> None:
-    """Write the recording into `out`, read back as every verb would, and say what it holds."""
+    """Write the recording into `out`, read back as every command would, and say what it holds."""
     from tactile_cube.api.job import typed_job
     from tactile_cube.api.recording import run_recording
 

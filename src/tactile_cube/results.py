@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("results")
+@command("results")
 def main(config: DictConfig) -> None:
     """Gather results files and training runs into one page and one picture."""
     from pathlib import Path

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("search_gait")
+@command("search_gait")
 def main(config: DictConfig) -> None:
     """Search, try the best again in fresh episodes, write gait.yaml and, after each generation, ledger.json."""
     import time

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("ship")
+@command("ship")
 def main(config: DictConfig) -> None:
     """Copy the policy file and write the card beside it."""
     import shutil

@@ -8,7 +8,7 @@ checkpoint.pt, checkpoint_before.pt and replay/ (to go on from), train.log (what
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -23,7 +23,7 @@ def sweep_summary(folders: list[Path]) -> None:
         print(f"this table again, and its curves: python -m tactile_cube.results sweep={sweep}")
 
 
-@verb("train", after_sweep=sweep_summary)
+@command("train", after_sweep=sweep_summary)
 def main(config: "DictConfig") -> None:
     """Train, and end with a status that a script or a sweep understands."""
     import sys

@@ -1,4 +1,4 @@
-"""Run the public verbs on blind recordings and judge what they answer.
+"""Run the public commands on blind recordings and judge what they answer.
 
     python tests/blind/judge.py --draws 60 --out outputs/blind --jobs 1
 
@@ -42,11 +42,11 @@ def commit() -> str:
     return found.stdout.strip() or "not recorded"
 
 
-def run_verb(verb: str, out: Path, *words: str) -> dict[str, Any] | None:
-    """One public verb as a user types it; its JSON answer, or None when it failed (its words stay in `out`)."""
-    answer = {"diagnose": "diagnosis.json", "compare": "comparison.json"}[verb]
+def run_command(name: str, out: Path, *words: str) -> dict[str, Any] | None:
+    """One public command as a user types it; its JSON answer, or None when it failed (its words stay in `out`)."""
+    answer = {"diagnose": "diagnosis.json", "compare": "comparison.json"}[name]
     out.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", f"tactile_cube.{verb}", *words, f"hydra.run.dir={out}"]
+    command = [sys.executable, "-m", f"tactile_cube.{name}", *words, f"hydra.run.dir={out}"]
     with (out / "words.txt").open("w") as words_of_verb:
         subprocess.run(command, stdout=words_of_verb, stderr=subprocess.STDOUT, check=False)
     path = out / answer
@@ -58,7 +58,7 @@ def validation_error(recording: Path, model: Path, out: Path) -> float | None:
     if not model.is_file():
         return None
     words = (f"recording={recording / 'validation'}", f"model={model}", "band.simulations=0", "rerun=false")
-    answer = run_verb("compare", out, *words)
+    answer = run_command("compare", out, *words)
     return None if answer is None else float(answer["error"]["overall"])
 
 
@@ -67,7 +67,7 @@ def judge(seed: int, folder: Path, seconds: float | None, keep: bool, engine: st
     place = folder / f"draw_{seed}"
     truth = write(seed, place, seconds, engine=engine)
     started = time.perf_counter()
-    diagnosis = run_verb(
+    diagnosis = run_command(
         "diagnose", place / "diagnose", f"recording={place / 'recording'}", "engine=fast", "rerun=false"
     )
     wall = time.perf_counter() - started

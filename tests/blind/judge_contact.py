@@ -55,9 +55,9 @@ def hidden(seed: int) -> tuple[str, dict[str, float]]:
     return name, {key: round(sign * value, 6) for key, value in values.items()}
 
 
-def run(verb: str, folder: Path, makes: Path, *words: str) -> Path:
-    """One public verb as a user types it, unless what it makes is there already."""
-    command = [sys.executable, "-m", f"tactile_cube.{verb}", *words, f"hydra.run.dir={folder}"]
+def run(name: str, folder: Path, makes: Path, *words: str) -> Path:
+    """One public command as a user types it, unless what it makes is there already."""
+    command = [sys.executable, "-m", f"tactile_cube.{name}", *words, f"hydra.run.dir={folder}"]
     done = None if makes.exists() else subprocess.run(command, capture_output=True, text=True, check=False)
     if done is not None and done.returncode != 0:
         raise SystemExit(f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}")
@@ -70,7 +70,7 @@ def judge(seed: int, folder: Path) -> dict[str, Any]:
     place = folder / f"draw_{seed}"
     said = ", ".join(f"{key}={value}" for key, value in values.items())
     told = [] if name == NOTHING else [f'source.hidden=["{name}: {said}"]']
-    recording, diagnosed, identified = (place / verb for verb in ("recording", "diagnose", "identify"))
+    recording, diagnosed, identified = (place / name for name in ("recording", "diagnose", "identify"))
     settings = ["source=grasp", f"out={recording}", f"seed={seed}", "source.validation=false"]
     run("record", place / "record", recording / "recording.yaml", *settings, *told)
     words = [f"recording={recording}", f"seed={seed}"]

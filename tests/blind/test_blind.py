@@ -1,4 +1,4 @@
-"""The blind world against a second engine, its recordings, the rules of the judge, quick draws with real verbs."""
+"""The blind world against a second engine, its recordings, the rules of the judge, quick draws with real commands."""
 
 import importlib.util
 import json
@@ -190,7 +190,7 @@ def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
 def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     judged: list[int] = []
 
-    def verbs(verb: str, out: Path, *words: str) -> dict[str, Any]:
+    def commands(name: str, out: Path, *words: str) -> dict[str, Any]:
         out.mkdir(parents=True)
         (out / "model.yaml").write_text("")
         return {**_answer("adequate"), "error": {"overall": 3e-4}}
@@ -200,7 +200,7 @@ def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
         (out / "recording").mkdir(parents=True)
         return {"seed": seed, **_truth()}
 
-    monkeypatch.setattr(judge, "run_verb", verbs)
+    monkeypatch.setattr(judge, "run_command", commands)
     monkeypatch.setattr(judge, "write", written)
     for draws in (2, 3):
         monkeypatch.setattr(sys, "argv", ["judge.py", "--draws", str(draws), "--out", str(tmp_path)])
@@ -211,11 +211,11 @@ def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
     assert summary["right"] == 3
 
 
-@pytest.mark.skipif(importlib.util.find_spec("tactile_cube.diagnose") is None, reason="the diagnose verb is not there")
+@pytest.mark.skipif(importlib.util.find_spec("tactile_cube.diagnose") is None, reason="no diagnose command")
 @pytest.mark.parametrize(("seed", "names"), [(3, []), (4, ["command_delay"])])
 def test_diagnosis_of_a_short_recording(seed: int, names: list[str], tmp_path: Path) -> None:
     generator.write(seed, tmp_path, QUICK, names, "pendulum")
     truth = json.loads((tmp_path / "truth.json").read_text())
-    answer = judge.run_verb("diagnose", tmp_path / "answer", f"recording={tmp_path / 'recording'}", "engine=fast")
+    answer = judge.run_command("diagnose", tmp_path / "answer", f"recording={tmp_path / 'recording'}", "engine=fast")
     assert answer is not None, (tmp_path / "answer" / "words.txt").read_text()
     assert score(truth, answer, None).outcome in ("right", "acceptable"), answer["verdict"]

@@ -11,8 +11,8 @@ from tactile_cube.drivetrain.model_file import read_model
 from tests.measurement.small_rig import URDF, table, write
 
 
-def run(verb: str, *arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", f"tactile_cube.{verb}", *arguments]
+def run(name: str, *arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", f"tactile_cube.{name}", *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240, check=False)
 
 

@@ -22,7 +22,7 @@ def test_a_source_has_the_settings_of_its_class(source: str) -> None:
     assert set(settings) == set(inspect.signature(cls).parameters)
 
 
-@pytest.mark.parametrize("verb", ["compare", "record"])
-def test_the_verbs_compose(verb: str) -> None:
+@pytest.mark.parametrize("command", ["compare", "record"])
+def test_the_commands_compose(command: str) -> None:
     with initialize_config_dir(str(Path(CONFIG).resolve()), version_base="1.3"):
-        assert compose(verb).seed == 0
+        assert compose(command).seed == 0

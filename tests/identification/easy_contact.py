@@ -29,7 +29,7 @@ class EasyTrial:
 
     freedom = 12
 
-    def surprise(self, contact: Contact) -> float:
+    def prior_penalty(self, contact: Contact) -> float:
         """Of offsets that a grip needs for another size than the true one."""
         size = self.truth.get(("object_size", "excess"), 0.0)
         excess = contact.values.get("object_size", {}).get("excess", 0.0)

@@ -171,8 +171,8 @@ def hydra_configuration() -> Iterator[None]:
 @cache
 def composed(command: str) -> Any:
     """The configuration of a command line, its environment as the object it describes."""
-    verb, *overrides = command.split()
-    config = compose(verb, overrides=overrides, return_hydra_config=True)
+    name, *overrides = command.split()
+    config = compose(name, overrides=overrides, return_hydra_config=True)
     return config, instantiate(config.env) if "env" in config else None
 
 

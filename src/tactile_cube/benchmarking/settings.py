@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, PositiveInt
 
 
 class RunSettings(BaseModel):
-    """Top-level keys of the verb.
+    """Top-level keys of the command.
 
     Attributes:
         sections: names, in the order in which they are run.

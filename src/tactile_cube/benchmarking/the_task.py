@@ -14,7 +14,7 @@ def table_config() -> EnvConfig:
 
     from tactile_cube.cli import CONFIG
 
-    GlobalHydra.instance().clear()  # of the verb that runs this, which has its configuration already
+    GlobalHydra.instance().clear()  # of the command that runs this, which has its configuration already
     with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
         config: EnvConfig = instantiate(compose("train", overrides=["+experiment=table"]).env)
     return config

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tactile_cube.identification.contact.fit import evenly, shown_by
-from tactile_cube.identification.contact.search import best_of, first_value, narrowed, pooled_cost, surprises
+from tactile_cube.identification.contact.search import best_of, first_value, narrowed, pooled_cost, prior_penalties
 from tactile_cube.identification.contact.together import solved
 from tactile_cube.identification.contact.trial import ContactTrial
 from tactile_cube.identification.contact.unknown import unknowns
@@ -62,17 +62,17 @@ class ContactSearch:
         first: mean square of the held-out residual to begin with (trials, 1, joints) [rad^2].
     """
 
-    def __init__(self, trials: Sequence[ContactTrial], judges: Sequence[ContactTrial], say: Callable[[str], None]):
+    def __init__(self, trials: Sequence[ContactTrial], validation: Sequence[ContactTrial], say: Callable[[str], None]):
         """Takes the trials to fit, those that judge, and what takes progress lines."""
-        self.trials, self.judges, self.say = trials, judges, say
+        self.trials, self.validation, self.say = trials, validation, say
         self.found: list[Tried] = []
         self.rivals: list[Tried] = []
         self.tried: list[list[Tried]] = []
 
     def run(self, contact: Contact) -> None:
         """Fill `found`, `rivals`, `tried` and `first`."""
-        self.say(f"simulating {len(self.trials)} trials as stated, and {len(self.judges)} that judge")
-        self.first = before = mean_squares(self.judges, contact)
+        self.say(f"simulating {len(self.trials)} trials as stated, and {len(self.validation)} that validate")
+        self.first = before = mean_squares(self.validation, contact)
         while len(self.found) < MOST_EFFECTS and (not self.found or np.sqrt(before.mean()) > GOOD):
             known = {one.effect for one in self.found}
             left = [effect for effect in contact_catalogue().values() if effect not in known]
@@ -86,7 +86,7 @@ class ContactSearch:
             best = helps[0]
             self.found.append(best)
             self.rivals = [one for one in helps[1:] if one.error < (1 + AS_GOOD) * best.error]
-            contact, before = best.contact, mean_squares(self.judges, best.contact)
+            contact, before = best.contact, mean_squares(self.validation, best.contact)
 
     def _try(self, effect: type[ContactEffect], contact: Contact, before: Array) -> Tried:
         """The effect at the values that suit the trials best, coarse unless they promise something."""
@@ -95,9 +95,9 @@ class ContactSearch:
         if pooled_cost(trials, stated, effect) - pooled_cost(trials, contact, effect) < len(trials) * np.log(PROMISE):
             self.say(f"{effect.name}: takes nothing off the error")
             return Tried(effect, contact, float(np.sqrt(before.mean())), 0.0, 1.0)
-        after = mean_squares(self.judges, contact)
+        after = mean_squares(self.validation, contact)
         error = float(np.sqrt(after.mean()))
-        telling = [one in shown_by(self.judges, effect) for one in self.judges]
+        telling = [one in shown_by(self.validation, effect) for one in self.validation]
         old, new = np.sqrt(before[telling]), np.sqrt(after[telling])
         gain = 1 - float(np.sqrt(np.mean(new**2) / np.mean(old**2)))
         p_value = (
@@ -105,7 +105,7 @@ class ContactSearch:
         )
         found = Tried(effect, contact, error, gain, p_value)
         if effect.shows_in == "offsets":
-            offsets = offsets_gained([*trials, *shown_by(self.judges, effect)], stated, contact)
+            offsets = offsets_gained([*trials, *shown_by(self.validation, effect)], stated, contact)
             found = max(found, Tried(effect, contact, error, *offsets, "offsets"), key=lambda one: one.gain)
         self.say(f"{effect.name}: takes {100 * found.gain:.0f} % off {GAIN_OF[found.gain_of]}")
         return found
@@ -134,7 +134,7 @@ def offsets_gained(trials: Sequence[ContactTrial], before: Contact, after: Conta
     The F test of one more number, which holds whatever the spread of the offsets is. It has trials to fit and held-out
     ones together: a single held-out initialisation may need less offset by chance.
     """
-    first, last = (sum(surprises(trials, contact).values()) for contact in (before, after))
+    first, last = (sum(prior_penalties(trials, contact).values()) for contact in (before, after))
     freedom = sum({one.trial.initialisation: one.freedom for one in trials}.values())
     ratio = max(first - last, 0.0) / (last / freedom)
     return 1 - float(np.sqrt(last / first)), float(stats.f.sf(ratio, 1, freedom))

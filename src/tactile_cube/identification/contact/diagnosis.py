@@ -126,16 +126,16 @@ def diagnose_contact(
     """
     with open_grasps(recording, model, step, seed) as grasps:
         trials = some_of_each_kind(grasps.fitted, FITTED)
-        judges = some_of_each_kind(grasps.held_out, JUDGED)
-        search = ContactSearch(trials, judges, say)
+        validation = some_of_each_kind(grasps.held_out, JUDGED)
+        search = ContactSearch(trials, validation, say)
         search.run(grasps.start)
         estimates, end = {}, search.first
         if search.found:
             fit = fit_contact(trials, [one.effect for one in search.found], grasps.start, say)
-            estimates, end = fit.estimates, mean_squares(judges, fit.contact)
+            estimates, end = fit.estimates, mean_squares(validation, fit.contact)
     errors = {"nominal": search.first, "with_effects": end}
     stages = {key: summarise(list(np.sqrt(squares)), grasps.joints) for key, squares in errors.items()}
-    names = [one.trial.name for one in judges]
+    names = [one.trial.name for one in validation]
     verdict = verdict_of(search, stages["with_effects"].overall)
     return ContactDiagnosis(
         verdict, search.found, search.rivals, search.tried, estimates, stages, grasps.noise_floor, names

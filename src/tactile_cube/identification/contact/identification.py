@@ -135,10 +135,10 @@ def identify_contact(
     with open_grasps(recording, model, step, seed) as grasps:
         fit = fit_contact(grasps.fitted, effects, grasps.start, say)
         say("simulating the held-out trials")
-        judges = list(dict.fromkeys(one for effect in effects for one in shown_by(grasps.held_out, effect)))
+        validation = list(dict.fromkeys(one for effect in effects for one in shown_by(grasps.held_out, effect)))
         stages = {"nominal": grasps.start, "with_effects": fit.contact}
-        errors = {key: contact_error(judges, contact, grasps.joints) for key, contact in stages.items()}
-    return ContactIdentification(fit, errors, grasps.noise_floor, [one.trial.name for one in judges])
+        errors = {key: contact_error(validation, contact, grasps.joints) for key, contact in stages.items()}
+    return ContactIdentification(fit, errors, grasps.noise_floor, [one.trial.name for one in validation])
 
 
 def contact_error(trials: Sequence[ContactTrial], contact: Contact, joints: Sequence[str]) -> ErrorSummary:

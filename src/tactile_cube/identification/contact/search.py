@@ -76,14 +76,14 @@ def pooled_cost(trials: Sequence[ContactTrial], contact: Contact, effect: type[C
     misfit = float(np.sum(np.log([trial.cost(contact) for trial in trials])))
     if effect.shows_in != "offsets":
         return misfit
-    return sum(surprises(trials, contact).values()) + MISFIT_COUNTS * misfit / len(trials)
+    return sum(prior_penalties(trials, contact).values()) + MISFIT_COUNTS * misfit / len(trials)
 
 
-def surprises(trials: Sequence[ContactTrial], contact: Contact) -> dict[int, float]:
+def prior_penalties(trials: Sequence[ContactTrial], contact: Contact) -> dict[int, float]:
     """Initialisation -> how improbable the joint offsets are that its trials need."""
     by_initialisation: dict[int, list[float]] = {}
     for one in trials:
-        by_initialisation.setdefault(one.trial.initialisation, []).append(one.surprise(contact))
+        by_initialisation.setdefault(one.trial.initialisation, []).append(one.prior_penalty(contact))
     return {key: float(np.mean(values)) for key, values in by_initialisation.items()}
 
 

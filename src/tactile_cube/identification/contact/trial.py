@@ -61,7 +61,7 @@ class ContactTrial:
         """Measured minus simulated position (n, joints) [rad], the nuisance fitted."""
         return self._fitted(contact)[1]
 
-    def surprise(self, contact: Contact) -> float:
+    def prior_penalty(self, contact: Contact) -> float:
         """Squared distance of joint offsets and the box's place from what is expected, in standard deviations."""
         return float(np.sum((self._fitted(contact)[0] / self._spread) ** 2))
 
