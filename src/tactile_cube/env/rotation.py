@@ -14,7 +14,7 @@ from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_al
 from tactile_cube.env.reward import REWARD_TERMS, Reward
 from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
 from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.randomization import Randomization, StartPoses
+from tactile_cube.randomization import GraspTable, Randomization, StartPoses
 from tactile_cube.simulation import EpisodeConstants, World
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ class RotationEnv:
         task: Task,
         reward: Reward,
         randomization: Randomization,
-        start: StartPoses,
+        start: StartPoses | GraspTable,
         constants: EpisodeConstants | None = None,
         hand: Hand = DLR_HAND2,
     ) -> None:

@@ -11,6 +11,7 @@ from tactile_cube.randomization.distributions import (
     sample,
 )
 from tactile_cube.randomization.effect_range import EffectRange
+from tactile_cube.randomization.grasp_starts import Grasps, GraspStarts, GraspTable
 from tactile_cube.randomization.identified import identified
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.randomization.start_states import StartPoses, StartStates
@@ -20,6 +21,9 @@ __all__ = [
     "Constant",
     "Distribution",
     "EffectRange",
+    "GraspStarts",
+    "GraspTable",
+    "Grasps",
     "LogUniform",
     "Normal",
     "Randomization",

@@ -16,13 +16,15 @@ from tactile_cube.hand.gait import GaitRanges
 from tactile_cube.transforms.partial_reset import reset_mask
 
 
-def finger_groups(fingers: int) -> Tensor:
+def finger_groups(fingers: int, single: bool = False) -> Tensor:
     """Fingers that move together (groups, fingers): each alone, every second one where there are four, all (twice).
 
-    Of four fingers those are the opposing pairs: ring and fore, middle and thumb.
+    Of four fingers those are the opposing pairs: ring and fore, middle and thumb. With `single` each alone is all.
     """
-    pairs = [[finger % 2 == first for finger in range(fingers)] for first in (0, 1)] if fingers == 4 else []
     alone = [[finger == one for finger in range(fingers)] for one in range(fingers)]
+    if single:
+        return torch.tensor(alone)
+    pairs = [[finger % 2 == first for finger in range(fingers)] for first in (0, 1)] if fingers == 4 else []
     return torch.tensor([*alone, *pairs, *[[True] * fingers] * 2])
 
 
@@ -39,6 +41,7 @@ class Exploration:
         probability: with which a step of such an episode begins to hold a random target.
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
+        single: only one finger at a time does; else also pairs and all of them, which in the air costs the object.
         demonstrations: part of the episodes in which a scripted gait or a teacher acts. There the policy takes over
             where an exploring one would hold a target, and for as long.
         noise: standard deviation of the noise on their actions.
@@ -50,6 +53,7 @@ class Exploration:
     probability: float = 0.06
     shortest: int = 2
     longest: int = 7
+    single: bool = False
     demonstrations: float = 0.0
     noise: float = 0.1
     gaits: GaitRanges | None = None
@@ -110,7 +114,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         """
         super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
-        self._groups, self._per_finger = finger_groups(fingers), joints_per_finger
+        self._groups, self._per_finger = finger_groups(fingers, exploration.single), joints_per_finger
         self._joints = fingers * joints_per_finger
         self._gaits = torch.zeros(1, 1, self._joints) if gaits is None else gaits
         self._teacher = teacher

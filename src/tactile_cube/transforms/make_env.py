@@ -18,7 +18,7 @@ from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.gait import similar_gaits
-from tactile_cube.randomization import Randomization, StartPoses, StartStates, identified
+from tactile_cube.randomization import GraspStarts, GraspTable, Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.resolution import unresolved
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
@@ -57,7 +57,7 @@ class EnvConfig:
     task: Task
     reward: Reward = field(default_factory=Reward)
     randomization: Randomization = field(default_factory=Randomization)
-    start: StartStates = field(default_factory=StartStates)
+    start: StartStates | GraspStarts = field(default_factory=StartStates)
     exploration: Exploration = field(default_factory=lambda: Exploration(episodes=0.0))
     curriculum: Curriculum | None = None
     constants: EpisodeConstants = field(default_factory=EpisodeConstants)
@@ -133,7 +133,7 @@ def _of_world(config: EnvConfig, index: int) -> EnvConfig:
     return replace(config, simulation=config.simulation.of_world(index))
 
 
-def rotation_env(config: EnvConfig, poses: StartPoses | None = None) -> RotationEnv:
+def rotation_env(config: EnvConfig, poses: StartPoses | GraspTable | None = None) -> RotationEnv:
     """The task in one new world, without transforms; `poses` are the start poses where they are at hand already."""
     world = World(config.hand, config.simulation, config.effects)
     start = config.start.of(config.hand, config.constants) if poses is None else poses

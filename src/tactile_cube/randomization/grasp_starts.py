@@ -1,0 +1,164 @@
+"""Where an episode starts in the middle of a turn: grasps that hold the object by themselves, from a file.
+
+Fixed starts learn no finger gaiting even without gravity, starts in stable grasps learn it: Khandate et al.,
+"Sampling-based Exploration for Reinforcement Learning of Dexterous Manipulation" (RSS 2023).
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import asdict, dataclass, field
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.errors import InputError
+from tactile_cube.hand import Hand
+from tactile_cube.randomization.randomization import Randomization
+from tactile_cube.randomization.start_states import StartPoses, StartStates
+from tactile_cube.simulation import EpisodeConstants, Start
+
+Array = NDArray[np.float64]
+
+SHIPPED = Path(str(resources.files("tactile_cube"))) / "randomization" / "grasps.npz"
+"""Those of the DLR-Hand II around the nominal cube; `python -m tactile_cube.search_grasps` made them."""
+COLUMNS = ("angles", "targets", "positions", "quaternions")
+
+
+@dataclass(frozen=True)
+class Grasps:
+    """Stable grasps of one hand around one object.
+
+    Attributes:
+        angles: joint angles `(grasps, joints)` [rad].
+        targets: what the controller holds, q_f `(grasps, joints)` [rad].
+        positions: centre of the object `(grasps, 3)` [m].
+        quaternions: its orientation, xyzw `(grasps, 4)`.
+        hand: name of the hand.
+        shape: of the object, as in `EpisodeConstants`.
+        size: of its bounding box (3,) [m].
+        origin: how they were found: command, commit, seed, tries.
+    """
+
+    angles: Array
+    targets: Array
+    positions: Array
+    quaternions: Array
+    hand: str
+    shape: str
+    size: tuple[float, ...]
+    origin: dict[str, str | int] = field(default_factory=dict)
+
+    def save(self, path: Path) -> None:
+        """Writes them as a NumPy archive; equal grasps give equal bytes."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        columns = {name: getattr(self, name).astype(np.float32) for name in COLUMNS}
+        rest = {key: value for key, value in asdict(self).items() if key not in COLUMNS}
+        np.savez_compressed(path, description=np.array(json.dumps(rest)), **columns)
+
+    @classmethod
+    def load(cls, path: Path) -> Grasps:
+        """Reads what `save` wrote.
+
+        Raises:
+            InputError: there is no such file, or it is no file of grasps.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                columns = {name: np.asarray(data[name], dtype=np.float64) for name in COLUMNS}
+                rest = json.loads(str(data["description"]))
+            made = cls(**columns, **rest | {"size": tuple(rest["size"])})
+        except FileNotFoundError:
+            raise InputError(f"start.file={path}: no such file; write it with python -m tactile_cube.search_grasps") from None
+        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+            raise InputError(f"start.file={path}: no file of grasps ({error})") from error
+        made.require_sound(path)
+        return made
+
+    def require_sound(self, path: Path) -> None:
+        """Raises InputError unless the columns fit one another and all numbers are finite."""
+        count = len(self.angles)
+        shapes = {"targets": self.angles.shape, "positions": (count, 3), "quaternions": (count, 4)}
+        for name, shape in shapes.items():
+            if count == 0 or getattr(self, name).shape != shape:
+                raise InputError(f"start.file={path}: {name} is {getattr(self, name).shape}, angles {self.angles.shape}")
+        for name in COLUMNS:
+            bad = np.flatnonzero(~np.isfinite(getattr(self, name)).all(axis=1))
+            if bad.size:
+                raise InputError(f"start.file={path}: {name}, row {bad[0]}, is not finite; search again")
+
+
+@dataclass(frozen=True)
+class GraspStarts:
+    """Starts in stable grasps of every phase of a turn.
+
+    Attributes:
+        file: of the grasps, which `python -m tactile_cube.search_grasps` writes; None: those that come with the package.
+        share: part of the episodes that start in one; the others start as `otherwise` says.
+        otherwise: starts of the other episodes; None: the published one.
+    """
+
+    file: str | None = None
+    share: float = 1.0
+    otherwise: StartStates | None = None
+
+    def __post_init__(self) -> None:
+        """Refuses values without a meaning."""
+        if not 0.0 < self.share <= 1.0:
+            raise InputError(f"start.share is {self.share}; give a part above 0, at most 1")
+
+    def of(self, hand: Hand, constants: EpisodeConstants | None = None) -> GraspTable:
+        """The starts of `hand` with the object of `constants`; None: the nominal cube.
+
+        Raises:
+            InputError: the grasps are of another hand or another object.
+        """
+        known = EpisodeConstants() if constants is None else constants
+        path = SHIPPED if self.file is None else Path(self.file)
+        grasps = Grasps.load(path)
+        wanted = (hand.name, known.object_shape, tuple(np.asarray(known.cube_size).tolist()))
+        if (grasps.hand, grasps.shape) != wanted[:2] or not np.allclose(grasps.size, wanted[2]):
+            raise InputError(
+                f"start.file={path}: grasps of hand {grasps.hand} and a {grasps.shape} of {list(grasps.size)} m, not of "
+                f"{wanted[0]} and a {wanted[1]} of {list(wanted[2])} m; search with python -m tactile_cube.search_grasps"
+            )
+        others = (self.otherwise or StartStates()).of(hand, known)
+        return GraspTable(hand, grasps, self.share, others)
+
+
+@dataclass(frozen=True)
+class GraspTable:
+    """A table of grasps to start in.
+
+    Attributes:
+        hand: the hand.
+        grasps: the grasps.
+        share: part of the episodes that start in one of them.
+        others: where the other episodes start.
+    """
+
+    hand: Hand
+    grasps: Grasps
+    share: float
+    others: StartPoses
+
+    def sample(self, randomization: Randomization, constants: EpisodeConstants, rng: np.random.Generator) -> Start:
+        """Draws a start; a grasp is taken as it was found, because displacing its parts would loosen it.
+
+        Raises:
+            InputError: the object lies on a table.
+        """
+        if constants.table_height is not None:
+            raise InputError("start=grasps holds the object in the air, the task has a table; choose start=wide_yaw")
+        if rng.random() >= self.share:
+            return self.others.sample(randomization, constants, rng)
+        row, grasps = int(rng.integers(len(self.grasps.angles))), self.grasps
+        return Start(
+            angles=np.clip(grasps.angles[row], self.hand.lower, self.hand.upper),
+            cube_position=grasps.positions[row],
+            cube_quaternion=grasps.quaternions[row],
+            target=grasps.targets[row] + constants.joint_offset,
+        )
