@@ -22,7 +22,8 @@ def main(config: DictConfig) -> None:
     from tactile_cube.evaluation.grasp_search import search_grasps
     from tactile_cube.simulation import World
 
-    folder, hand, constants = Path(HydraConfig.get().runtime.output_dir), *map(instantiate, (config.hand, config.constants))
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    hand, constants = instantiate(config.hand), instantiate(config.constants)
     world = World(hand, instantiate(config.simulation))
     found = search_grasps(world, constants, instantiate(config.search), config.grasps, config.seed)
     command = shlex.join(["python", "-m", "tactile_cube.search_grasps", *sys.argv[1:]])

@@ -31,6 +31,13 @@ def test_only_the_given_part_of_the_episodes_explores(transformed: MakeEnv) -> N
     assert (taken[:, exploring] != 0.0).any()
 
 
+def test_single_fingers_move_one_at_a_time(transformed: MakeEnv) -> None:
+    env = transformed(FingerExploration(Exploration(episodes=1.0, probability=0.2, single=True)), worlds=40)
+    moved = (run(env, 40, 40) != 0.0).all(-1)
+    assert set(moved.sum(-1).unique().tolist()) == {0, 1}
+    assert moved.any(dim=(0, 1)).all()
+
+
 def test_whole_fingers_hold_a_target_for_two_to_seven_steps(transformed: MakeEnv) -> None:
     env = transformed(FingerExploration(Exploration(episodes=1.0, probability=0.06)), worlds=60)
     taken = run(env, 60, 80)

@@ -25,7 +25,7 @@ REACHED = 1e-3
 BETWEEN_TIPS = 2e-3
 """Least gap between the tips of two fingers before the hand closes [m]."""
 CLOSING_TIME = 0.1
-"""T_s while the hand closes [s]: the targets are constant, so the grasp that stands in the end does not depend on it."""
+"""T_s while the hand closes [s]: targets are constant, so what stands in the end hardly depends on it."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def search_grasps(
     most_tries: int | None = None,
     say: Callable[[str], None] = print,
 ) -> Grasps:
-    """Try random grasps until `count` of them held; yaws are drawn first, so that hard ones are as frequent as easy ones.
+    """Try random grasps until `count` of them held; yaws are drawn first, hard ones as often as easy ones.
 
     Args:
         world: simulates them, with the hand.

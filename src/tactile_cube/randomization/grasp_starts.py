@@ -72,7 +72,7 @@ class Grasps:
                 rest = json.loads(str(data["description"]))
             made = cls(**columns, **rest | {"size": tuple(rest["size"])})
         except FileNotFoundError:
-            raise InputError(f"start.file={path}: no such file; write it with python -m tactile_cube.search_grasps") from None
+            raise InputError(f"start.file={path}: no such file; write one with tactile_cube.search_grasps") from None
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InputError(f"start.file={path}: no file of grasps ({error})") from error
         made.require_sound(path)
@@ -84,7 +84,8 @@ class Grasps:
         shapes = {"targets": self.angles.shape, "positions": (count, 3), "quaternions": (count, 4)}
         for name, shape in shapes.items():
             if count == 0 or getattr(self, name).shape != shape:
-                raise InputError(f"start.file={path}: {name} is {getattr(self, name).shape}, angles {self.angles.shape}")
+                found = getattr(self, name).shape
+                raise InputError(f"start.file={path}: {name} is {found}, angles {self.angles.shape}")
         for name in COLUMNS:
             bad = np.flatnonzero(~np.isfinite(getattr(self, name)).all(axis=1))
             if bad.size:
@@ -96,7 +97,7 @@ class GraspStarts:
     """Starts in stable grasps of every phase of a turn.
 
     Attributes:
-        file: of the grasps, which `python -m tactile_cube.search_grasps` writes; None: those that come with the package.
+        file: of the grasps, as `python -m tactile_cube.search_grasps` writes it; None: the one of the package.
         share: part of the episodes that start in one; the others start as `otherwise` says.
         otherwise: starts of the other episodes; None: the published one.
     """
@@ -122,8 +123,9 @@ class GraspStarts:
         wanted = (hand.name, known.object_shape, tuple(np.asarray(known.cube_size).tolist()))
         if (grasps.hand, grasps.shape) != wanted[:2] or not np.allclose(grasps.size, wanted[2]):
             raise InputError(
-                f"start.file={path}: grasps of hand {grasps.hand} and a {grasps.shape} of {list(grasps.size)} m, not of "
-                f"{wanted[0]} and a {wanted[1]} of {list(wanted[2])} m; search with python -m tactile_cube.search_grasps"
+                f"start.file={path}: grasps of hand {grasps.hand} and a {grasps.shape} of {list(grasps.size)} m, "
+                f"not of {wanted[0]} and a {wanted[1]} of {list(wanted[2])} m; "
+                "search with python -m tactile_cube.search_grasps"
             )
         others = (self.otherwise or StartStates()).of(hand, known)
         return GraspTable(hand, grasps, self.share, others)
