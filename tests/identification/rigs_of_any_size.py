@@ -12,7 +12,7 @@ from tactile_cube.drivetrain.effects import Effect, find_effect
 from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.stretches import cut
+from tactile_cube.identification.fitting.windows import cut
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 
@@ -80,11 +80,11 @@ def simulated(
         polars.DataFrame(columns).write_parquet(folder / str(trial["file"]))
     planned = read_recording(folder)
     shooting = Shooting(planned, EFFECTS)
-    stretches = cut(planned, np.ones(1), segment=SAMPLES, time=shooting.time)
+    windows = cut(planned, np.ones(1), segment=SAMPLES, time=shooting.time)
     plain = nominal_model(planned)
     known = effect("a", **values)
-    model = Model(plain.constants, (Term(effect, "a", known.values, ()),), plain.posture)
-    played = shooting.positions([model], stretches)[0]
+    model = Model(plain.constants, (Term(effect, "a", known.values, ()),), plain.offsets)
+    played = shooting.positions([model], windows)[0]
     rng = np.random.default_rng(1)
     for entry, trial, ideal in zip(trials, planned.trials, played, strict=True):
         position = ideal[:, 0] + NOISE * size.position * rng.normal(size=SAMPLES)

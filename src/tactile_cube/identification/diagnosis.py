@@ -142,7 +142,7 @@ class Simulations(Questions):
 
     def __init__(self, search: Search, base: Explanation, floor: NoiseFloor, engine: Engine, step: float) -> None:
         self.search, self.base, self.floor, self.engine, self.step = search, base, floor, engine, step
-        self.problem = Problem(search.shooting, search.all_stretches)
+        self.problem = Problem(search.shooting, search.all_windows)
         self._final: dict[str, Fitted] = {}
         self._errors: dict[str, ErrorSummary] = {}
 
@@ -197,7 +197,7 @@ def follows_signals(unexplained: Sequence[Unexplained], criteria: Criteria = STA
 
 def with_offsets(model: Model, judged: Model) -> Model:
     """The final model with the joint offsets that were found for the held-out initialisations."""
-    return Model(model.constants, model.terms, {**judged.posture, **model.posture})
+    return Model(model.constants, model.terms, {**judged.offsets, **model.offsets})
 
 
 def _unexplained(search: Search, joints: Sequence[str], beside: Mapping[str, Judgement]) -> list[Unexplained]:

@@ -88,7 +88,7 @@ def identify(
         label = current.model.terms[-1].label
         stages[f"+ {label}"] = _judged(search, held_out, current.model)
         say(f"fitted {label}")
-    fitted = final_fit(Problem(search.shooting, search.all_stretches), current.model, search.unknowns(current.model))
+    fitted = final_fit(Problem(search.shooting, search.all_windows), current.model, search.unknowns(current.model))
     last = list(stages)[-1]
     stages[last] = with_offsets(fitted.model, stages[last])
     say("simulating the held-out trials")
@@ -98,7 +98,7 @@ def identify(
 
 def _judged(search: Search, held_out: Recording, model: Model) -> Model:
     """The model with the joint offsets of the held-out initialisations."""
-    full = search.with_postures(model)
+    full = search.with_known_offsets(model)
     search.judges.linearise_starts(full)
     return judge(search.judges, held_out, full).model
 

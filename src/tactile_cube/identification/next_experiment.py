@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.stretches import cut
+from tactile_cube.identification.fitting.windows import cut
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 
@@ -57,11 +57,11 @@ def next_experiment(
     """The excitation whose worst-told pair of rivals differs most, in units of the noise."""
     excitations = safe_excitations(recording, seed, shooting.time)
     trials = [_trial(recording, name, commands) for name, commands in excitations.items()]
-    stretches = [cut(recording, noise, [trial], segment=len(trial.time), time=shooting.time) for trial in trials]
+    windows = [cut(recording, noise, [trial], segment=len(trial.time), time=shooting.time) for trial in trials]
     models = [_without_offsets(model) for model in rivals.values()]
     best: Experiment | None = None
-    for trial, stretch in zip(trials, stretches, strict=True):
-        predicted = shooting.positions(models, stretch)[:, 0]
+    for trial, window in zip(trials, windows, strict=True):
+        predicted = shooting.positions(models, window)[:, 0]
         pairs = [(a, b) for a in range(len(models)) for b in range(a)]
         distances = np.array([np.sqrt(np.mean((predicted[a] - predicted[b]) ** 2, axis=0)) for a, b in pairs])
         worst = distances[np.argmin(distances.max(axis=1))]
@@ -119,5 +119,5 @@ def _trial(recording: Recording, name: str, commands: Array) -> Trial:
 
 
 def _without_offsets(model: Model) -> Model:
-    zero = {0: np.zeros_like(next(iter(model.posture.values())))}
+    zero = {0: np.zeros_like(next(iter(model.offsets.values())))}
     return Model(model.constants, model.terms, zero)

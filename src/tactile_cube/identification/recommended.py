@@ -74,5 +74,5 @@ def _estimate(value: float, interval: tuple[float, float, float] | None, unit: s
 
 def _offset(model: Model, joint: int) -> Estimate:
     """Joint offset (measured minus true angle), its interval spanning the initialisations."""
-    offsets = [-float(posture[joint]) for posture in model.posture.values()]
+    offsets = [-float(one[joint]) for one in model.offsets.values()]
     return Estimate(value=float(np.mean(offsets)), low=min(offsets), high=max(offsets), unit="rad")

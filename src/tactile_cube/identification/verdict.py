@@ -56,8 +56,8 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
     if not findings.levels:
         return Verdict("adequate" if base.error <= criteria.adequate else "unknown_effect", base)
     found = [one for level in findings.levels for one in level]
-    plausible, chosen = [one for one in found if not stretched(one)], simplest(found, criteria)
-    if stretched(chosen):
+    plausible, chosen = [one for one in found if not at_bound(one)], simplest(found, criteria)
+    if at_bound(chosen):
         as_good = [one for one in plausible if not worse(one.judgement, chosen.judgement, criteria)]
         if not as_good:
             return Verdict("unknown_effect", chosen)
@@ -80,7 +80,7 @@ def _explains(chosen: Explanation, base: Explanation, ask: Questions, criteria: 
     return share > criteria.nearly_whole and (chosen.error < criteria.far or ask.as_repeats(chosen))
 
 
-def stretched(one: Explanation) -> bool:
+def at_bound(one: Explanation) -> bool:
     """Whether a number of its effects ends at the edge of what such a number may be.
 
     Then the law stands in for another one: so do waves longer than the range of motion for any bent curve.

@@ -1,4 +1,4 @@
-"""A comparison as a Rerun recording: the robot in motion, measured and simulated signals, failing stretches marked."""
+"""A comparison as a Rerun recording: the robot in motion, measured and simulated signals, failing intervals marked."""
 
 import tempfile
 from collections.abc import Sequence
@@ -75,7 +75,7 @@ def blueprint(comparison: Comparison) -> rrb.Blueprint:
         rrb.Spatial3DView(name="The rig, as measured", origin="/", contents=["/robot/**"], line_grid=False),
         rrb.Tabs(
             rrb.TextDocumentView(name="Where it fails", origin="/summary"),
-            rrb.TextLogView(name="Failing stretches", origin="/failing"),
+            rrb.TextLogView(name="Failing intervals", origin="/failing"),
         ),
         row_shares=[3, 2],
     )
@@ -148,7 +148,7 @@ def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list
         stream.set_time(TIMELINE, duration=start)
         stream.log("failing", rr.TextLog(f"trial {trial}", level=rr.TextLogLevel.INFO))
     units = comparison.recording.units
-    for one in comparison.stretches:
+    for one in comparison.failing_intervals:
         stream.set_time(TIMELINE, duration=begin[one.trial] + one.start)
         line = f"{one.joint} in {one.trial}: {one.start:.2f} .. {one.end:.2f} s, {milli(one.error, units[one.joint])}"
         stream.log("failing", rr.TextLog(line, level=rr.TextLogLevel.WARN))

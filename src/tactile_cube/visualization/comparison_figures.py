@@ -14,7 +14,7 @@ BEFORE = PALETTE[1]
 
 
 def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
-    """Command, measured and simulated angle of one joint in one trial, failing stretches marked.
+    """Command, measured and simulated angle of one joint in one trial, failing intervals marked.
 
     With `before`, the comparison of the model as it was, its simulation is drawn too.
     """
@@ -91,9 +91,9 @@ def regime_map(comparison: Comparison) -> str:
 
 
 def marked(comparison: Comparison, trial: int, joint: int) -> tuple[tuple[float, float], ...]:
-    """Start and end [s] of the failing stretches of one joint in one trial."""
+    """Start and end [s] of the failing intervals of one joint in one trial."""
     name, of = comparison.recording.joints[joint], comparison.recording.trials[trial].name
-    return tuple((one.start, one.end) for one in comparison.stretches if one.joint == name and one.trial == of)
+    return tuple((one.start, one.end) for one in comparison.failing_intervals if one.joint == name and one.trial == of)
 
 
 def worst_trial(comparison: Comparison, joint: int) -> int:

@@ -39,7 +39,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Axes:
-    """The frame of a chart: size [px], labels, ranges and stretches of x that are marked."""
+    """The frame of a chart: size [px], labels, ranges and intervals of x that are marked."""
 
     x_label: str
     y_label: str
@@ -57,7 +57,7 @@ class Axes:
 
 
 def line_chart(axes: Axes, lines: list[Line], bands: list[Band] | None = None) -> str:
-    """Curves and bands over one x axis, with ticks, grid, legend and marked stretches."""
+    """Curves and bands over one x axis, with ticks, grid, legend and marked intervals."""
     bands = bands or []
     xs = [one.x for one in lines] + [one.x for one in bands]
     ys = [one.y for one in lines] + [one.low for one in bands] + [one.high for one in bands]
@@ -96,7 +96,7 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
 
 
 def thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """At most `MOST_POINTS` points that keep every peak: smallest and largest of each stretch."""
+    """At most `MOST_POINTS` points that keep every peak: smallest and largest of each interval."""
     if len(x) <= MOST_POINTS:
         return x, y
     edges = np.linspace(0, len(x), MOST_POINTS // 2 + 1).astype(int)

@@ -20,10 +20,10 @@ def test_values_stay_within_their_bounds() -> None:
 
 
 def test_offsets_belong_to_one_initialisation() -> None:
-    unknown = Unknown("posture", "offset", 0, -0.1, 0.1, 0.05, initialisation=1)
+    unknown = Unknown("offset", "offset", 0, -0.1, 0.1, 0.05, initialisation=1)
     changed = unknown.put(PLAIN, 0.02)
-    assert changed.posture[1][0] == 0.02
-    assert changed.posture[0][0] == 0.0
+    assert changed.offsets[1][0] == 0.02
+    assert changed.offsets[0][0] == 0.0
 
 
 def test_a_candidate_fits_only_the_parameters_of_its_form() -> None:

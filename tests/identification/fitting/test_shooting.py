@@ -15,7 +15,7 @@ from tactile_cube.identification.fitting.beginnings import with_beginnings
 from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.stretches import Stretches, cut
+from tactile_cube.identification.fitting.windows import Windows, cut
 from tactile_cube.identification.free_run import free_run
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -48,8 +48,8 @@ def measured(recording: Recording, model: Model) -> Recording:
 def test_segments_show_what_the_replay_logs(recording: Recording, gap: bool) -> None:
     model = with_gap(recording) if gap else nominal_model(recording)
     logged = measured(recording, model)
-    stretches = cut(logged, NOISE)
-    error = (Shooting(logged, EFFECTS).positions([model], stretches)[0] - stretches.measured)[stretches.weight > 0.0]
+    windows = cut(logged, NOISE)
+    error = (Shooting(logged, EFFECTS).positions([model], windows)[0] - windows.measured)[windows.weight > 0.0]
     assert np.sqrt(np.mean(error**2)) < 5e-4, "a motor that floats jumps with the whole command"
 
 
@@ -58,50 +58,50 @@ def test_a_delayed_jump_is_felt_when_it_acts_and_not_at_the_row(recording: Recor
     plain = nominal_model(recording)
     model = replace(plain, terms=tuple(Term(CommandDelay, joint, {"delay": delay}, ("delay",)) for joint in "ab"))
     logged = measured(recording, model)
-    stretches = cut(logged, NOISE)
-    error = (Shooting(logged, EFFECTS).positions([model], stretches)[0] - stretches.measured)[stretches.weight > 0.0]
+    windows = cut(logged, NOISE)
+    error = (Shooting(logged, EFFECTS).positions([model], windows)[0] - windows.measured)[windows.weight > 0.0]
     assert np.sqrt(np.mean(error**2)) < 4e-4, "a delay that is no whole number of rows leaves no more than one that is"
 
 
-def hidden_start(recording: Recording, place: float) -> tuple[Shooting, Model, Stretches]:
-    """Stretches whose measurement began with the link of b at `place` [rad] from the middle of its gap, at rest."""
-    model, stretches = with_gap(recording), cut(recording, NOISE)
+def hidden_start(recording: Recording, place: float) -> tuple[Shooting, Model, Windows]:
+    """Windows whose measurement began with the link of b at `place` [rad] from the middle of its gap, at rest."""
+    model, windows = with_gap(recording), cut(recording, NOISE)
     shooting = Shooting(recording, EFFECTS)
-    beginning = np.zeros_like(stretches.beginning)
-    beginning[:, 1], beginning[:, 3] = place, -stretches.speed[:, 0, 1]
-    seen = shooting.positions_from(model, [beginning], stretches)[0]
-    return shooting, model, replace(stretches, measured=seen)
+    beginning = np.zeros_like(windows.beginning)
+    beginning[:, 1], beginning[:, 3] = place, -windows.speed[:, 0, 1]
+    seen = shooting.positions_from(model, [beginning], windows)[0]
+    return shooting, model, replace(windows, measured=seen)
 
 
 @pytest.mark.parametrize("place", [-0.4 * GAP, 0.3 * GAP])
 def test_the_place_of_a_hidden_link_at_the_start_is_found(recording: Recording, place: float) -> None:
-    shooting, model, stretches = hidden_start(recording, place)
-    found = with_beginnings(shooting, model, stretches)
+    shooting, model, windows = hidden_start(recording, place)
+    found = with_beginnings(shooting, model, windows)
 
-    def error(of: Stretches) -> float:
+    def error(of: Windows) -> float:
         residual = (shooting.positions([model], of)[0] - of.measured)[:, : of.segment]
         return float(np.sqrt(np.mean(residual**2)))
 
-    assert error(found) < 0.2 * error(stretches)
+    assert error(found) < 0.2 * error(windows)
     assert np.all(found.beginning[:, [0, 2]] == 0.0), "the joint without a gap is where its sensor says"
     assert found.beginning[0, 1] == pytest.approx(place, abs=0.1 * GAP)
 
 
 def test_without_a_gap_every_trial_begins_where_its_sensors_say(recording: Recording) -> None:
-    stretches = cut(recording, NOISE)
-    assert with_beginnings(Shooting(recording, EFFECTS), nominal_model(recording), stretches) is stretches
+    windows = cut(recording, NOISE)
+    assert with_beginnings(Shooting(recording, EFFECTS), nominal_model(recording), windows) is windows
 
 
 @pytest.mark.parametrize("models", [1, 2, 3])
 def test_any_number_of_cores_gives_the_same_bits(recording: Recording, models: int) -> None:
-    stretches = cut(recording, NOISE, segment=10)
-    assert len(stretches) > 1
+    windows = cut(recording, NOISE, segment=10)
+    assert len(windows) > 1
     shooting = Shooting(recording, EFFECTS)
     wanted = [with_gap(recording), nominal_model(recording), with_gap(recording)][:models]
     shooting.workers = 1
-    alone = shooting.positions(wanted, stretches)
+    alone = shooting.positions(wanted, windows)
     shooting.workers = 2
-    np.testing.assert_array_equal(shooting.positions(wanted, stretches), alone)
+    np.testing.assert_array_equal(shooting.positions(wanted, windows), alone)
 
 
 def test_a_simulation_that_runs_away_swamps_no_other(recording: Recording) -> None:
@@ -113,12 +113,12 @@ def test_a_simulation_that_runs_away_swamps_no_other(recording: Recording) -> No
             out[0], out[1] = np.nan, 1e200
             return out
 
-    stretches, model = cut(recording, NOISE), nominal_model(recording)
-    problem = Problem(Away(recording, EFFECTS), stretches)
+    windows, model = cut(recording, NOISE), nominal_model(recording)
+    problem = Problem(Away(recording, EFFECTS), windows)
     problem.linearise_starts(model)
     sane = Shooting(recording, EFFECTS)
-    residual = problem.residual(stretches.by_segment(sane.positions([model], stretches)[0])[None])[0]
+    residual = problem.residual(windows.by_segment(sane.positions([model], windows)[0])[None])[0]
     assert np.isfinite(problem.cost(residual)).all()
-    slopes = Away(recording, EFFECTS).start_sensitivity(model, stretches)
+    slopes = Away(recording, EFFECTS).start_sensitivity(model, windows)
     assert not slopes[0].any()
-    np.testing.assert_array_equal(slopes[2:], sane.start_sensitivity(model, stretches)[2:])
+    np.testing.assert_array_equal(slopes[2:], sane.start_sensitivity(model, windows)[2:])

@@ -12,7 +12,7 @@ from tactile_cube.identification.fitting.intervals import bounds, final_fit
 from tactile_cube.identification.fitting.model import read_all
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.stretches import Stretches, cut
+from tactile_cube.identification.fitting.windows import Windows, cut
 from tactile_cube.identification.fitting.time_step import FINER, finer
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -27,7 +27,7 @@ def read(folder: Path, rate: float = 100.0) -> Recording:
 
 
 @pytest.mark.parametrize("rate", [100.0, 500.0])
-def test_finer_stretches_are_those_of_a_faster_controller(tmp_path: Path, rate: float) -> None:
+def test_finer_windows_are_those_of_a_faster_controller(tmp_path: Path, rate: float) -> None:
     coarse, fast = (cut(read(tmp_path / str(k), k), NOISE) for k in (rate, 4.0 * 500.0))
     fine = finer(coarse, fast.substeps // coarse.substeps)
     first = fine.history * fine.substeps
@@ -36,7 +36,7 @@ def test_finer_stretches_are_those_of_a_faster_controller(tmp_path: Path, rate: 
 
 
 def test_where_a_row_is_one_step_the_jump_tells_the_later_command(tmp_path: Path) -> None:
-    def slow(folder: Path, rate: float) -> Stretches:
+    def slow(folder: Path, rate: float) -> Windows:
         return cut(read(folder, rate), NOISE, time=10.0)  # a slow machine, whose rows need no finer steps
 
     coarse, fast = slow(tmp_path / "a", 100.0), slow(tmp_path / "b", 400.0)
@@ -47,9 +47,9 @@ def test_where_a_row_is_one_step_the_jump_tells_the_later_command(tmp_path: Path
 
 def test_the_interval_reaches_from_the_value_of_coarse_steps_to_that_of_the_finer_world(tmp_path: Path) -> None:
     recording = read(tmp_path)
-    shooting, stretches, truth = Shooting(recording, EFFECTS), cut(recording, SMALL), nominal_model(recording)
-    world = shooting.finer(FINER).positions([truth], finer(stretches, FINER))[0]
-    problem = Problem(shooting, replace(stretches, measured=world))
+    shooting, windows, truth = Shooting(recording, EFFECTS), cut(recording, SMALL), nominal_model(recording)
+    world = shooting.finer(FINER).positions([truth], finer(windows, FINER))[0]
+    problem = Problem(shooting, replace(windows, measured=world))
     fitted = final_fit(problem, truth, base_unknowns(recording, truth.constants, shooting.sizes))
     unknowns = fitted.fit.unknowns
     error = read_all(truth, unknowns) - read_all(fitted.model, unknowns)

@@ -14,9 +14,9 @@ SIZES = {"q1": FINGER, "q2": FINGER}
 RECORDING = type("Recording", (), {"joints": ("q1", "q2")})
 
 
-def base(*postures: list[float]) -> Explanation:
+def base(*offsets: list[float]) -> Explanation:
     """A base model with a joint offset of each initialisation [rad]."""
-    model = Model({}, (), {k: np.array(posture) for k, posture in enumerate(postures)})
+    model = Model({}, (), {k: np.array(one) for k, one in enumerate(offsets)})
     fit = replace(FIT, model=model)
     return Explanation((), fit, replace(judged(1.0), model=model), 1.0, 0.0)
 

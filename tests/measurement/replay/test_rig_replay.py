@@ -105,7 +105,7 @@ def test_draws_come_from_the_interval_or_the_spread(recording: Recording) -> Non
     kd = np.array([draw.constants["kd"] for draw in draws])
     assert 0.29 <= kd[:, 0].min() < 0.292 < 0.308 < kd[:, 0].max() <= 0.31
     assert 0.1 <= kd[:, 1].min() < 0.12 < 0.28 < kd[:, 1].max() <= 0.3
-    assert np.abs([draw.posture for draw in draws]).max() <= 0.02
+    assert np.abs([draw.offset for draw in draws]).max() <= 0.02
 
 
 def test_commanded_torques_drive_the_joint(tmp_path: Path) -> None:

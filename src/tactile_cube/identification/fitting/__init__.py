@@ -1,1 +1,1 @@
-"""One model and its numbers: simulated in many short stretches at once, compared with the data, fitted."""
+"""One model and its numbers: simulated in many short windows at once, compared with the data, fitted."""

@@ -11,7 +11,7 @@ from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import EffectEstimate, ModelFile
 from tactile_cube.identification.fitting.model import Model, Term, Unknown
-from tactile_cube.measurement.comparing.postures import LARGEST_OFFSET
+from tactile_cube.measurement.comparing.joint_offsets import LARGEST_OFFSET
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.parameters import nominal_parameters
 
@@ -91,7 +91,7 @@ def offset_unknowns(recording: Recording, sizes: Mapping[str, Scales]) -> tuple[
 
 def _offset(joint: int, initialisation: int, size: float) -> Unknown:
     most, scale, spread = size * LARGEST_OFFSET, size * OFFSET, size * OFFSET_SPREAD
-    return Unknown("posture", "offset", joint, -most, most, scale, initialisation, spread=spread)
+    return Unknown("offset", "offset", joint, -most, most, scale, initialisation, spread=spread)
 
 
 def _creep(joint: int, size: float) -> Unknown:

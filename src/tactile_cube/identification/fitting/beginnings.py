@@ -9,31 +9,31 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.stretches import Stretches
+from tactile_cube.identification.fitting.windows import Windows
 
 Array = NDArray[np.float64]
 PLACES = 17  # within the gap: the time of landing depends on them
 
 
-def with_beginnings(shooting: Shooting, model: Model, stretches: Stretches) -> Stretches:
-    """The stretches with the beginning of each trial that follows its first segment best, one joint after the other.
+def with_beginnings(shooting: Shooting, model: Model, windows: Windows) -> Windows:
+    """The windows with the beginning of each trial that follows its first segment best, one joint after the other.
 
     A link may stand anywhere within the gap, at rest or as fast as the motor. Without a gap nothing changes.
     """
     gap = shooting.gaps(model)
     if not gap.any():
-        return stretches
-    at_start = np.flatnonzero(stretches.time == 0.0)
-    first = stretches.take(at_start).first_segments()
+        return windows
+    at_start = np.flatnonzero(windows.time == 0.0)
+    first = windows.take(at_start).first_segments()
     first = replace(first, beginning=np.zeros_like(first.beginning))
     for joint in np.flatnonzero(gap):
         first = replace(first, beginning=_best(shooting, model, first, int(joint), float(gap[joint])))
-    beginning = stretches.beginning.copy()
+    beginning = windows.beginning.copy()
     beginning[at_start] = first.beginning
-    return replace(stretches, beginning=beginning)
+    return replace(windows, beginning=beginning)
 
 
-def _best(shooting: Shooting, model: Model, first: Stretches, joint: int, gap: float) -> Array:
+def _best(shooting: Shooting, model: Model, first: Windows, joint: int, gap: float) -> Array:
     """The beginnings (S, 2 n) with that of one joint chosen from all places in its gap."""
     count, joints = len(first), first.position.shape[2]
     trials = []

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.model import Model, Unknown, put_all, read_all
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.measurement.comparing.postures import CORRELATED
+from tactile_cube.measurement.comparing.joint_offsets import CORRELATED
 
 Array = NDArray[np.float64]
 DAMPING = 1e-4  # of a first step, in units of the information
@@ -54,7 +54,7 @@ def fit(
     """Fit the unknowns of a model.
 
     Args:
-        problem: the stretches to fit.
+        problem: the windows to fit.
         model: where to start.
         unknowns: what to fit; with `frozen`, beside its unknowns.
         iterations: most steps that are taken.

@@ -36,7 +36,7 @@ class Fitted:
 
 
 def final_fit(problem: Problem, model: Model, unknowns: Sequence[Unknown], iterations: int = 12) -> Fitted:
-    """Refit constants and effects of a model on all stretches, with intervals.
+    """Refit constants and effects of a model on all windows, with intervals.
 
     Where two numbers do nearly the same, the error is nearly flat along their valley: the fit goes on until a step
     gains less than the noise decides.

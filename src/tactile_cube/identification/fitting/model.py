@@ -46,12 +46,12 @@ class Model:
     Attributes:
         constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia.
         terms: effects in force.
-        posture: initialisation -> (n,) true minus measured angle [rad].
+        offsets: initialisation -> (n,) true minus measured angle [rad].
     """
 
     constants: Mapping[str, Array]
     terms: tuple[Term, ...]
-    posture: Mapping[int, Array]
+    offsets: Mapping[int, Array]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Unknown:
         neutral: value at which an effect's parameter changes nothing.
     """
 
-    kind: Literal["constant", "posture", "effect"]
+    kind: Literal["constant", "offset", "effect"]
     key: str
     place: int
     low: float
@@ -86,8 +86,8 @@ class Unknown:
         """Its value in a model."""
         if self.kind == "constant":
             return float(model.constants[self.key][self.place])
-        if self.kind == "posture":
-            return float(model.posture[self.initialisation][self.place])
+        if self.kind == "offset":
+            return float(model.offsets[self.initialisation][self.place])
         return float(model.terms[self.place].values[self.key])
 
     def put(self, model: Model, value: float) -> Model:
@@ -95,8 +95,8 @@ class Unknown:
         value = min(max(value, self.low), self.high)
         if self.kind == "constant":
             return replace(model, constants=_changed(model.constants, self.key, self.place, value))
-        if self.kind == "posture":
-            return replace(model, posture=_changed(model.posture, self.initialisation, self.place, value))
+        if self.kind == "offset":
+            return replace(model, offsets=_changed(model.offsets, self.initialisation, self.place, value))
         term = model.terms[self.place]
         new = replace(term, values={**term.values, self.key: value})
         return replace(model, terms=(*model.terms[: self.place], new, *model.terms[self.place + 1 :]))

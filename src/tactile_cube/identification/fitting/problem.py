@@ -1,4 +1,4 @@
-"""The least-squares problem of one set of stretches: weighted residuals, columns, starts of segments taken out."""
+"""The least-squares problem of one set of windows: weighted residuals, columns, starts of segments taken out."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tactile_cube.identification.fitting.beginnings import with_beginnings
 from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.stretches import Stretches
+from tactile_cube.identification.fitting.windows import Windows
 
 Array = NDArray[np.float64]
 START_POSITION = 1e-3  # [rad] of a finger, as all sizes here: how well a segment's start is known beforehand
@@ -26,23 +26,23 @@ class Problem:
     left when it is integrated out, so `sum(x * free(y))` is the inner product of the marginal likelihood.
     """
 
-    def __init__(self, shooting: Shooting, stretches: Stretches) -> None:
+    def __init__(self, shooting: Shooting, windows: Windows) -> None:
         self.shooting = shooting
-        self.stretches = stretches
-        self.weight = stretches.by_segment(stretches.weight)
-        self.measured = stretches.by_segment(stretches.measured)
-        self.segment_trial = np.repeat(stretches.trial, stretches.segments)
-        self.run_away = np.tile(RUN_AWAY * shooting.per_joint("rad"), stretches.segment)
-        self.segment_initialisation = np.repeat(stretches.initialisation, stretches.segments)
+        self.windows = windows
+        self.weight = windows.by_segment(windows.weight)
+        self.measured = windows.by_segment(windows.measured)
+        self.segment_trial = np.repeat(windows.trial, windows.segments)
+        self.run_away = np.tile(RUN_AWAY * shooting.per_joint("rad"), windows.segment)
+        self.segment_initialisation = np.repeat(windows.initialisation, windows.segments)
         self._starts: Array = np.zeros((*self.weight.shape, 0))
         self._inverse: Array = np.zeros((len(self.weight), 0, 0))
 
     def linearise_starts(self, model: Model) -> None:
         """Take the beginnings of trials and the sensitivity to segment starts from this model from now on."""
-        self.stretches = with_beginnings(self.shooting, model, self.stretches)
-        raw = self.shooting.start_sensitivity(model, self.stretches)
-        columns = np.stack([self.stretches.by_segment(column) for column in raw], axis=-1)
-        acceleration = np.abs(self.stretches.acceleration).reshape(len(self.weight), -1)
+        self.windows = with_beginnings(self.shooting, model, self.windows)
+        raw = self.shooting.start_sensitivity(model, self.windows)
+        columns = np.stack([self.windows.by_segment(column) for column in raw], axis=-1)
+        acceleration = np.abs(self.windows.acceleration).reshape(len(self.weight), -1)
         known, sure = START_SPEED * self.shooting.per_joint("rad/s"), START_POSITION * self.shooting.per_joint("rad")
         speed = known + START_SPEED_PER_ACCELERATION * self.shooting.time * acceleration
         spread = np.concatenate([np.broadcast_to(sure, speed.shape), speed], axis=1)
@@ -59,8 +59,8 @@ class Problem:
 
     def predictions(self, models: Sequence[Model]) -> Array:
         """(models, G, R) [rad]."""
-        simulated = self.shooting.positions(models, self.stretches)
-        return np.stack([self.stretches.by_segment(one) for one in simulated])
+        simulated = self.shooting.positions(models, self.windows)
+        return np.stack([self.windows.by_segment(one) for one in simulated])
 
     def residual(self, prediction: Array) -> Array:
         """Weighted measured - predicted (G, R); a simulation that ran away counts as far off."""
@@ -88,7 +88,7 @@ class Problem:
         return base, np.nan_to_num(np.stack(columns, axis=-1)) if columns else np.zeros((*base.shape, 0))
 
     def _masked(self, column: Array, unknown: Unknown) -> Array:
-        if unknown.kind != "posture":
+        if unknown.kind != "offset":
             return column
         return np.asarray(column * (self.segment_initialisation == unknown.initialisation)[:, None])
 
@@ -105,8 +105,8 @@ def _simulated(unknowns: Sequence[Unknown]) -> list[Unknown]:
 def moved_model(model: Model, unknown: Unknown) -> tuple[Model, float]:
     """The model with an unknown moved by a finite step within its bounds, and the step in units of its scale."""
     step = STEP * unknown.scale
-    if unknown.kind == "posture":
-        moved = {key: value + step * (np.arange(len(value)) == unknown.place) for key, value in model.posture.items()}
+    if unknown.kind == "offset":
+        moved = {key: value + step * (np.arange(len(value)) == unknown.place) for key, value in model.offsets.items()}
         return Model(model.constants, model.terms, moved), STEP
     value = unknown.of(model)
     step = step if value + step <= unknown.high else -step

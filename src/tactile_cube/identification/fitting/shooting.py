@@ -1,4 +1,4 @@
-"""Simulates many models at once, each through all stretches of a recording, on all cores."""
+"""Simulates many models at once, each through all windows of a recording, on all cores."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION
 from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.fitting.stretches import SMOOTHING, Stretches, steps_per_row
+from tactile_cube.identification.fitting.windows import SMOOTHING, Windows, steps_per_row
 from tactile_cube.identification.joint_scales import joint_scales, rigid_body
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.jump_ratio import gaps, jump_ratio
@@ -46,7 +46,7 @@ class Shooting:
         self.workers = min(4, len(os.sched_getaffinity(0)))
 
     def finer(self, times: int) -> Shooting:
-        """The same in steps so many times as short, for stretches that are made finer likewise."""
+        """The same in steps so many times as short, for windows that are made finer likewise."""
         fine = copy(self)
         fine.plant = Plant([self.tree], self.plant.dt / times, self.plant.effects, self.recording.joints)
         return fine
@@ -60,63 +60,63 @@ class Shooting:
         """How many times larger numbers of a unit are than at a finger, (n,)."""
         return np.array([scales.of(unit) for scales in self.scales])
 
-    def positions(self, models: Sequence[Model], stretches: Stretches) -> Array:
+    def positions(self, models: Sequence[Model], windows: Windows) -> Array:
         """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
-        return self._simulate(models, [stretches] * len(models))
+        return self._simulate(models, [windows] * len(models))
 
-    def positions_from(self, model: Model, beginnings: Sequence[Array], stretches: Stretches) -> Array:
+    def positions_from(self, model: Model, beginnings: Sequence[Array], windows: Windows) -> Array:
         """The same for one model from several `beginning`s, (beginnings, S, K segment, n) [rad]."""
-        begun = [replace(stretches, beginning=one) for one in beginnings]
+        begun = [replace(windows, beginning=one) for one in beginnings]
         return self._simulate([model] * len(begun), begun)
 
     def gaps(self, model: Model) -> Array:
         """Width of the gap in each joint's transmission (n,) [rad]."""
         return gaps(self.plant, self.memory(model))
 
-    def start_sensitivity(self, model: Model, stretches: Stretches) -> Array:
+    def start_sensitivity(self, model: Model, windows: Windows) -> Array:
         """D position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
         joints = len(self.recording.joints)
         nudge = np.diag([*(POSITION_NUDGE * self.per_joint("rad")), *(SPEED_NUDGE * self.per_joint("rad/s"))])
         count = 2 * joints + 1
-        moved = self._simulate([model] * count, [stretches] * count, np.vstack([nudge, np.zeros(2 * joints)]))
+        moved = self._simulate([model] * count, [windows] * count, np.vstack([nudge, np.zeros(2 * joints)]))
         # a simulation that ran away has no slope; it would swamp those of all others
         most = self.per_joint("rad")
         change = np.clip(np.nan_to_num(moved[:-1] - moved[-1], nan=0.0), -most, most)
         return np.asarray(change / nudge.max(axis=1)[:, None, None, None])
 
-    def _simulate(self, models: Sequence[Model], stretches: Sequence[Stretches], nudges: Array | None = None) -> Array:
-        """Each model through its stretches, the start of each segment moved by the model's nudge."""
-        out = np.zeros((len(models), *stretches[0].measured.shape))
+    def _simulate(self, models: Sequence[Model], windows: Sequence[Windows], nudges: Array | None = None) -> Array:
+        """Each model through its windows, the start of each segment moved by the model's nudge."""
+        out = np.zeros((len(models), *windows[0].measured.shape))
         if nudges is None:
             nudges = np.zeros((len(models), 2 * len(self.recording.joints)))
-        whole = len(models) - len(models) % self.workers  # a model a core; the last ones' stretches go to all cores
+        whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
         with ThreadPoolExecutor(self.workers) as pool:
-            list(pool.map(self._one, models[:whole], stretches[:whole], nudges, out))
+            list(pool.map(self._one, models[:whole], windows[:whole], nudges, out))
             for k in range(whole, len(models)):
-                self._one(models[k], stretches[k], nudges[k], out[k], pool)
+                self._one(models[k], windows[k], nudges[k], out[k], pool)
         return out
 
     def _one(
-        self, model: Model, stretches: Stretches, nudge: Array, out: Array, pool: ThreadPoolExecutor | None = None
+        self, model: Model, windows: Windows, nudge: Array, out: Array, pool: ThreadPoolExecutor | None = None
     ) -> None:
-        memory = self._memory(model, stretches)
-        count, fine = len(stretches), stretches.substeps
-        felt, _ = jump_ratio(self.plant, memory[0], stretches.commands[0, stretches.history * fine])
+        memory = self._memory(model, windows)
+        count, fine = len(windows), windows.substeps
+        felt, _ = jump_ratio(self.plant, memory[0], windows.commands[0, windows.history * fine])
         gap = gaps(self.plant, memory[0])
         rows = np.array([MOTOR_POSITION, COMMAND, *([LEAD] if gap.any() else [])])
         signals = np.zeros((count, out.shape[1] * fine, len(rows), out.shape[2]))
 
         def run(first: int, last: int) -> None:
             self.plant.kernel.segments_batch(
-                stretches.commands,
+                windows.commands,
                 np.arange(count),
                 np.full(count, signals.shape[1]),
-                stretches.history * fine,
+                windows.history * fine,
                 1,
-                stretches.segment * fine,
-                stretches.position,
-                stretches.speed,
-                stretches.beginning,
+                windows.segment * fine,
+                windows.position,
+                windows.speed,
+                windows.beginning,
                 np.tile(nudge, (count, 1)),
                 memory,
                 rows,
@@ -130,26 +130,26 @@ class Shooting:
         else:
             parts = [count * k // self.workers for k in range(self.workers + 1)]
             list(pool.map(run, parts[:-1], parts[1:]))
-        jump = _jumps(signals[:, :, 1], stretches)
+        jump = _jumps(signals[:, :, 1], windows)
         free = free_way(signals[:, ::fine, 2], jump, gap) if gap.any() else 0.0
         out[:] = signals[:, ::fine, 0] - free - felt * (jump - free)
 
-    def _memory(self, model: Model, stretches: Stretches) -> Array:
-        """One block (S, size) for each stretch, at rest at its start."""
+    def _memory(self, model: Model, windows: Windows) -> Array:
+        """One block (S, size) for each window, at rest at its start."""
         single = self.memory(model)
-        memory = np.tile(single, (len(stretches), 1))
-        posture = np.array([model.posture[int(k)] for k in stretches.initialisation])
-        self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * posture[:, self.tree.follow]
-        self.plant.view(memory, "angle_offset")[:] = posture
-        self.plant.reset(memory, self._links(model, stretches), stretches.speed[:, 0])
-        self.plant.view(memory, "step")[:, 0] = stretches.time / self.plant.dt
+        memory = np.tile(single, (len(windows), 1))
+        offsets = np.array([model.offsets[int(k)] for k in windows.initialisation])
+        self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * offsets[:, self.tree.follow]
+        self.plant.view(memory, "angle_offset")[:] = offsets
+        self.plant.reset(memory, self._links(model, windows), windows.speed[:, 0])
+        self.plant.view(memory, "step")[:, 0] = windows.time / self.plant.dt
         self.plant.view(memory, "unsure")[:] = SMOOTHING * self.time
         for k, key in enumerate(("kp", "kd", "torque_limit")):
-            self.plant.view(memory, key)[:] *= stretches.gains[:, k]
-        self.plant.view(memory, "brake")[stretches.clamped] = CLAMPED
-        for k, force in enumerate(stretches.forces):
+            self.plant.view(memory, key)[:] *= windows.gains[:, k]
+        self.plant.view(memory, "brake")[windows.clamped] = CLAMPED
+        for k, force in enumerate(windows.forces):
             if force is not None:
-                resting = np.average(stretches.measured[k], axis=0, weights=stretches.weight[k, :, 0])
+                resting = np.average(windows.measured[k], axis=0, weights=windows.weight[k, :, 0])
                 self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
         return memory
 
@@ -171,27 +171,27 @@ class Shooting:
             self.plant.set_effect(memory, term.effect, term.joint, term.values)
         return memory
 
-    def _links(self, model: Model, stretches: Stretches) -> Array:
+    def _links(self, model: Model, windows: Windows) -> Array:
         """Link positions (S, n) near those of the first row: measured less the deflection of the plain drive."""
         constants = model.constants
-        error = stretches.commands[:, stretches.history * stretches.substeps] - stretches.position[:, 0]
-        torque = constants["kp"] * error - constants["kd"] * stretches.speed[:, 0]
+        error = windows.commands[:, windows.history * windows.substeps] - windows.position[:, 0]
+        torque = constants["kp"] * error - constants["kd"] * windows.speed[:, 0]
         limit = constants["torque_limit"]
-        return stretches.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
+        return windows.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
 
 
-def _jumps(acting: Array, stretches: Stretches) -> Array:
+def _jumps(acting: Array, windows: Windows) -> Array:
     """Simulated command at each reading less the one that the log feels (S, K segment, n).
 
     Known exactly unless an effect changes the command on its way; then half the change across the reading, smoothed
     where a row is one step.
     """
-    first, fine = stretches.history * stretches.substeps, stretches.substeps
-    if np.array_equal(acting, stretches.commands[:, first:]):
-        return stretches.jump
+    first, fine = windows.history * windows.substeps, windows.substeps
+    if np.array_equal(acting, windows.commands[:, first:]):
+        return windows.jump
     jumps = np.zeros_like(acting[:, ::fine])
     if fine == 1:
         jumps[:, 1:-1] = 0.25 * (acting[:, 2:] - acting[:, :-2])
     else:
         jumps[:, 1:] = 0.5 * (acting[:, fine + 1 :: fine] - acting[:, fine - 1 : -fine : fine])
-    return jumps if stretches.read_after else -jumps
+    return jumps if windows.read_after else -jumps

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, full_step
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.stretches import Stretches
+from tactile_cube.identification.fitting.windows import Windows
 
 Array = NDArray[np.float64]
 FINER = 8  # times as short are the steps that show what the model's own ones do: 0.25 ms beside 2 ms
-ENOUGH = 12  # stretches that tell it, spread over the recording: up to 53 s of a finger
+ENOUGH = 12  # windows that tell it, spread over the recording: up to 53 s of a finger
 
 
 def step_shift(problem: Problem, fitted: Fit) -> Array:
@@ -21,9 +21,9 @@ def step_shift(problem: Problem, fitted: Fit) -> Array:
 
     A Gauss-Newton step in the finer simulation, less the one in the model's own: what noise moves moves alike in both.
     """
-    stretches = problem.stretches
-    chosen = np.unique(np.linspace(0, len(stretches) - 1, ENOUGH).round().astype(np.int64))
-    part = stretches.take(chosen)
+    windows = problem.windows
+    chosen = np.unique(np.linspace(0, len(windows) - 1, ENOUGH).round().astype(np.int64))
+    part = windows.take(chosen)
     problems = [Problem(problem.shooting, part), Problem(problem.shooting.finer(FINER), finer(part, FINER))]
     for one in problems:
         one.linearise_starts(fitted.model)
@@ -31,17 +31,17 @@ def step_shift(problem: Problem, fitted: Fit) -> Array:
     return np.asarray(fine - own)
 
 
-def finer(stretches: Stretches, times: int) -> Stretches:
-    """Stretches for simulation steps so many times as short.
+def finer(windows: Windows, times: int) -> Windows:
+    """Windows for simulation steps so many times as short.
 
     The first step of a row takes the mean of two commands, all others the later one. Where a row is one step the jump
     tells the later one; of the past, which only wakes memories, the mean is kept.
     """
-    count, _, joints = stretches.commands.shape
-    rows = stretches.commands.reshape(count, -1, stretches.substeps, joints)
+    count, _, joints = windows.commands.shape
+    rows = windows.commands.reshape(count, -1, windows.substeps, joints)
     held = rows[:, :, -1:].copy()
-    if stretches.substeps == 1:
-        held[:, stretches.history :, 0] += stretches.jump if stretches.read_after else -stretches.jump
-    fine = stretches.substeps * times
+    if windows.substeps == 1:
+        held[:, windows.history :, 0] += windows.jump if windows.read_after else -windows.jump
+    fine = windows.substeps * times
     commands = np.concatenate([rows[:, :, :1], np.repeat(held, fine - 1, axis=2)], axis=2)
-    return replace(stretches, commands=commands.reshape(count, -1, joints), substeps=fine)
+    return replace(windows, commands=commands.reshape(count, -1, joints), substeps=fine)

@@ -52,7 +52,7 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
 
 def _joint_errors(problem: Problem, residual: Array) -> Array:
     """RMS (n,) of each joint's residual with the starts of segments taken out."""
-    joints = problem.stretches.measured.shape[2]
+    joints = problem.windows.measured.shape[2]
     products = (residual * problem.free(residual)).reshape(-1, joints)
     present = np.count_nonzero(problem.weight.reshape(-1, joints), axis=0)
     return np.asarray(np.sqrt(np.maximum(products.sum(axis=0), 0.0) / np.maximum(present, 1)))

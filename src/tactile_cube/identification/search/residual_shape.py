@@ -60,17 +60,17 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
     """The torque that each joint would have to get so that the residual vanished: I r'' + D r' + K r.
 
     Args:
-        problem: the stretches that the residual belongs to.
+        problem: the windows that the residual belongs to.
         recording: names the joints.
         model: gives inertia and gains.
         residual: (G, R) weighted measured - predicted.
     """
-    n, segment = len(recording.joints), problem.stretches.segment
+    n, segment = len(recording.joints), problem.windows.segment
     weight = problem.weight.reshape(-1, segment, n)
     error = np.divide(residual.reshape(weight.shape), weight, out=np.zeros_like(weight), where=weight > 0)
     measured = problem.measured.reshape(weight.shape)
-    fine = problem.stretches.substeps
-    commands = problem.stretches.commands[:, problem.stretches.history * fine :: fine].reshape(weight.shape)
+    fine = problem.windows.substeps
+    commands = problem.windows.commands[:, problem.windows.history * fine :: fine].reshape(weight.shape)
     step = recording.step
     position, velocity, acceleration = _derivatives(measured, step, problem.shooting.time)
     constants = model.constants
@@ -79,14 +79,14 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
     r, dr, ddr = _derivatives(error, step, problem.shooting.time)
     torque = inertia * ddr + constants["kd"] / soft * dr + constants["kp"] / soft * r
     drive = constants["kp"] * (commands - position) - constants["kd"] * velocity
-    first = np.tile(problem.stretches.time[:, None], (1, problem.stretches.segments)).ravel()
+    first = np.tile(problem.windows.time[:, None], (1, problem.windows.segments)).ravel()
     length = segment * step
-    time = first + np.tile(np.arange(problem.stretches.segments), len(problem.stretches)) * length
+    time = first + np.tile(np.arange(problem.windows.segments), len(problem.windows)) * length
     inner = slice(segment // 8, -segment // 8)
     inside = np.all(weight[:, inner] > 0, axis=2)
     number = np.broadcast_to(np.arange(len(weight))[:, None], weight.shape[:2])[:, inner][inside]
     clock = (time[:, None] + np.arange(segment) * step)[:, inner][inside]
-    angle = position + np.array([model.posture[int(k)] for k in problem.segment_initialisation])[:, None]
+    angle = position + np.array([model.offsets[int(k)] for k in problem.segment_initialisation])[:, None]
     found = []
     for j, joint in enumerate(recording.joints):
         signals = {}

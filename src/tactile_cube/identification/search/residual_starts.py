@@ -20,7 +20,7 @@ def residual_candidates(
     """Candidates for what a fit leaves unexplained.
 
     Args:
-        problem: the stretches that were fitted.
+        problem: the windows that were fitted.
         recording: names the joints.
         fitted: with its residual on them.
         effects: classes to try.

@@ -62,7 +62,7 @@ def screen(problem: Problem, base: Fit, wanted: Sequence[Candidate], batch: int 
     """Scores of candidates, best first.
 
     Args:
-        problem: stretches to look at.
+        problem: windows to look at.
         base: fit whose residual is to be explained.
         wanted: candidates at their starts.
         batch: candidates simulated at once, which bounds the memory.

@@ -16,7 +16,7 @@ from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.stretches import Stretches, cut
+from tactile_cube.identification.fitting.windows import Windows, cut
 from tactile_cube.identification.search.candidates import Candidate, candidates, model_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, judge, p_value, worse
 from tactile_cube.identification.search.explanation import NEARLY, Explanation
@@ -93,12 +93,12 @@ class Search:
         self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
         effects = tuple(dict.fromkeys([*effects, *(term.effect for term in self.start.terms)]))
         self.shooting = Shooting(fitted, effects)
-        self.all_stretches = cut(fitted, noise, time=self.shooting.time)
-        self.problem = Problem(self.shooting, some(self.all_stretches, SEGMENTS))
+        self.all_windows = cut(fitted, noise, time=self.shooting.time)
+        self.problem = Problem(self.shooting, some(self.all_windows, SEGMENTS))
         self.judges = Problem(self.shooting, some(cut(held_out, noise, time=self.shooting.time), SEGMENTS))
         self.effects = effects
         self.candidates = candidates(self.shooting.sizes, effects)
-        self.postures = dict(self.start_held_out.posture)
+        self.offsets = dict(self.start_held_out.offsets)
         self.last_scores: list[Score] = []
         self.last_behind: list[tuple[Candidate, Fit]] = []
         self.left_behind: list[tuple[Candidate, Fit]] = []
@@ -106,7 +106,7 @@ class Search:
     def run(self) -> Findings:
         """The whole search."""
         base = self.fit_base()
-        nominal = judge(self.judges, self.held_out, self.with_postures(self.start))
+        nominal = judge(self.judges, self.held_out, self.with_known_offsets(self.start))
         levels: list[tuple[Explanation, ...]] = []
         scores: tuple[Score, ...] = ()
         doubtful: list[Explanation] = []
@@ -155,9 +155,9 @@ class Search:
         first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
         self.problem.linearise_starts(first.model)
         second = fit(self.problem, first.model, first.unknowns, iterations=3)
-        self.judges.linearise_starts(self.with_postures(second.model))
-        judgement = judge(self.judges, self.held_out, self.with_postures(second.model))
-        self.postures = dict(judgement.model.posture)
+        self.judges.linearise_starts(self.with_known_offsets(second.model))
+        judgement = judge(self.judges, self.held_out, self.with_known_offsets(second.model))
+        self.offsets = dict(judgement.model.offsets)
         self.say(f"base refitted: held-out error {judgement.error:.2f} x sensor noise")
         return Explanation((), second, judgement, 1.0, 0.0)
 
@@ -166,9 +166,9 @@ class Search:
         sizes = self.shooting.sizes
         return (*base_unknowns(self.fitted, self.start.constants, sizes), *model_unknowns(model, sizes))
 
-    def with_postures(self, model: Model) -> Model:
+    def with_known_offsets(self, model: Model) -> Model:
         """The model with joint offsets for the held-out initialisations too."""
-        return Model(model.constants, model.terms, {**self.postures, **model.posture})
+        return Model(model.constants, model.terms, {**self.offsets, **model.offsets})
 
     def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
@@ -267,7 +267,7 @@ class Search:
         """A model with everything refitted, and how it does on the held-out trials."""
         self.problem.linearise_starts(model)
         fitted = fit(self.problem, model, self.unknowns(model), LONG)
-        found = self.with_postures(fitted.model)
+        found = self.with_known_offsets(fitted.model)
         self.judges.linearise_starts(found)
         return fitted, judge(self.judges, self.held_out, found)
 
@@ -298,13 +298,13 @@ def without_effect(explanation: Explanation, place: int) -> Model:
     return replace(model, terms=(*model.terms[:first], *model.terms[last:]))
 
 
-def some(stretches: Stretches, segments: int) -> Stretches:
-    """Stretches of about so many segments, spread over trials and over the time within trials."""
-    by_trial = [np.flatnonzero(stretches.trial == k) for k in np.unique(stretches.trial)]
+def some(windows: Windows, segments: int) -> Windows:
+    """Windows of about so many segments, spread over trials and over the time within trials."""
+    by_trial = [np.flatnonzero(windows.trial == k) for k in np.unique(windows.trial)]
     order = [
         int(rows[(turn + k) % len(rows)])
         for turn in range(max(len(rows) for rows in by_trial))
         for k, rows in enumerate(by_trial)
         if turn < len(rows)
     ]
-    return stretches.take(np.array(sorted(order[: -(-segments // stretches.segments)])))
+    return windows.take(np.array(sorted(order[: -(-segments // windows.segments)])))

@@ -47,7 +47,7 @@ def shared_offset(
     three initialisations whose offsets happen to be alike are no evidence either: Student's t decides.
     """
     effect = next((effect for effect in effects if effect.constant_reading), None)
-    if effect is None or len(base.judgement.model.posture) < 2:
+    if effect is None or len(base.judgement.model.offsets) < 2:
         return None
     mean, by_chance = _mean_and_chance(base)
     least = LEAST * np.array([sizes[joint].of("rad") for joint in fitted.joints])
@@ -58,8 +58,8 @@ def shared_offset(
     joints = tuple(fitted.joints[j] for j in places)
     name = effect.constant_reading
     terms = tuple(Term(effect, fitted.joints[j], {name: float(mean[j])}, (name,)) for j in places)
-    posture = {key: value + np.where(shared, mean, 0.0) for key, value in base.fit.model.posture.items()}
-    model = Model(base.fit.model.constants, (*base.fit.model.terms, *terms), posture)
+    offsets = {key: value + np.where(shared, mean, 0.0) for key, value in base.fit.model.offsets.items()}
+    model = Model(base.fit.model.constants, (*base.fit.model.terms, *terms), offsets)
     candidate = Candidate(effect, joints, {name: float(np.abs(mean[shared]).max())}, sizes)
     fit = replace(base.fit, model=model)
     return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=float(by_chance[shared].max()))
@@ -67,7 +67,7 @@ def shared_offset(
 
 def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
     """Large offsets that every initialisation has and that two or three of them do not prove to be the encoder's."""
-    count = len(base.judgement.model.posture)
+    count = len(base.judgement.model.offsets)
     if count < 2:
         return ()
     mean, by_chance = _mean_and_chance(base)
@@ -80,7 +80,7 @@ def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
 
 def _mean_and_chance(base: Explanation) -> tuple[Array, Array]:
     """Mean offsets (n,) over the initialisations, and how probable their likeness is (Student's t)."""
-    offsets = -np.array([base.judgement.model.posture[k] for k in sorted(base.judgement.model.posture)])
+    offsets = -np.array([base.judgement.model.offsets[k] for k in sorted(base.judgement.model.offsets)])
     mean, scatter = offsets.mean(axis=0), offsets.std(axis=0, ddof=1)
     ratio = np.abs(mean) / np.maximum(scatter, 1e-9) * np.sqrt(len(offsets))
     return mean, np.minimum(1.0, 2.0 * student_t.sf(ratio, len(offsets) - 1) * len(mean))

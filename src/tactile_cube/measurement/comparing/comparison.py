@@ -12,9 +12,9 @@ from tactile_cube.measurement.comparing.band import Band, simulate_band
 from tactile_cube.measurement.comparing.error import ErrorSummary, residuals, summarise
 from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.comparing.postures import fitted_postures, no_postures, replay_each
+from tactile_cube.measurement.comparing.joint_offsets import fitted_offsets, no_offsets, replay_each
 from tactile_cube.measurement.comparing.regimes import Regime, regimes
-from tactile_cube.measurement.comparing.stretches import Stretch, failing_stretches
+from tactile_cube.measurement.comparing.failing_intervals import FailingInterval, failing_intervals
 from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.parameters import Parameters, nominal_parameters, require_same_joints
@@ -41,7 +41,7 @@ class Comparison:
         sentences: the same in words.
         whiteness: does the residual remember itself?
         cross_correlations: what it goes with, strongest first.
-        stretches: where it is far above the floor.
+        failing_intervals: where it is far above the floor.
         band: randomised simulations, or None.
     """
 
@@ -56,7 +56,7 @@ class Comparison:
     sentences: list[str]
     whiteness: list[Whiteness]
     cross_correlations: list[CrossCorrelation]
-    stretches: list[Stretch]
+    failing_intervals: list[FailingInterval]
     band: Band | None
 
     @property
@@ -96,10 +96,10 @@ def compare(
     if model is not None:
         require_same_joints(recording, model)
     parameters = nominal_parameters(recording, model)
-    postures = fitted_postures(recording, parameters, step) if model is not None else no_postures(recording)
-    simulated = replay_each(recording, parameters, postures, engine, step)
+    offsets = fitted_offsets(recording, parameters, step) if model is not None else no_offsets(recording)
+    simulated = replay_each(recording, parameters, offsets, engine, step)
     if floor is None:
-        floor = noise_floor(recording, step_size_error(recording, parameters, postures, simulated, step))
+        floor = noise_floor(recording, step_size_error(recording, parameters, offsets, simulated, step))
     band = simulate_band(recording, model, simulations, spread or {}, step, seed) if simulations else None
     return describe(recording, model, simulated, floor, band)
 
@@ -124,7 +124,7 @@ def describe(
         sentences=where_it_fails(table, summary.joints, floor, recording.units),
         whiteness=whiteness(trials, errors, joints),
         cross_correlations=cross_correlations(trials, errors, joints),
-        stretches=_stretches(recording, errors, floor),
+        failing_intervals=_failing_intervals(recording, errors, floor),
         band=band,
     )
 
@@ -132,21 +132,21 @@ def describe(
 def step_size_error(
     recording: Recording,
     parameters: Parameters,
-    postures: Mapping[int, Array],
+    offsets: Mapping[int, Array],
     simulated: list[Simulated],
     step: float,
 ) -> ErrorSummary:
     """Difference between a simulation and the same one in much smaller steps."""
-    fine = replay_each(recording, parameters, postures, "fast", step / FINER)
+    fine = replay_each(recording, parameters, offsets, "fast", step / FINER)
     return summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
 
 
-def _stretches(recording: Recording, errors: list[Array], floor: NoiseFloor) -> list[Stretch]:
+def _failing_intervals(recording: Recording, errors: list[Array], floor: NoiseFloor) -> list[FailingInterval]:
     return [
-        stretch
+        interval
         for trial, error in zip(recording.trials, errors, strict=True)
         for index, joint in enumerate(recording.joints)
-        for stretch in failing_stretches(trial.name, joint, trial.time, error[:, index], floor.joints[joint])
+        for interval in failing_intervals(trial.name, joint, trial.time, error[:, index], floor.joints[joint])
     ]
 
 
@@ -172,7 +172,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
             for trial, errors in zip(recording.trials, comparison.trials, strict=True)
         ],
         "where": comparison.sentences,
-        "stretches": [asdict(one) for one in comparison.stretches],
+        "failing_intervals": [asdict(one) for one in comparison.failing_intervals],
         "whiteness": [asdict(one) for one in comparison.whiteness],
         "cross_correlations": [asdict(one) for one in comparison.cross_correlations],
         "band": None

@@ -79,7 +79,7 @@ class HandReplay:
 
         Args:
             recording: of the whole hand.
-            parameters: constants and effects of the drivetrain; their posture is not used.
+            parameters: constants and effects of the drivetrain; their offset is not used.
             step: longest physics step [s].
             iterations: of the contact solver.
             hand: the hand that was recorded.

@@ -24,12 +24,12 @@ class Parameters:
         constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia and friction_creep (how fast a
             sticking joint gives way, rad/s per N m), each (joints,).
         effects: (`NAME@JOINT`, parameter -> value) of each effect.
-        posture: (joints,) true minus measured angle [rad], the negative joint offset.
+        offset: (joints,) true minus measured angle [rad], the negative joint offset.
     """
 
     constants: dict[str, Array]
     effects: tuple[tuple[str, dict[str, float]], ...]
-    posture: Array
+    offset: Array
 
 
 def nominal_parameters(recording: Recording, model: ModelFile | None) -> Parameters:
@@ -61,10 +61,10 @@ def draw_parameters(
         (one.effect, {key: _drawn(value, 0.0, rng) for key, value in one.parameters.items()})
         for one in (model.drive_effects if model is not None else [])
     )
-    return Parameters(constants, effects, _posture(recording, model, spread.get("offset", 0.0), rng))
+    return Parameters(constants, effects, _offset(recording, model, spread.get("offset", 0.0), rng))
 
 
-def _posture(recording: Recording, model: ModelFile | None, width: float, rng: np.random.Generator) -> Array:
+def _offset(recording: Recording, model: ModelFile | None, width: float, rng: np.random.Generator) -> Array:
     offsets = model.offsets if model is not None else {}
     bounds = [(offsets[j].low, offsets[j].high) if j in offsets else (-width, width) for j in recording.joints]
     return -np.array([rng.uniform(low, high) for low, high in bounds])

@@ -147,8 +147,8 @@ class Replay:
         ]  # fmt: skip
         memory: Array = self.plant.memory(constants, gravity=self.recording.gravity, effects=effects)
         self.plant.view(memory, "friction_creep")[:] = own.get("friction_creep", 0.0)
-        self.plant.view(memory, "offset")[0] += self.tree.ratio * parameters.posture[self.tree.follow]
-        self.plant.view(memory, "angle_offset")[:] = parameters.posture
+        self.plant.view(memory, "offset")[0] += self.tree.ratio * parameters.offset[self.tree.follow]
+        self.plant.view(memory, "angle_offset")[:] = parameters.offset
         position, velocity, torque = self.start(trial)
         deflection = torque / parameters.constants["stiffness"]
         self.plant.reset(memory, position - deflection, velocity)

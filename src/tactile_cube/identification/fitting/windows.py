@@ -1,4 +1,4 @@
-"""A recording cut for multiple shooting: stretches simulated in one go, made of short segments started anew."""
+"""A recording cut for multiple shooting: windows simulated in one go, made of short segments started anew."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ Rows = NDArray[np.int64]
 SEGMENT = (
     0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
 )
-STRETCH = 11  # segments simulated without a break, so that effects with a memory keep it
-LEAD = 1  # segments at the beginning of a stretch that only wake such memories, unless a trial begins there
-HISTORY = 8.0  # [s] of commands before a stretch at most, for effects that remember them, such as a rate limit
+WINDOW = 11  # segments simulated without a break, so that effects with a memory keep it
+LEAD = 1  # segments at the beginning of a window that only wake such memories, unless a trial begins there
+HISTORY = 8.0  # [s] of commands before a window at most, for effects that remember them, such as a rate limit
 LONGEST_STEP = 0.0021  # [s] of the simulation; of a finger, as all times here
-FEWEST = 4  # samples that a stretch needs
+FEWEST = 4  # samples that a window needs
 ROWS = (
     "commands",
     "measured",
@@ -39,14 +39,14 @@ ROWS = (
     "clamped",
     "beginning",
 )
-"""Arrays with one row a stretch."""
+"""Arrays with one row a window."""
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
 MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
 
 
 @dataclass(frozen=True)
-class Stretches:
-    """S stretches of K segments of `segment` rows each; n joints.
+class Windows:
+    """S windows of K segments of `segment` rows each; n joints.
 
     Attributes:
         commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
@@ -61,7 +61,7 @@ class Stretches:
         initialisation: (S,) robot initialisation.
         time: (S,) of the first row in its trial [s].
         clamped: (S,) the links were held still.
-        beginning: (S, 2 n) how far links stand from where their sensors put them as the stretch begins [rad], and how
+        beginning: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and how
             much faster they are [rad/s]; see `beginnings`.
         forces: known forces on a link, or None.
         history: H.
@@ -91,21 +91,21 @@ class Stretches:
 
     @property
     def segments(self) -> int:
-        """K, segments of a stretch."""
+        """K, segments of a window."""
         return int(self.position.shape[1])
 
     def __len__(self) -> int:
         """S."""
         return len(self.commands)
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Stretches:
-        """Some of the stretches."""
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
+        """Some of the windows."""
         picked = {key: getattr(self, key)[chosen] for key in ROWS}
         forces = tuple(self.forces[int(k)] for k in np.arange(len(self))[chosen])
         return replace(self, **picked, forces=forces)
 
-    def first_segments(self) -> Stretches:
-        """The first segment of each stretch alone."""
+    def first_segments(self) -> Windows:
+        """The first segment of each window alone."""
         rows = slice(self.segment)
         return replace(
             self,
@@ -125,8 +125,8 @@ def cut(
     trials: Sequence[Trial] | None = None,
     segment: int | None = None,
     time: float = 1.0,
-) -> Stretches:
-    """The trials of a recording as stretches.
+) -> Windows:
+    """The trials of a recording as windows.
 
     Args:
         recording: gives the joints and the sampling step.
@@ -138,8 +138,8 @@ def cut(
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
     segment = min(segment or max(8, round(SEGMENT * time / recording.step)), longest)
-    rows = segment * min(STRETCH, -(-longest // segment))
-    forward = max(rows - LEAD * segment, segment)  # from the start of a stretch to that of the next one
+    rows = segment * min(WINDOW, -(-longest // segment))
+    forward = max(rows - LEAD * segment, segment)  # from the start of a window to that of the next one
     history = min(round(HISTORY * time / recording.step), (longest - 1) // forward * forward)
     pieces = [
         piece
@@ -148,7 +148,7 @@ def cut(
     ]
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces = tuple(piece["force"] for piece in pieces)
-    return Stretches(
+    return Windows(
         **columns,
         forces=forces,  # type: ignore[arg-type]
         history=history,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.identification.fitting.noise import sensor_noise
-from tactile_cube.identification.fitting.stretches import Drive, _states, cut, steps_per_row
+from tactile_cube.identification.fitting.windows import Drive, _states, cut, steps_per_row
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tests.measurement.small_rig import write
@@ -21,8 +21,8 @@ def test_the_sensor_noise_is_read_from_the_positions(recording: Recording) -> No
 
 
 def test_every_sample_is_in_exactly_one_segment(recording: Recording) -> None:
-    stretches = cut(recording, np.array([2e-4, 2e-4]))
-    counted = np.count_nonzero(stretches.weight[..., 0])
+    windows = cut(recording, np.array([2e-4, 2e-4]))
+    counted = np.count_nonzero(windows.weight[..., 0])
     assert counted == sum(len(trial.time) for trial in recording.trials)
 
 
@@ -35,41 +35,41 @@ def test_dropped_samples_weigh_nothing(recording: Recording) -> None:
 
 
 def test_segments_start_where_the_joint_was_measured(recording: Recording) -> None:
-    stretches = cut(recording, np.array([2e-4, 2e-4]), recording.trials[:1])
-    row = 3 * stretches.segment
+    windows = cut(recording, np.array([2e-4, 2e-4]), recording.trials[:1])
+    row = 3 * windows.segment
     phase = 2 * np.pi * 0.8 * (row / 100 - 0.02)
-    assert stretches.position[0, 3, 0] == pytest.approx(0.3 * np.sin(phase), abs=1e-3)
-    assert stretches.speed[0, 3, 0] == pytest.approx(0.3 * 2 * np.pi * 0.8 * np.cos(phase), abs=0.05)
+    assert windows.position[0, 3, 0] == pytest.approx(0.3 * np.sin(phase), abs=1e-3)
+    assert windows.speed[0, 3, 0] == pytest.approx(0.3 * 2 * np.pi * 0.8 * np.cos(phase), abs=0.05)
 
 
 def test_slow_recordings_are_simulated_in_finer_steps(recording: Recording) -> None:
-    stretches = cut(recording, np.array([2e-4, 2e-4]))
-    assert steps_per_row(recording) == stretches.substeps == 5
-    rows = stretches.history + stretches.measured.shape[1]
-    assert stretches.commands.shape[1] == 5 * rows
+    windows = cut(recording, np.array([2e-4, 2e-4]))
+    assert steps_per_row(recording) == windows.substeps == 5
+    rows = windows.history + windows.measured.shape[1]
+    assert windows.commands.shape[1] == 5 * rows
 
 
 def test_the_first_step_of_a_row_takes_the_mean_of_two_commands(recording: Recording) -> None:
     trial = recording.trials[0]
-    stretches = cut(recording, np.array([2e-4, 2e-4]), [trial])
-    first = stretches.history * stretches.substeps
-    assert stretches.commands[0, first] == pytest.approx(0.5 * (trial.command[0] + trial.command[1]))
-    assert stretches.commands[0, first + 1] == pytest.approx(trial.command[1])
+    windows = cut(recording, np.array([2e-4, 2e-4]), [trial])
+    first = windows.history * windows.substeps
+    assert windows.commands[0, first] == pytest.approx(0.5 * (trial.command[0] + trial.command[1]))
+    assert windows.commands[0, first + 1] == pytest.approx(trial.command[1])
 
 
-def test_taking_stretches_keeps_rows_together(recording: Recording) -> None:
-    stretches = cut(recording, np.array([2e-4, 2e-4]))
-    last = stretches.take(np.array([len(stretches) - 1]))
+def test_taking_windows_keeps_rows_together(recording: Recording) -> None:
+    windows = cut(recording, np.array([2e-4, 2e-4]))
+    last = windows.take(np.array([len(windows) - 1]))
     assert last.trial.tolist() == [1]
-    assert np.array_equal(last.measured[0], stretches.measured[-1])
+    assert np.array_equal(last.measured[0], windows.measured[-1])
 
 
-def test_a_later_stretch_wakes_the_memories_of_effects_before_its_samples_count(recording: Recording) -> None:
-    stretches = cut(recording, np.array([2e-4, 2e-4]), segment=10)
-    later = stretches.time > 0.0
+def test_a_later_window_wakes_the_memories_of_effects_before_its_samples_count(recording: Recording) -> None:
+    windows = cut(recording, np.array([2e-4, 2e-4]), segment=10)
+    later = windows.time > 0.0
     assert later.any()
-    assert not stretches.weight[later, :10].any()
-    assert stretches.weight[later, 10:11].all()
+    assert not windows.weight[later, :10].any()
+    assert windows.weight[later, 10:11].all()
 
 
 def test_a_start_in_the_middle_of_a_jerk_is_read_without_bias(recording: Recording) -> None:
