@@ -12,8 +12,8 @@ from tactile_cube.identification.fitting.intervals import bounds, final_fit
 from tactile_cube.identification.fitting.model import read_all
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import Windows, cut
 from tactile_cube.identification.fitting.time_step import FINER, finer
+from tactile_cube.identification.fitting.windows import Windows, cut
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tests.measurement.small_rig import write

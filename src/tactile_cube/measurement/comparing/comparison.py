@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.band import Band, simulate_band
 from tactile_cube.measurement.comparing.error import ErrorSummary, residuals, summarise
-from tactile_cube.measurement.comparing.in_words import where_it_fails
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.comparing.joint_offsets import fitted_offsets, no_offsets, replay_each
-from tactile_cube.measurement.comparing.regimes import Regime, regimes
 from tactile_cube.measurement.comparing.failing_intervals import FailingInterval, failing_intervals
+from tactile_cube.measurement.comparing.in_words import where_it_fails
+from tactile_cube.measurement.comparing.joint_offsets import fitted_offsets, no_offsets, replay_each
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.comparing.regimes import Regime, regimes
 from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.parameters import Parameters, nominal_parameters, require_same_joints
