@@ -1,7 +1,7 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
 Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
-`export` and `deploy`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give what they work on.
+`export`, `deploy` and `view`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give what they work on.
 Nothing slow is imported before it is used.
 """
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.identification import identify
     from tactile_cube.api.recording import record
     from tactile_cube.api.training import train
+    from tactile_cube.api.view import view
     from tactile_cube.drivetrain.model_file import read_model
     from tactile_cube.measurement.recordings.arrays import TrialArrays, recording_from_arrays
     from tactile_cube.measurement.recordings.reading import read_recording
@@ -41,6 +42,7 @@ _PLACES = {
     "identify": "api.identification",
     "record": "api.recording",
     "train": "api.training",
+    "view": "api.view",
     "read_model": "drivetrain.model_file",
     "TrialArrays": "measurement.recordings.arrays",
     "recording_from_arrays": "measurement.recordings.arrays",
@@ -64,6 +66,7 @@ __all__ = [
     "record",
     "recording_from_arrays",
     "train",
+    "view",
 ]
 
 

@@ -9,7 +9,7 @@ from tests.evaluation.synthetic import episode
 
 
 def test_a_saved_record_comes_back_unchanged(tmp_path: Path) -> None:
-    record = episode(steps=5)
+    record = episode(steps=5, policy={"action": np.ones((5, 12))})
     record.save(tmp_path / "episode.npz")
     loaded = EpisodeRecord.load(tmp_path / "episode.npz")
     for name in ARRAY_FIELDS:
@@ -19,6 +19,7 @@ def test_a_saved_record_comes_back_unchanged(tmp_path: Path) -> None:
     assert (loaded.ending, loaded.direction, loaded.constants) == (record.ending, record.direction, record.constants)
     assert loaded.reward_terms.keys() == record.reward_terms.keys()
     assert loaded.trace.keys() == record.trace.keys()
+    np.testing.assert_array_equal(loaded.policy["action"], record.policy["action"])
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip file", b"PK\x03\x04 cut off"])

@@ -55,6 +55,23 @@ def test_the_record_is_complete(env: TransformedEnv) -> None:
     assert set(record.contacts.finger.tolist()) == {0, 1, 2, 3}
 
 
+def test_the_record_holds_what_the_policy_got_with_offset_and_noise(env: TransformedEnv) -> None:
+    record = run_episode(env, RandomPolicy(), 0)
+    error = record.policy["q_m"][1:] - record.trace["q_m"][49:-1:50]  # of the physics step before the policy was asked
+    assert 0.0015 < np.std(error - error.mean(axis=0)) < 0.0025
+    offset = np.abs(error.mean(axis=0))
+    assert 0.002 < offset.max() < 0.012
+
+
+def test_the_record_holds_what_the_policy_asked_for_before_it_was_repeated(env: TransformedEnv) -> None:
+    record = run_episode(env, RandomPolicy(), 1)
+    middle = 0.5 * (DLR_HAND2.action_lower + DLR_HAND2.action_upper)
+    asked = middle + (DLR_HAND2.action_upper - middle) * record.policy["action"]
+    differing = np.flatnonzero(np.abs(asked - record.target).max(axis=1) > 1e-4)
+    assert len(differing) == 1
+    np.testing.assert_allclose(record.target[differing[0]], record.target[differing[0] - 1], atol=1e-6)
+
+
 def test_contact_forces_of_a_held_cube_carry_its_weight(env: TransformedEnv) -> None:
     held = make_env(dataclasses.replace(CONFIG, randomization=Randomization()), 1, 0, evaluation=True)
     record = run_episode(held, HoldPolicy(), 0)

@@ -19,7 +19,8 @@ def moving() -> EpisodeRecord:
     """An episode whose joints read something else at every physics step."""
     record, rng = episode(steps=20), np.random.default_rng(0)
     signals = {name: rng.normal(size=(1000, 12)) for name in ("q_m", "q_f")}
-    return replace(record, trace=record.trace | signals)
+    policy = {name: rng.uniform(-1.0, 1.0, size=(20, 12)) for name in ("q_m", "e_q", "action")}
+    return replace(record, trace=record.trace | signals, policy=policy)
 
 
 @pytest.fixture(scope="module")
@@ -77,13 +78,15 @@ def test_contacts_are_arrows(recording: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=2), 0.03, rtol=1e-5)
 
 
-def test_what_the_policy_gets_comes_back_at_10_hz(recording: Path) -> None:
-    trace = moving().trace
+def test_what_the_policy_gets_and_asks_comes_back_at_10_hz(recording: Path) -> None:
+    policy = moving().policy
+    middle = 0.5 * (DLR_HAND2.action_lower + DLR_HAND2.action_upper)
+    half = DLR_HAND2.action_upper - middle
+    expected = {"q_m": policy["q_m"], "e_q": policy["e_q"], "action": middle + half * policy["action"]}
     for place, finger in enumerate(("ring", "middle", "fore", "thumb")):
-        mine = slice(3 * place, 3 * place + 3)
-        q_m, e_q = (rows(recording, f"/policy/{finger}/{name}", "Scalars:scalars") for name in ("q_m", "e_q"))
-        np.testing.assert_allclose(q_m[1:], trace["q_m"][49:950:50, mine])
-        np.testing.assert_allclose(e_q[1:], (trace["q_f"] - trace["q_m"])[49:950:50, mine])
+        for name, values in expected.items():
+            found = rows(recording, f"/policy/{finger}/{name}", "Scalars:scalars")
+            np.testing.assert_allclose(found, values[:, 3 * place : 3 * place + 3])
     for signal, length in (("q_f", 1000), ("q_n", 20)):
         assert rows(recording, f"/joints/ring/{signal}", "Scalars:scalars").shape == (length, 3)
 

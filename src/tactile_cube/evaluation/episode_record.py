@@ -58,6 +58,8 @@ class EpisodeRecord:
         cube_size: edge lengths `(3,)` [m].
         constants: what was drawn for this episode and what the run was given (seed, T_s, gravity, ...).
         trace: signals at the physics rate, each `(m, ...)`, with "time" [s] among them.
+        policy: what went in and out of the policy in each step, each `(n, joints)`: its newest "q_m" and "e_q" with the
+            sensors' offset and noise [rad], and the "action" it asked for, in [-1, 1], before any is repeated.
         fingers: of the hand, in the order of joint vectors; all have equally many joints.
         object_shape: "box", "cylinder" or "capsule".
         axis: of the rotation, in the world.
@@ -78,6 +80,7 @@ class EpisodeRecord:
     cube_size: Array
     constants: dict[str, float | str] = field(default_factory=dict)
     trace: dict[str, Array] = field(default_factory=dict)
+    policy: dict[str, Array] = field(default_factory=dict)
     fingers: tuple[str, ...] = ("ring", "middle", "fore", "thumb")
     object_shape: ObjectShape = "box"
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
@@ -105,6 +108,7 @@ class EpisodeRecord:
         arrays |= {f"contacts.{name}": getattr(self.contacts, name) for name in CONTACT_FIELDS}
         arrays |= {f"reward.{name}": value for name, value in self.reward_terms.items()}
         arrays |= {f"trace.{name}": value for name, value in self.trace.items()}
+        arrays |= {f"policy.{name}": value for name, value in self.policy.items()}
         arrays["meta"] = np.array(
             json.dumps([self.ending, self.direction, self.constants, self.fingers, self.object_shape, self.axis])
         )
@@ -131,6 +135,7 @@ class EpisodeRecord:
                 direction=direction,
                 constants=constants,
                 trace=_with_prefix(data, "trace."),
+                policy=_with_prefix(data, "policy."),
                 **hand,
             )
         except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:

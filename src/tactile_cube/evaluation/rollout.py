@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torchrl.envs import TransformedEnv
 
@@ -40,7 +41,9 @@ def run_episode(
     while not finished:
         if interference is not None:
             interference(task, step)
-        action = policy.act(state["observation"][0].numpy(), step)
+        observation = state["observation"][0].numpy()
+        action = policy.act(observation, step)
+        recorder.decided(observation, action)
         state["action"] = state["observation"].new_tensor(action)[None]
         state = env.step(state)["next"]
         recorder.add(state)
@@ -59,8 +62,17 @@ class Recorder:
         self._trace: list[dict[str, Array]] = []
         self._theta, self._reward = [0.0], list[float]()
         self._terms, self._targets = list[Array](), list[Array]()
+        self._policy: dict[str, list[Array]] = {}
         self._outcome = 0
         self._sample()
+
+    def decided(self, observation: NDArray[np.float32], action: Array) -> None:
+        """Take over what the policy was given, a stack of readings, and the action `(joints,)` it asked for."""
+        joints = self._task.hand.joints
+        newest = np.array(observation[-2 * joints :], dtype=np.float64)
+        values = (newest[:joints], newest[joints:], np.array(action, dtype=np.float64))
+        for name, value in zip(POLICY_SIGNALS, values, strict=True):
+            self._policy.setdefault(name, []).append(value)
 
     def add(self, state: TensorDictBase) -> None:
         """Take over one policy step that has just been made."""
@@ -98,6 +110,7 @@ class Recorder:
             object_shape=task.constants.object_shape,
             axis=tuple(task.task.axis_vector().tolist()),
             trace={name: np.concatenate([piece[name] for piece in self._trace]) for name in names},
+            policy={name: np.array(rows) for name, rows in self._policy.items()},
         )
 
     def _sample(self) -> None:
@@ -125,6 +138,7 @@ class Recorder:
 
 
 NO_NUMBERS = ("effects", "joints", "object_shape")
+POLICY_SIGNALS = ("q_m", "e_q", "action")
 WORLD_SIGNALS = ("q", "q_f", "cube_position", "cube_quaternion")
 
 

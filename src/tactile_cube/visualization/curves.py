@@ -23,7 +23,9 @@ MARKERS = (">", "s")
 MAP_COLUMNS = 3
 
 
-def write_learning_curves(curves: Sequence[Curve], path: Path, title: str) -> None:
+def write_learning_curves(
+    curves: Sequence[Curve], path: Path, title: str, size: tuple[float, float] = (8.0, 5.5)
+) -> None:
     """Draw mean final angle over environment steps, and below it what the curriculum did.
 
     A triangle and a square mark where the curriculum of a run begins and ends.
@@ -32,8 +34,9 @@ def write_learning_curves(curves: Sequence[Curve], path: Path, title: str) -> No
         curves: the runs, e.g. one a seed.
         path: file to write; its ending (.png, .svg) chooses the format.
         title: of the picture.
+        size: of the picture [inch].
     """
-    figure = Figure(figsize=(8, 5.5), layout="constrained")
+    figure = Figure(figsize=size, layout="constrained")
     angle, schedule = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     for number, curve in enumerate(curves):
         million = [step / 1e6 for step in curve.columns[STEPS]]

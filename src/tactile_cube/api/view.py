@@ -1,0 +1,131 @@
+"""See a run from a program: best and worst episode side by side, and its learning curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactile_cube.api.input_errors import as_input_errors
+from tactile_cube.api.job import Job, PathLike, Say, called_job
+from tactile_cube.errors import InputError
+
+if TYPE_CHECKING:
+    from tactile_cube.api.evaluation import EvaluationResult
+    from tactile_cube.evaluation.training_curve import Curve
+    from tactile_cube.evaluation.verdict import EpisodeResult
+
+RECORDING = "view.rrd"
+
+
+@dataclass(frozen=True)
+class ViewResult:
+    """What there is to see, and where.
+
+    Attributes:
+        files: Rerun recordings.
+        episodes: "best" and "worst" -> what the episode was; {} where recordings were there already.
+        opened: where they are shown, or how to open them, in words.
+    """
+
+    files: list[Path]
+    episodes: Mapping[str, EpisodeResult]
+    opened: str
+
+    @property
+    def text(self) -> str:
+        """The answer of the command."""
+        lines = [f"{name}: {_described(result)}" for name, result in self.episodes.items()]
+        return "\n".join([*lines, *(f"recording: {file}" for file in self.files), self.opened])
+
+
+@as_input_errors
+def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say = print) -> ViewResult:
+    """Write the best and the worst of some episodes of a run as one Rerun recording, and open it where there is a display.
+
+    Args:
+        run: folder of a training run, a policy file, or a policy that ships with the package; of a folder of `evaluate`
+            or `compare`, the recordings in it are opened.
+        settings: values as on the command line, e.g. "episodes=4", "viewer=web".
+        folder: where the recording goes; None: outputs/view/...
+        say: takes a line for each episode.
+
+    Raises:
+        InputError: there is no such run, or a value that cannot be used.
+
+    Example:
+        >>> seen = tactile_cube.view("table", "episodes=4", "viewer=none")
+        >>> print(seen.files[0], seen.episodes["best"].final_angle)
+    """
+    return run_view(called_job("view", settings, folder, run=str(run)), say)
+
+
+def run_view(job: Job, say: Say) -> ViewResult:
+    """See what a job names."""
+    from tactile_cube.visualization.viewer import require_viewer, show_files
+
+    config = job.config
+    require_viewer(config.viewer)
+    if not isinstance(config.episodes, int) or config.episodes < 2:
+        raise InputError(f"episodes={config.episodes}: give at least 2, of which the best and the worst are shown")
+    there = recordings_in(Path(config.run))
+    if there:
+        return ViewResult(there, {}, show_files(there, config.viewer))
+    file = job.folder / RECORDING
+    episodes = write_run(job, file, say)
+    return ViewResult([file], episodes, show_files([file], config.viewer))
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """The Rerun recordings of a folder in which no policy was trained."""
+    if not folder.is_dir() or (folder / "policy.safetensors").is_file():
+        return []
+    return sorted(folder.glob("*.rrd"))
+
+
+def write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
+    """Run the episodes of a job and write the best and the worst; gives what they were."""
+    from tactile_cube.api.evaluation import evaluate
+    from tactile_cube.evaluation.policy_path import BASELINES, policy_path
+    from tactile_cube.visualization.run_view import write_pair
+    from tactile_cube.visualization.showcase import description
+
+    config = job.config
+    if config.run not in BASELINES:
+        policy_path(config.run, "run")  # names the key that the user wrote
+    settings = [f"protocol.episodes={config.episodes}", f"seed={config.seed}", *config.evaluate]
+    settings += [] if config.seconds is None else [f"protocol.seconds={config.seconds}"]
+    tried = evaluate(config.run, *settings, say=say)
+    ordered = sorted(tried.variants[0].results, key=lambda result: result.final_angle)
+    chosen = {"best": ordered[-1], "worst": ordered[0]}
+    recorded = {
+        name: (tried.episode(one.episode), f"{name}: {_described(one)}", description(one))
+        for name, one in chosen.items()
+    }
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_pair(file, recorded, tried.evaluation.hand, learning_curve(config.run), _words(config.run, tried))
+    return chosen
+
+
+def learning_curve(run: str) -> Curve | None:
+    """The learning curve of a run's folder, or of a policy in one; None without metrics."""
+    from tactile_cube.evaluation.training_curve import read_curve
+
+    folder = Path(run) if Path(run).is_dir() else Path(run).parent
+    metrics = folder / "metrics.csv"
+    if not metrics.is_file() or metrics.read_text(encoding="utf-8").count("\n") < 2:  # no row yet
+        return None
+    return read_curve(folder, folder.resolve().name)
+
+
+def _described(result: EpisodeResult) -> str:
+    return f"episode {result.episode}, {result.final_angle:.2f} rad, {result.verdict.value.replace('_', ' ')}"
+
+
+def _words(run: str, tried: EvaluationResult) -> str:
+    """About the run, in Markdown."""
+    provenance = tried.run.source.provenance
+    known = {key: provenance[key] for key in ("steps", "seed", "time_constant", "commit") if key in provenance}
+    rows = [f"| {key} | {value} |" for key, value in known.items()]
+    return "\n".join([f"## {run}", "", *(["| | |", "|---|---|", *rows, ""] if rows else []), tried.text])
