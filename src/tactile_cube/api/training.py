@@ -112,7 +112,10 @@ def training_run(job: Job) -> Run:
         make_agent=instantiate(config.agent, _partial_=True),
         collector=CollectorSettings(**plain["collector"]),
         training=TrainingSettings(**plain["training"] | {"init_from": networks_path(config.training.init_from)}),
-        loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
+        loggers={
+            name: instantiate(entry, _partial_=True)
+            for name, entry in (*config.logger.items(), *config.visualization.items())
+        },
         config=plain,
     )
 
@@ -124,6 +127,7 @@ def _plain(job: Job) -> dict[str, Any]:
     from tactile_cube.drivetrain.model_file import read_model
 
     plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
+    plain.pop("visualization", None)  # a run is the same whether or not somebody looks on
     if job.config.model is not None:
         plain["env"]["model"] = read_model(job.config.model).model_dump()
     return _without_published(plain)

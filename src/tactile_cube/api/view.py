@@ -42,7 +42,7 @@ class ViewResult:
 
 @as_input_errors
 def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say = print) -> ViewResult:
-    """Write the best and the worst of some episodes of a run as one Rerun recording, and open it where there is a display.
+    """Write the best and the worst episode of a run as one Rerun recording, and open it where there is a display.
 
     Args:
         run: folder of a training run, a policy file, or a policy that ships with the package; of a folder of `evaluate`

@@ -33,8 +33,9 @@ class EpisodeViews:
     def scene(self, name: str = "Hand and cube") -> rrb.View:
         """Hand, object, contact forces and trail in 3D."""
         # Rerun's URDF importer logs collision shapes beside the visual ones; seen together they flicker.
-        collision_shapes = f"- {self._at('hand')}/{self.hand_name}/collision_geometries/**"
-        parts = (f"{self._at(part)}/**" for part in ("hand", "cube", "contacts", "trail"))
+        hand = f"/{self.root.strip('/')}_hand" if self.root.strip("/") else "/hand"  # as Branch.hand
+        collision_shapes = f"- {hand}/{self.hand_name}/collision_geometries/**"
+        parts = (f"{part}/**" for part in (hand, *(self._at(name) for name in ("cube", "contacts", "trail"))))
         return rrb.Spatial3DView(
             name=name,
             origin=self.root,
@@ -52,8 +53,8 @@ class EpisodeViews:
         """Rewards, forces, conditions, and the episode in words."""
         return [
             self._curves("reward terms", "task/reward"),
-            self._curves("normal force of each finger [N]", "task/force"),
-            self._curves("curriculum: T_s [s], gravity", "curriculum"),
+            self._curves("forces [N]", "task/force"),
+            self._curves("T_s [s], gravity", "curriculum"),
             rrb.TextDocumentView(name="Episode", origin=self._at("episode")),
         ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import rerun as rr
@@ -29,6 +29,11 @@ class Branch:
     root: str = ""
     start: float = 0.0
     stride: int = 1
+
+    @property
+    def hand(self) -> Branch:
+        """Where its hand is written: Rerun's URDF importer takes one name, no path."""
+        return replace(self, root=f"{self.root.replace('/', '_')}hand/")
 
     def log(self, entity: str, archetype: Any, time: float = 0.0) -> None:
         """Write what holds from `time` [s] of the episode on."""

@@ -35,9 +35,9 @@ def log_hand(branch: Branch, hand: Hand) -> UrdfTree:
         file.write_text(urdf, encoding="utf-8")
         tree = UrdfTree.from_file_path(
             file,
-            entity_path_prefix=f"{branch.root}hand",
+            entity_path_prefix=branch.hand.root.rstrip("/"),
             frame_prefix=prefix or None,
-            static_transform_entity_path=f"{branch.root}hand/static",
+            static_transform_entity_path=f"{branch.hand.root}static",
         )
         tree.log_urdf_to_recording(branch.stream)
     fill_shapes(branch.stream, tree, urdf)
@@ -47,7 +47,7 @@ def log_hand(branch: Branch, hand: Hand) -> UrdfTree:
         parent_frame="tf#/",
         child_frame=prefix + tree.root_link().name,
     )
-    branch.always("hand/pose", root)
+    branch.hand.always("pose", root)
     return tree
 
 
@@ -59,7 +59,7 @@ def log_motion(branch: Branch, record: EpisodeRecord, hand: Hand, tree: UrdfTree
         actuated = hand.followed(joint.name)
         if actuated in columns:
             transform = joint.compute_transform_columns(q[:, columns[actuated]].tolist(), clamp=False)
-            branch.columns(f"hand/joint_transforms/{joint.name}", time, transform)
+            branch.hand.columns(f"joint_transforms/{joint.name}", time, transform)
     _log_object(branch, record)
     branch.columns("cube", time, rr.Transform3D.columns(translation=position, quaternion=quaternion))
     _log_trail(branch, record)

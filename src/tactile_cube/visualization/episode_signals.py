@@ -1,4 +1,4 @@
-"""The signals of an episode in Rerun: the task at 10 Hz, what the policy gets and asks, the joints at the physics rate."""
+"""The signals of an episode in Rerun: the task and the policy at 10 Hz, the joints at the physics rate."""
 
 from __future__ import annotations
 

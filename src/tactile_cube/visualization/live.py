@@ -1,0 +1,85 @@
+"""What a run has learned, shown while it learns: its side of a process that evaluates and draws.
+
+The process reads the policy that the run has saved last. It has random generators, simulator and memory of its own, so
+that the run learns bit for bit what it would without; it yields the processor to the run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from tactile_cube.errors import InputError
+from tactile_cube.training.run import POLICY
+from tactile_cube.visualization.viewer import has_display
+
+VIEWERS = ("auto", "window", "web", "file")
+PATIENCE = 10.0
+"""How long the end of a run waits for an episode that is being drawn [s]."""
+
+
+class LiveView:
+    """Asks for an evaluation episode every so many training episodes. A logger as those of `training.loggers`.
+
+    Args:
+        folder: of the run.
+        resumed_at: environment steps at which this session begins; not used.
+        every: training episodes from one to the next.
+        viewer: "window", "web", "file", a Rerun URL to connect to, or "auto".
+
+    Raises:
+        InputError: a value that cannot be used.
+    """
+
+    def __init__(self, folder: Path, resumed_at: int, every: int = 300, viewer: str = "auto"):
+        if not isinstance(every, int) or every < 1:
+            raise InputError(f"visualization.live.every={every}: give at least 1 training episode")
+        if viewer not in VIEWERS and "://" not in viewer:
+            known = ", ".join(VIEWERS)
+            raise InputError(f"visualization.live.viewer={viewer}: choose {known}, or give a URL such as "
+                             "rerun+http://127.0.0.1:9876/proxy")  # fmt: skip
+        if viewer == "auto":
+            viewer = "window" if has_display() else "web"
+        self._policy, self._every, self._shown = folder / POLICY, every, -every
+        self.process = _start(folder, viewer)
+
+    def log(self, steps: int, metrics: Mapping[str, float]) -> None:
+        """Ask for an episode under the conditions in force if it is time; never waits."""
+        episodes = int(metrics.get("episodes", 0))
+        if self.process is None or episodes < self._shown + self._every or not self._policy.is_file():
+            return
+        self._shown = episodes
+        conditions = {name: metrics[name] for name in ("T_s", "gravity") if name in metrics}
+        try:
+            self.process.stdin.write(json.dumps({"steps": steps, **conditions}).encode() + b"\n")  # type: ignore[union-attr]
+        except BlockingIOError:
+            pass  # it still draws earlier ones
+        except OSError:
+            print("live view: its process has ended; the run goes on without", file=sys.stderr, flush=True)
+            self.process = None
+
+    def close(self) -> None:
+        """Let it draw what it was asked for, then end it; a viewer stays open."""
+        if self.process is None:
+            return
+        self.process.stdin.close()  # type: ignore[union-attr]
+        for end in (self.process.terminate, self.process.kill, self.process.wait):
+            try:
+                self.process.wait(PATIENCE)
+                break
+            except subprocess.TimeoutExpired:
+                end()
+        self.process = None
+
+
+def _start(folder: Path, viewer: str) -> subprocess.Popen[bytes] | None:
+    """Start the process that draws; Ctrl-C at the terminal is the run's alone."""
+    words = [sys.executable, "-m", "tactile_cube.visualization.live_episodes", str(folder), viewer]
+    one = {"OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, env=os.environ | one, bufsize=0, start_new_session=True)
+    os.set_blocking(process.stdin.fileno(), False)  # type: ignore[union-attr]
+    return process

@@ -1,0 +1,93 @@
+"""A run that somebody looks at learns the same, to the bit, and shows what it has learned."""
+
+import io
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tactile_cube
+from tactile_cube.agent.policy_file import PolicyInfo, load_policy
+from tactile_cube.errors import InputError
+from tactile_cube.visualization.live import LiveView
+from tactile_cube.visualization.live_episodes import FILE, serve
+from tests.visualization.test_episode_recording import listed, rows
+
+SHORT = [
+    "+experiment=smoke",
+    "collector=single",
+    "collector.worlds=4",
+    "training.learning_starts=100",
+    "training.random_steps=100",
+    "training.steps=200",
+    "task.episode_steps=10",
+    "logger=csv",
+]
+LIVE = ["visualization=live", "visualization.live.viewer=file", "visualization.live.every=4"]
+
+
+def read_policy(path: Path) -> tuple[list[bytes], PolicyInfo]:
+    """Weights, byte for byte, and what the file says of the run."""
+    actor, info = load_policy(path)
+    return [parameter.numpy().tobytes() for parameter in actor.parameters()], info
+
+
+def test_a_run_that_is_watched_learns_the_same_bit_for_bit_and_shows_episodes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tactile_cube.visualization.live.PATIENCE", 200.0)  # the machine may be busy
+    watched = tactile_cube.train(*SHORT, *LIVE, folder=tmp_path / "watched" / "run")
+    alone = tactile_cube.train(*SHORT, folder=tmp_path / "alone" / "run")
+    for mine, theirs in zip(*(read_policy(result.policy) for result in (watched, alone)), strict=True):
+        assert mine == theirs
+    curves = [result.curve() for result in (watched, alone)]
+    learned = [{key: values for key, values in curve.items() if "hours" not in key} for curve in curves]
+    assert repr(learned[0]) == repr(learned[1])  # some are not a number
+    shown = watched.folder / FILE
+    told = listed(shown, "/episode", "TextDocument:text")
+    assert told
+    assert all(text[0].startswith("# run: ") for text in told)
+    assert len(rows(shown, "/task/theta", "Scalars:scalars")) >= 2 * len(told)
+    assert listed(shown, "/curves", "EncodedImage:media_type") != []
+    assert not (alone.folder / FILE).exists()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"every": 0}, r"visualization\.live\.every=0: give at least 1"),
+        (
+            {"viewer": "televison"},
+            r"visualization\.live\.viewer=televison: choose auto, window, web, file, or give a URL",
+        ),
+    ],
+)
+def test_settings_without_a_meaning_are_refused(tmp_path: Path, settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        LiveView(tmp_path, 0, **settings)
+
+
+def test_a_run_outlives_the_process_that_shows_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "policy.safetensors").write_bytes(b"")
+    live = LiveView(tmp_path, 0, every=1, viewer="file")
+    assert live.process is not None
+    live.process.send_signal(signal.SIGKILL)
+    live.process.wait()
+    for episodes in (1, 2, 3):
+        live.log(episodes, {"episodes": float(episodes)})
+    live.close()
+    assert capsys.readouterr().err.count("the run goes on without") == 1
+
+
+def test_of_requests_that_wait_only_the_newest_is_drawn() -> None:
+    drawn: list[tuple[int, dict[str, float]]] = []
+
+    class Episodes:
+        def show(self, steps: int, conditions: dict[str, float]) -> None:
+            drawn.append((steps, conditions))
+
+    lines = "".join(f'{{"steps": {steps}, "T_s": 0.5}}\n' for steps in range(100))
+    serve(io.StringIO(lines), Episodes())  # type: ignore[arg-type]
+    assert drawn[-1] == (99, {"T_s": 0.5})
+    assert len(drawn) < 100
