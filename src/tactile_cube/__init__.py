@@ -1,8 +1,8 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
 Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
-`export`, `deploy` and `view`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give what they
-work on. Nothing slow is imported before it is used.
+`export`, `deploy`, `view` and `monitor`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give
+what they work on. Nothing slow is imported before it is used.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.api.export import export, load_policy
     from tactile_cube.api.identification import identify
+    from tactile_cube.api.monitoring import monitor
     from tactile_cube.api.recording import record
     from tactile_cube.api.training import train
     from tactile_cube.api.view import view
@@ -40,6 +41,7 @@ _PLACES = {
     "export": "api.export",
     "load_policy": "api.export",
     "identify": "api.identification",
+    "monitor": "api.monitoring",
     "record": "api.recording",
     "train": "api.training",
     "view": "api.view",
@@ -61,6 +63,7 @@ __all__ = [
     "identify",
     "load_policy",
     "make_env",
+    "monitor",
     "read_model",
     "read_recording",
     "record",

@@ -10,7 +10,7 @@ import pytest
 
 import tactile_cube
 
-COMMANDS = ("compare", "deploy", "diagnose", "evaluate", "export", "identify", "record", "train", "view")
+COMMANDS = ("compare", "deploy", "diagnose", "evaluate", "export", "identify", "monitor", "record", "train", "view")
 
 
 def test_importing_the_package_imports_nothing_slow() -> None:

@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from tactile_cube.visualization.branch import TIMELINE
 
 LEGEND = rrb.PlotLegend(corner="LeftTop")
-EYE = rrb.EyeControls3D(position=(0.24, -0.27, -0.06), look_target=(0.0, 0.0, 0.04), eye_up=(0, 0, 1))
+EYE = rrb.EyeControls3D(position=(0.23, -0.26, -0.01), look_target=(0.0, 0.0, 0.06), eye_up=(0, 0, 1))
 BACKGROUND = rrb.Background(color=(247, 248, 250))
 
 

@@ -1,0 +1,176 @@
+"""Watch a machine from a program: what has changed since its model was identified?"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
+from tactile_cube.api.input_errors import as_input_errors
+from tactile_cube.api.job import Job, PathLike, Say, called_job
+from tactile_cube.errors import InputError
+
+if TYPE_CHECKING:
+    from tactile_cube.api.diagnosis import DiagnosisResult
+    from tactile_cube.api.identification import IdentificationResult
+    from tactile_cube.drivetrain.model_file import ModelFile
+    from tactile_cube.identification.drift import Drift
+    from tactile_cube.measurement.recordings.recording import Recording
+
+
+@dataclass(frozen=True)
+class MonitorResult:
+    """What has changed.
+
+    Attributes:
+        before: the reference model.
+        refitted: the same effects fitted to the newest recording.
+        drifts: every number that both know, the least probable difference first.
+        changed: those that are no chance.
+        ratios: held-out error over noise floor, of the reference then and of the refitted model now.
+        missing: whether the refitted model has become so much worse that something new is missing.
+        diagnosis: names it, where that was asked for.
+        job: the call.
+    """
+
+    before: ModelFile
+    refitted: IdentificationResult
+    drifts: list[Drift]
+    changed: list[Drift]
+    ratios: tuple[float, float]
+    missing: bool
+    diagnosis: DiagnosisResult | None
+    job: Job
+
+    @property
+    def alarm(self) -> bool:
+        """Whether anything has changed."""
+        return bool(self.changed) or self.missing
+
+    @property
+    def text(self) -> str:
+        """What has changed, in words."""
+        then, now = self.ratios
+        lines = [f"changed: {_described(one)}" for one in self.changed]
+        if self.missing:
+            lines.append(f"something new is missing: error {now:.2f} times the noise floor, {then:.2f} times before")
+        if not lines:
+            lines.append(
+                f"nothing has changed: {len(self.drifts)} numbers agree, error {now:.2f} times the noise floor"
+            )
+        return "\n".join([*lines, *([self.diagnosis.text] if self.diagnosis else [])])
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The content of monitor.json: plain numbers."""
+        rows = {
+            one.name: {
+                "before": one.before.model_dump(),
+                "now": one.now.model_dump(),
+                "difference": one.difference,
+                "half_width": one.half_width,
+                "p_value": one.p_value,
+                "changed": one in self.changed,
+            }
+            for one in self.drifts
+        }
+        ratios = dict(zip(("before", "now"), self.ratios, strict=True))
+        named = self.diagnosis.effects if self.diagnosis else None
+        made = {"command": self.job.command, "seconds": self.job.seconds}
+        return (
+            {"alarm": self.alarm, "missing": self.missing, "error_over_floor": ratios, "named": named}
+            | made
+            | {"numbers": rows}
+        )
+
+    def write(self, folder: PathLike) -> None:
+        """Write monitor.json and model.yaml, the refitted model; with a diagnosis its files in diagnosis/."""
+        from tactile_cube.drivetrain.model_file import write_model
+
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "monitor.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
+        write_model(self.refitted.model, folder / "model.yaml")
+        if self.diagnosis is not None:
+            self.diagnosis.write(folder / "diagnosis")
+
+
+@as_input_errors
+def monitor(
+    recording: Recording | PathLike, model: ModelFile | PathLike, *settings: str, say: Say | None = None
+) -> MonitorResult:
+    """Find out whether a machine has changed since its model was identified.
+
+    Args:
+        recording: the newest, or its folder; two or more trials.
+        model: of `identify` or `diagnose` on an earlier recording of the same machine, or its file.
+        settings: values as on the command line, e.g. "last=4", "significance=0.001".
+        say: takes lines of progress; None: stderr.
+
+    Raises:
+        InputError: a recording or a model that cannot be used, or that are not of the same joints.
+
+    Example:
+        >>> seen = tactile_cube.monitor("log_of_today", "last_week/model.yaml")
+        >>> print(seen.alarm, seen.text)
+    """
+    job = called_job("monitor", settings, recording=recording_name(recording), model=model_name(model))
+    reference = modelled(model)
+    assert reference is not None  # there is one
+    return run_monitor(job, opened(recording), reference, say or job.say)
+
+
+def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> MonitorResult:
+    """Refit the reference's effects on the newest recording, and hold the numbers and the errors side by side."""
+    from tactile_cube.api.diagnosis import diagnose
+    from tactile_cube.api.identification import identify
+    from tactile_cube.identification.drift import changed, drifts
+    from tactile_cube.measurement.replay.parameters import require_same_joints
+
+    config = job.config
+    then = error_over_floor(before)
+    require_same_joints(recording, before)
+    newest = newest_trials(recording, config.last)
+    settings = [f"engine={config.engine}", f"step={config.step}", f"seed={config.seed}"]
+    refitted = identify(newest, [one.effect for one in before.drive_effects], *settings, say=say)
+    now = error_over_floor(refitted.model)
+    found = drifts(before, refitted.model)
+    gone = changed(found, config.significance)
+    missing = now > config.growth * max(then, 1.0)
+    named = diagnose(newest, *settings, model=before, say=say) if config.name_it and (gone or missing) else None
+    return MonitorResult(before, refitted, found, gone, (then, now), missing, named, job)
+
+
+def newest_trials(recording: Recording, last: int | None) -> Recording:
+    """The last so many trials of a recording; all with None.
+
+    Raises:
+        InputError: fewer than two, of which one could be held out.
+    """
+    if last is None:
+        return recording
+    if not isinstance(last, int) or last < 2:
+        raise InputError(f"last={last}: give at least 2 trials, of which one is held out, or null for all")
+    return recording.with_trials(recording.trials[-last:])
+
+
+def error_over_floor(model: ModelFile) -> float:
+    """Held-out error of an identified model over the noise floor of its recording.
+
+    Raises:
+        InputError: the model's file does not state them.
+    """
+    if model.errors.with_effects is None or not model.errors.noise_floor:
+        raise InputError(
+            f"model of {model.rig}: errors.with_effects and errors.noise_floor are missing; "
+            "take the model.yaml that identify or diagnose wrote"
+        )
+    return model.errors.with_effects / model.errors.noise_floor
+
+
+def _described(one: Drift) -> str:
+    unit = f" {one.now.unit}" if one.now.unit else ""
+    moved = f"{one.before.value:.4g} -> {one.now.value:.4g}{unit}"
+    return f"{one.name}: {moved} ({one.difference:+.2g} +- {one.half_width:.2g}, p = {one.p_value:.1g})"
