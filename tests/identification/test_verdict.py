@@ -26,7 +26,7 @@ def judged(error: float, seed: int = 0) -> Judgement:
     """60 segments of 100 samples whose RMS error is about `error` times the noise."""
     scatter = np.random.default_rng(seed).uniform(0.8, 1.2, 60)
     costs = 100.0 * error**2 * scatter / scatter.mean()
-    return Judgement(MODEL, costs, np.full(60, 100), NOTHING, np.array([error, 1.0]))
+    return Judgement(MODEL, costs, np.full(60, 100), NOTHING, np.array([error, 1.0]), np.arange(60) // 10)
 
 
 JOINTS = ("q1", "q2")

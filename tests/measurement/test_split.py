@@ -1,10 +1,12 @@
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
-from tactile_cube.measurement.split import held_out_split
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.split import held_out_split, turned, with_test_part
 from tests.measurement.small_rig import write
 
 
@@ -39,3 +41,44 @@ def test_a_single_trial_cannot_be_split(tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match=r"1 trial in all.*source\.length=SECONDS"):
         held_out_split(read_recording(write(tmp_path, change)))
+
+
+def twelve(tmp_path: Path, initialisations: int) -> Recording:
+    def change(data: dict) -> None:
+        data["trials"] = [
+            {"file": "first.parquet", "initialisation": k % initialisations, "kind": f"log{k % 4}"} for k in range(12)
+        ]
+
+    read = read_recording(write(tmp_path, change))
+    return read.with_trials([replace(trial, name=f"t{k}") for k, trial in enumerate(read.trials)])
+
+
+@pytest.mark.parametrize("initialisations", [1, 3])
+def test_the_trials_that_test_are_neither_fitted_nor_chosen_by(tmp_path: Path, initialisations: int) -> None:
+    whole = twelve(tmp_path, initialisations)
+    fit, held = held_out_split(whole)
+    less, tested = with_test_part(fit, 12)
+    assert tested is not None
+    assert len(tested.trials) == 2
+    parts = [{trial.name for trial in part.trials} for part in (less, held, tested)]
+    assert set().union(*parts) == {trial.name for trial in whole.trials}
+    assert sum(len(part) for part in parts) == 12
+    assert {t.kind for t in less.trials} == {t.kind for t in fit.trials}, "each kind stays in the fit"
+
+
+def test_few_trials_are_all_needed_by_the_fit(tmp_path: Path) -> None:
+    fit, _ = held_out_split(read_recording(write(tmp_path)))
+    assert with_test_part(fit, 2) == (fit, None)
+
+
+@pytest.mark.parametrize("initialisations", [1, 3])
+def test_every_trial_is_held_out_in_turn(tmp_path: Path, initialisations: int) -> None:
+    whole = twelve(tmp_path, initialisations)
+    first = held_out_split(whole)
+    divisions = [first, *turned(*first)]
+    assert sorted(t.name for _, held in divisions for t in held.trials) == sorted(t.name for t in whole.trials)
+    for fit, held in divisions:
+        assert {t.name for t in fit.trials}.isdisjoint(t.name for t in held.trials)
+        assert len(fit.trials) + len(held.trials) == 12
+        if initialisations > 1:
+            assert {t.initialisation for t in fit.trials}.isdisjoint(t.initialisation for t in held.trials)

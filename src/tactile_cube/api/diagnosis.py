@@ -181,7 +181,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     moving = without_touches(recording)
     criteria = Criteria(**config.criteria)
     found = diagnose_free(moving, effects, config.engine, config.step, config.seed, say, known, criteria)
-    model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
+    model = model_file(moving, found.fitted, found.errors(), [*found.held_out, *found.tested], job.command, config.seed)
     data = as_json(found, None, job.seconds) | {"units": recording.units}
     if known is not None:
         model = model.model_copy(update={"effects": model.with_effects(known.object_effects)})

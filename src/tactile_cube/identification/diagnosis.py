@@ -1,4 +1,4 @@
-"""A diagnosis from beginning to end: split, search, decide, refit, state errors, propose the next experiment."""
+"""A diagnosis from beginning to end: split, search, decide, refit, test, propose the next experiment."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy as np
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
+from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.evidence import Judgement
+from tactile_cube.identification.search.evidence import Judgement, judge
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Findings, Search
@@ -27,7 +28,7 @@ from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.rig_replay import Engine
-from tactile_cube.measurement.split import held_out_split
+from tactile_cube.measurement.split import held_out_split, turned, with_test_part
 
 SHOWN_SHAPES = 6
 
@@ -56,11 +57,13 @@ class Diagnosis:
         findings: what was tried.
         fitted: the recommended model, refitted on all fitted trials, with intervals.
         rivals: the same for each rival.
-        stages: nominal, refitted, with_effects: free-running held-out errors.
+        stages: nominal, refitted, with_effects: free-running errors on the trials that test.
+        over_noise: refitted, with_effects: errors of segments there, in units of the sensor noise.
         floor: noise floor of the recording.
         unexplained: what is left, joint by joint; empty unless something is.
         experiment: what would tell the rivals apart; None without rivals.
-        held_out: names of the held-out trials.
+        held_out: names of the trials that the search chose by.
+        tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
         known: effects of the model that it began with, NAME@JOINT.
         common: joint offsets that may be the encoder's or the initialisations'.
     """
@@ -70,10 +73,12 @@ class Diagnosis:
     fitted: Fitted
     rivals: tuple[tuple[Explanation, Fitted], ...]
     stages: dict[str, ErrorSummary]
+    over_noise: dict[str, float]
     floor: NoiseFloor
     unexplained: list[Unexplained]
     experiment: Experiment | None
     held_out: list[str]
+    tested: list[str]
     known: tuple[str, ...] = ()
     common: tuple[CommonOffset, ...] = ()
 
@@ -101,21 +106,24 @@ def diagnose(
         effects: the catalogue to search, a user's own effects included.
         engine: of the free-running errors that are stated.
         step: its simulation step [s].
-        seed: which trials are held out.
+        seed: which trials are held out, and which test.
         say: takes progress lines.
         known: the model to begin with, whose effects are no news; None: what the recording's owner states.
         criteria: what decides.
     """
     fitted_part, held_out = held_out_split(recording, seed=seed)
+    fitted_part, tested = with_test_part(fitted_part, len(recording.trials), seed)
     noise = sensor_noise(recording)
-    search = Search(fitted_part, held_out, noise, effects, say, known, criteria)
+    folds = turned(fitted_part, held_out)
+    search = Search(fitted_part, held_out, noise, effects, say, known, criteria, folds)
     findings, floor = search.run(), noise_floor(recording)
     simulations = Simulations(search, findings.base, floor, engine, step)
     verdict = decide(findings, simulations, criteria)
     fitted = simulations.final(verdict.chosen)
-    stages = {"nominal": search.start_held_out, "refitted": findings.base.judgement.model}
-    summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
-    summaries["with_effects"] = simulations.free_error(verdict.chosen)
+    test = held_out if tested is None else tested
+    summaries, over_noise = test_errors(
+        search, test, {"refitted": findings.base.fit.model, "with_effects": fitted.model}, engine, step
+    )
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
     rivals = tuple((one, simulations.final(one)) for one in verdict.rivals)
     experiment = None
@@ -128,13 +136,41 @@ def diagnose(
         fitted=fitted,
         rivals=rivals,
         stages=summaries,
+        over_noise=over_noise,
         floor=floor,
         unexplained=simulations.unexplained(verdict.chosen, beside_base=verdict.kind == "unknown_effect"),
         experiment=experiment,
         held_out=[trial.name for trial in held_out.trials],
+        tested=[trial.name for trial in tested.trials] if tested else [],
         known=tuple(term.label for term in search.start.terms),
         common=common_offsets(findings.base, search.shooting.sizes) if verdict.kind == "adequate" else (),
     )
+
+
+def test_errors(
+    search: Search, test: Recording, models: Mapping[str, Model], engine: Engine, step: float
+) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
+    """Free-running errors of the model as stated and of others [rad], and their errors of segments over the noise.
+
+    Args:
+        search: cuts trials into segments.
+        test: trials to test by.
+        models: fitted; the joint offsets of initialisations that they have not seen are fitted here.
+        engine: of the free runs.
+        step: its simulation step [s].
+    """
+    problem = Problem(search.shooting, search.windows(test))
+    stated = nominal_model(test, search.known)
+    summaries = {"nominal": free_run_error(test, free_run(test, stated, engine, step))}
+    over_noise = {}
+    for stage, model in models.items():
+        found = Model(model.constants, model.terms, {**stated.offsets, **model.offsets})
+        problem.linearise_starts(found)
+        judged = judge(problem, test, found)
+        over_noise[stage] = judged.error
+        seen = with_offsets(model, judged.model)
+        summaries[stage] = free_run_error(test, free_run(test, seen, engine, step))
+    return summaries, over_noise
 
 
 class Simulations(Questions):

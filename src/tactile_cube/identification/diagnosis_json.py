@@ -40,10 +40,8 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
         "error_joints": errors["joints"],
         "noise_floor_source": diagnosis.floor.source,
-        "error_over_noise": {
-            "refitted": diagnosis.findings.base.error,
-            "with_effects": verdict.chosen.error,
-        },
+        "error_part": "test" if diagnosis.tested else "held_out",
+        "error_over_noise": diagnosis.over_noise,
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
         "partial_effects": effects if verdict.kind == "unknown_effect" else [],
         "unproven_effects": _unproven(diagnosis) if verdict.kind == "unknown_effect" else [],
@@ -51,6 +49,7 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "next_experiment": str(experiment) if experiment else None,
         "held_out": diagnosis.held_out,
+        "tested": diagnosis.tested,
         "seconds": round(seconds, 2),
     }
 
@@ -64,8 +63,7 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "gain": round(one.gain, 5),
             "p_value": one.p_value,
         }
-        for level in diagnosis.findings.levels
-        for one in level
+        for one in (*(e for level in diagnosis.findings.levels for e in level), *diagnosis.findings.surpassed)
     ]
     judged = {row["effects"] for row in rows}
     for score in diagnosis.findings.scores[:RANKED]:

@@ -17,6 +17,7 @@ OPENING = {
 }
 UNRELATED = "The error is above the noise, but what is left goes with none of the logged signals."
 NO_LAW, LEFT = 0.05, 2.0  # share that a black box explains of what follows no law; noise floors worth a word
+PARTIAL = "Effects were found that help, and they are not the whole of what is missing."
 UNPROVEN = "Something is missing, and these trials do not suffice to prove what."
 GAIN_OF = {"error": "the held-out error", "offsets": "the joint offsets that the grips need"}
 HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
@@ -34,7 +35,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     if known := result.get("known_effects"):
         lines.append(f"  beside what was known: {', '.join(known)}")
     if partial := result.get("partial_effects"):
-        lines.append("  These help, and the recommended model holds them, but they are not the whole of it:")
+        lines.append("  The recommended model holds them:")
         lines += [_effect(entry, units) for entry in partial]
     lines += [f"  {line}" for line in unproven_effects(unproven)] if unproven else []
     lines += [_unexplained(entry) for entry in result["unexplained"]]
@@ -42,7 +43,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     error, unit = result["error"], common_unit(units.values())
     refitted = f"{milli(error['refitted'], unit)} with constants refitted, " if not grasps else ""
     lines.append(
-        f"Held-out error: {milli(error['nominal'], unit)} as stated, {refitted}"
+        f"{error_of(result)}: {milli(error['nominal'], unit)} as stated, {refitted}"
         f"{milli(error['with_effects'], unit)} with the recommended model; "
         f"noise floor {milli(error['noise_floor'], unit)}."
     )
@@ -51,8 +52,16 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     return "\n".join(lines)
 
 
+def error_of(result: Mapping[str, Any]) -> str:
+    """Of which trials the errors are that a result states."""
+    tested = result.get("tested")
+    return f"Error on {len(tested)} trials that nothing was fitted to or chosen by" if tested else "Held-out error"
+
+
 def headline(result: Mapping[str, Any]) -> str:
     """The answer in a sentence."""
+    if result["verdict"] == "unknown_effect" and result.get("partial_effects"):
+        return PARTIAL
     shares = [one.get("black_box", 1.0) for one in result.get("unexplained", [])]
     if result["verdict"] == "unknown_effect" and shares and max(shares) < NO_LAW:
         return UNRELATED

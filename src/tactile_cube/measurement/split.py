@@ -1,4 +1,6 @@
-"""Which trials are fitted and which are held out: split by trial, never by sample."""
+"""Which trials are fitted, which choose, and which only test: split by trial, never by sample."""
+
+from collections import Counter
 
 import numpy as np
 
@@ -40,6 +42,61 @@ def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> 
         recording.with_trials([trial for trial, held_out in trials if not held_out]),
         recording.with_trials([trial for trial, held_out in trials if held_out]),
     )
+
+
+TESTED = 0.15  # of all trials
+FEWEST_FITTED = 5  # trials that stay to be fitted; with fewer a test part would take what the fit needs
+
+
+def with_test_part(fitted: Recording, trials: int, seed: int = 0) -> tuple[Recording, Recording | None]:
+    """The trials to fit without some that only test: nothing is fitted to them and nothing chosen by them.
+
+    They come from the trials to fit, for those that choose are few already; of each kind at least one stays there.
+
+    Args:
+        fitted: trials to fit.
+        trials: how many the recording has in all.
+        seed: which ones.
+
+    Returns:
+        The trials to fit, and those to test by; None where there are too few.
+    """
+    kinds = Counter(trial.kind for trial in fitted.trials)
+    repeated = max(kinds.values()) > 1
+    count = min(max(1, round(TESTED * trials)), len(fitted.trials) - FEWEST_FITTED)
+    chosen: set[int] = set()
+    for index in np.random.default_rng([seed, 1]).permutation(len(fitted.trials)).tolist():
+        kind = fitted.trials[index].kind
+        if len(chosen) < count and (kinds[kind] > 1 or not repeated) and fitted.trials[index].valid.any():
+            chosen.add(index)
+            kinds[kind] -= 1
+    if not chosen:
+        return fitted, None
+    rows = list(enumerate(fitted.trials))
+    return (
+        fitted.with_trials([trial for index, trial in rows if index not in chosen]),
+        fitted.with_trials([trial for index, trial in rows if index in chosen]),
+    )
+
+
+def turned(fitted: Recording, held_out: Recording, parts: int = 3) -> list[tuple[Recording, Recording]]:
+    """Further divisions of the same trials, in which those to fit are held out in turn; of `parts` parts in all.
+
+    Whole initialisations are held out where the first division did so.
+    """
+    between = {trial.initialisation for trial in fitted.trials}
+    whole = len(between) > 1 and between.isdisjoint(trial.initialisation for trial in held_out.trials)
+    groups = [[t for t in fitted.trials if t.initialisation == k] for k in sorted(between)]
+    groups = groups if whole else [[trial] for trial in fitted.trials]
+    others = [[trial for group in groups[k :: parts - 1] for trial in group] for k in range(parts - 1)]
+    return [
+        (
+            fitted.with_trials([*held_out.trials, *(t for other in others if other is not part for t in other)]),
+            fitted.with_trials(part),
+        )
+        for part in others
+        if part
+    ]
 
 
 def _trials_of_each_kind(kinds: list[str], share: float, rng: np.random.Generator) -> list[bool]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.identification.in_words import (
+    PARTIAL,
     UNPROVEN,
     UNRELATED,
     common_offset,
@@ -65,8 +66,8 @@ def diagnosis_report(
     tone, said = VERDICTS[diagnosis["verdict"]]
     if diagnosis.get("unproven_effects"):
         said = UNPROVEN
-    elif headline(diagnosis) == UNRELATED:
-        said = UNRELATED
+    elif headline(diagnosis) in (PARTIAL, UNRELATED):
+        said = headline(diagnosis)
     units = before.recording.units
     sets = diagnosis.get("sets", [])
     names = sets_in_words(sets) if sets else _names(diagnosis["effects"], " and ")
@@ -177,9 +178,10 @@ def _tiles(diagnosis: Mapping[str, Any], unit: str) -> list[Tile]:
     errors = diagnosis["error"]
     tiles = [Tile(diagnosis["verdict"].replace("_", " "), "verdict", VERDICTS[diagnosis["verdict"]][0])]
     guessed = diagnosis.get("noise_floor_source") == "guess"
+    part = "test" if diagnosis.get("tested") else "held-out"
     for key, label in (
-        ("nominal", "held-out error as stated"),
-        ("with_effects", "held-out error with the recommended model"),
+        ("nominal", f"{part} error as stated"),
+        ("with_effects", f"{part} error with the recommended model"),
         (
             "noise_floor",
             "noise floor (sensor noise, a guess: no repeats)" if guessed else "noise floor (scatter of repeats)",

@@ -41,7 +41,8 @@ def staircase_section(
     bars = [(STAGES.get(key, key), 1e3 * v) for key, v in stages.items() if key != "noise_floor" and v is not None]
     floor = stages.get("noise_floor")
     caption = (
-        "RMS position error on trials that were held out from the fit; the dashed line is what noise alone would leave."
+        "RMS position error on trials that were held out from the fit (where there are enough, on trials "
+        "that nothing was chosen by either); the dashed line is what noise alone would leave."
     )
     blocks: list[Figure | Table] = [Figure(bar_chart(bars, unit, None if floor is None else 1e3 * floor), caption)]
     if joints:

@@ -1,4 +1,3 @@
-from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -8,7 +7,6 @@ from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, p_value
-from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.search import Search, pursued
 from tactile_cube.identification.search.shortlist import of_each, with_groups
@@ -28,36 +26,6 @@ def test_no_effect_is_crowded_out_by_variants_of_another(order: str, count: int,
     kept = of_each(pairs, count)  # type: ignore[arg-type]
     assert "".join(letter[candidate.effect.name] for candidate, _ in kept) == chosen
     assert [c.joints for c, _ in kept] == sorted(c.joints for c, _ in kept)
-
-
-class Rehearsal(Search):
-    """A search whose fits are known beforehand: what an effect leaves alone, and what the best pair with it leaves."""
-
-    def __init__(self, outcomes: dict[str, tuple[float, float]]) -> None:
-        self.outcomes, self.said, self.say = outcomes, [], lambda line: self.said.append(line)
-        self.fitted = SimpleNamespace(joints=("q1", "q2"))  # type: ignore[assignment]
-        self.left_behind = [(explanation(name, 9.0).effects[0], FIT) for name in outcomes]  # type: ignore[misc]
-
-    def finish(self, parent: Explanation, candidate: Candidate, refitted: object, judged: int) -> Explanation:
-        return explanation(candidate.effect.name, self.outcomes[candidate.effect.name][0], 300.0)
-
-    def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
-        error = self.outcomes[parent.effects[0].effect.name][1]
-        second = explanation("torque_saturation", error, parent.error)
-        return [replace(second, effects=(*parent.effects, *second.effects))]
-
-    def pruned(self, one: Explanation) -> Explanation:
-        return one
-
-
-def test_a_pair_is_found_through_the_effect_that_alone_looked_worse() -> None:
-    search = Rehearsal({"cogging": (200.0, 190.0), "nonlinear_drag": (150.0, 1.05), "viscous_friction": (180.0, 1.0)})
-    base = explanation("torque_bias", 300.0, 300.0)
-    base = replace(base, fit=replace(base.fit, cost=1.0))
-    (pair,) = search.second_thoughts(base)
-    assert [c.effect.name for c in pair.effects] == ["nonlinear_drag", "torque_saturation"]
-    assert len(search.said) == 2, "what comes after a pair at the noise is not tried"
-    assert search.second_thoughts(replace(base, fit=replace(base.fit, cost=0.0))) == (), "they leave too much alone"
 
 
 def test_the_simplest_of_equals_is_pursued_beside_the_best() -> None:

@@ -50,6 +50,12 @@ class Problem:
         gram = np.swapaxes(self._starts, 1, 2) @ self._starts
         self._inverse = np.asarray(np.linalg.inv(gram + np.eye(gram.shape[-1])), dtype=np.float64)
 
+    def chosen_numbers(self, model: Model) -> NDArray[np.int64]:
+        """How many numbers (G,) of each segment's start were chosen by the segment itself: see `beginnings`."""
+        first = np.zeros((len(self.windows), self.windows.segments), dtype=np.int64)
+        first[self.windows.time == 0.0, 0] = 2 * np.count_nonzero(self.shooting.gaps(model))
+        return np.asarray(first.ravel())
+
     def free(self, x: Array) -> Array:
         """Residuals or columns (G, R) or (G, R, P) with the starts integrated out."""
         wide = x if x.ndim == 3 else x[..., None]

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import wilcoxon
+from scipy.stats import rankdata, wilcoxon
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.measurement.comparing.joint_offsets import CORRELATED
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
+TRIALS = 1_000_000  # more than any part has: tells those of several parts apart
+FEWEST_BLOCKS = 5  # that a signed-rank test needs to come below 5 %
+FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
+NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,7 @@ class Judgement:
         samples: (G,) measured numbers in each.
         residual: (G, R) weighted.
         joint_errors: (n,) RMS error of each joint in units of the sensor noise.
+        trial: (G,) to which each belongs; segments of one trial follow each other in time.
     """
 
     model: Model
@@ -35,6 +42,7 @@ class Judgement:
     samples: Array
     residual: Array = field(repr=False)
     joint_errors: Array
+    trial: NDArray[np.int64]
 
     @property
     def error(self) -> float:
@@ -46,8 +54,31 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
     """Error of a model on held-out segments; only the joint offsets of unseen initialisations are fitted there."""
     fitted = fit(problem, model, offset_unknowns(held_out, problem.shooting.sizes), iterations=3)
     samples = np.count_nonzero(problem.weight, axis=1)
-    costs = problem.cost(fitted.residual)
-    return Judgement(fitted.model, costs, samples, fitted.residual, _joint_errors(problem, fitted.residual))
+    costs = charged(problem.cost(fitted.residual), samples, problem.chosen_numbers(fitted.model))
+    joints = _joint_errors(problem, fitted.residual)
+    return Judgement(fitted.model, costs, samples, fitted.residual, joints, problem.segment_trial)
+
+
+def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]) -> Array:
+    """Squared errors (G,) with a charge for numbers (G,) of a segment's start that were chosen by the segment itself.
+
+    Generalised cross-validation: of n independent numbers k choose, so what is left counts (n / (n - k))^2 times. What
+    is above the noise remembers itself, so that few of its samples are independent; what is noise is charged nothing.
+    Source: Golub, Heath, Wahba, Technometrics 21, 1979.
+    """
+    independent = np.maximum(samples / CORRELATED, numbers + 1.0)
+    excess = np.maximum(costs - samples, 0.0)
+    return np.asarray(costs + excess * ((independent / (independent - numbers)) ** 2 - 1.0))
+
+
+def all_of(judgements: Sequence[Judgement]) -> Judgement:
+    """What several held-out parts say together; model and residual are those of the first."""
+    first = judgements[0]
+    samples = np.array([one.samples.sum() for one in judgements])
+    trial = np.concatenate([one.trial + place * TRIALS for place, one in enumerate(judgements)])
+    squares = np.average([one.joint_errors**2 for one in judgements], axis=0, weights=samples)
+    costs, counts = (np.concatenate([getattr(one, key) for one in judgements]) for key in ("costs", "samples"))
+    return Judgement(first.model, costs, counts, first.residual, np.sqrt(squares), trial)
 
 
 def _joint_errors(problem: Problem, residual: Array) -> Array:
@@ -69,17 +100,56 @@ def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> b
     The difference has to stand out of its scatter from segment to segment, and to be more than a part of what the
     better model leaves unexplained itself: that much a law may differ in detail from the real thing.
     """
-    difference = (other.costs - best.costs)[best.samples > 0]
+    difference = other.costs - best.costs
     unexplained = max(float(best.costs.sum() - best.samples.sum()), 0.0)
     if difference.sum() <= criteria.clear + criteria.large_gain * unexplained:
         return False
-    scatter = float(difference.std(ddof=1)) * np.sqrt(len(difference)) if len(difference) > 1 else np.inf
-    return bool(difference.sum() > criteria.stands_out * scatter or p_value(other, best) < criteria.significant_if_most)
+    blocks = in_blocks(difference, best)
+    scatter = float(blocks.std(ddof=1)) * np.sqrt(len(blocks)) if len(blocks) > 1 else np.inf
+    return bool(blocks.sum() > criteria.stands_out * scatter or p_value(other, best) < criteria.significant_if_most)
 
 
 def p_value(before: Judgement, after: Judgement) -> float:
-    """Probability of such paired differences if the second model were no better (Wilcoxon, one-sided)."""
-    difference = (before.costs - after.costs)[before.samples > 0]
-    if len(difference) < 5 or not np.any(difference):
+    """Probability of such paired differences if the second model were no better (Wilcoxon, one-sided).
+
+    What is paired are blocks of segments as long as the differences remember themselves.
+    """
+    difference = in_blocks(before.costs - after.costs, after)
+    if len(difference) < FEWEST_BLOCKS or not np.any(difference):
         return 1.0
     return float(wilcoxon(difference, alternative="greater").pvalue)
+
+
+def in_blocks(difference: Array, judged: Judgement) -> Array:
+    """Sums (B,) of differences (G,) over neighbouring segments of a trial, as many as their correlation is long."""
+    counted = judged.samples > 0
+    difference, trial = difference[counted], judged.trial[counted]
+    length = correlation_length(difference, trial)
+    if length == 1:
+        return difference
+    sums = [np.add.reduceat(part, np.arange(0, len(part), length)) for part in _by_trial(difference, trial)]
+    return np.concatenate(sums)
+
+
+def correlation_length(difference: Array, trial: NDArray[np.int64]) -> int:
+    """How many neighbouring differences (G,) say as much as one: 1 + 2 x the sum of their autocorrelation.
+
+    Of ranks, as the test takes them, so that a single huge one does not hide it; up to the first lag at which it cannot
+    be told from none. Source: Geyer, Practical Markov chain Monte Carlo, Statistical Science 7, 1992.
+    """
+    ranks = rankdata(difference) - 0.5 * (len(difference) + 1)
+    variance = float(np.mean(ranks**2)) if len(ranks) else 0.0
+    length = 1.0
+    for lag in range(1, len(ranks) // FEWEST_BLOCKS):
+        same = trial[lag:] == trial[:-lag]
+        if variance == 0.0 or np.count_nonzero(same) < FEWEST_PAIRS:
+            break
+        correlation = float(np.mean((ranks[lag:] * ranks[:-lag])[same])) / variance
+        if correlation < NORMAL_95 / np.sqrt(np.count_nonzero(same)):
+            break
+        length += 2.0 * correlation
+    return int(np.ceil(length))
+
+
+def _by_trial(values: Array, trial: NDArray[np.int64]) -> list[Array]:
+    return np.split(values, np.flatnonzero(np.diff(trial)) + 1)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from tactile_cube.identification.fitting.gauss_newton import Fit
+from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.evidence import Judgement
 
@@ -52,3 +54,11 @@ class Explanation:
     def explained(self, base: Explanation) -> float:
         """Share of the base model's excess over the sensor noise that is explained."""
         return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
+
+
+def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Model:
+    """A fitted model, whose last terms are those of `effects`, without one of them."""
+    known = len(model.terms) - sum(len(candidate.joints) for candidate in effects)
+    first = known + sum(len(candidate.joints) for candidate in effects[:place])
+    last = first + len(effects[place].joints)
+    return replace(model, terms=(*model.terms[:first], *model.terms[last:]))

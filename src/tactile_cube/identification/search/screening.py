@@ -45,17 +45,24 @@ class Screen:
         expected = temper(problem, base.cost) * precision(base.unknowns)
         self.information = base.information + np.diag(expected)
         offset = [(u.of(base.model) - u.centre) / u.scale for u in base.unknowns]
-        self.pull = np.einsum("grp,gr->p", base.columns, self.residual, optimize=True) - expected * np.array(offset)
+        self.gradient = np.einsum("grp,gr->p", base.columns, self.residual, optimize=True) - expected * np.array(offset)
 
     def column(self, prediction: Array) -> Array:
         """Change of the weighted prediction (G, R) that an effect makes."""
         return np.asarray(self.problem.limited(prediction - self.prediction) * self.problem.weight)
 
-    def terms(self, column: Array) -> tuple[float, float, Array]:
-        """Pull on a column, its own size, and its products with the base columns (P,)."""
-        freed = self.problem.free(column)
-        cross = np.einsum("grp,gr->p", self.free_columns, column, optimize=True)
-        return float(np.sum(column * self.residual)), float(np.sum(column * freed)), cross
+    def alone(self, column: Array) -> tuple[float, float, float]:
+        """Gradient of a column, its size beside the base columns, and its size without them."""
+        gradient, gram = self.products(column[..., None])
+        return float(gradient[0]), float(gram[0, 0]), float(np.sum(column * self.problem.free(column)))
+
+    def products(self, columns: Array) -> tuple[Array, Array]:
+        """Gradient (C,) and products (C, C) of columns (G, R, C), with the base columns projected out."""
+        cross = np.einsum("grp,grc->pc", self.free_columns, columns, optimize=True)
+        solved = np.linalg.solve(self.information, cross)
+        gram = np.einsum("grc,grd->cd", columns, self.problem.free(columns), optimize=True) - cross.T @ solved
+        gradient = np.einsum("grc,gr->c", columns, self.residual, optimize=True) - solved.T @ self.gradient
+        return np.asarray(gradient), np.asarray(gram)
 
 
 def screen(problem: Problem, base: Fit, wanted: Sequence[Candidate], batch: int = 24) -> list[Score]:
@@ -68,15 +75,12 @@ def screen(problem: Problem, base: Fit, wanted: Sequence[Candidate], batch: int 
         batch: candidates simulated at once, which bounds the memory.
     """
     view = Screen(problem, base)
-    solved = np.linalg.solve(view.information, view.pull)
     scores = []
     for first in range(0, len(wanted), batch):
         part = list(wanted[first : first + batch])
         models = [candidate.added_to(base.model)[0] for candidate in part]
         for candidate, model, prediction in zip(part, models, problem.predictions(models), strict=True):
-            pull, size, cross = view.terms(view.column(prediction))
-            left = size - float(cross @ np.linalg.solve(view.information, cross))
-            pull -= float(cross @ solved)
-            factor = pull / left if left > 1e-6 * size and size > 1e-3 else 0.0
-            scores.append(Score(candidate, model, factor * pull, factor))
+            gradient, left, size = view.alone(view.column(prediction))
+            factor = gradient / left if left > 1e-6 * size and size > 1e-3 else 0.0
+            scores.append(Score(candidate, model, factor * gradient, factor))
     return sorted(scores, key=lambda score: -score.gain)

@@ -1,0 +1,135 @@
+"""Trials to fit and trials to judge by: a model fitted on the ones and judged on the others."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.identification.fitting.base import base_unknowns, nominal_model
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
+from tactile_cube.identification.fitting.model import Model, Unknown
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.windows import Windows, cut
+from tactile_cube.identification.search.candidates import Candidate, model_unknowns
+from tactile_cube.identification.search.evidence import Judgement, judge
+from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.measurement.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
+SEGMENTS = 132  # enough data to search on, 52.8 s of a finger; the final fit takes all
+
+
+class Division:
+    """A recording's trials divided in two.
+
+    Attributes:
+        shooting: simulates both parts.
+        fitted: the trials to fit.
+        held_out: the trials to judge by.
+        start: the model to begin with, of the trials to fit; `start_held_out` of the others.
+        all_windows: of the trials to fit; `problem` takes as many of them as a search needs.
+        judges: the problem of the trials to judge by.
+        offsets: joint offsets of all initialisations that are known by now [rad].
+    """
+
+    def __init__(
+        self,
+        shooting: Shooting,
+        fitted: Recording,
+        held_out: Recording,
+        noise: Array,
+        segment: int | None = None,
+        known: ModelFile | None = None,
+    ) -> None:
+        """Prepare the problems.
+
+        Args:
+            shooting: with all effects compiled in.
+            fitted: trials to fit.
+            held_out: trials to judge by.
+            noise: (n,) of the position sensors [rad].
+            segment: rows of a segment; as long as identification likes them by default.
+            known: the model to begin with; None: what the recording's owner states.
+        """
+        self.shooting, self.fitted, self.held_out = shooting, fitted, held_out
+        self.noise, self.segment, self.known = noise, segment, known
+        self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
+        self.all_windows = self.windows(fitted)
+        self.problem = Problem(shooting, some(self.all_windows, SEGMENTS))
+        self.judges = Problem(shooting, some(self.windows(held_out), SEGMENTS))
+        self.offsets = dict(self.start_held_out.offsets)
+
+    def windows(self, recording: Recording) -> Windows:
+        """Other trials cut likewise."""
+        return cut(recording, self.noise, segment=self.segment, time=self.shooting.time)
+
+    def fit_base(self) -> Explanation:
+        """Refit what the model already has."""
+        self.problem.linearise_starts(self.start)
+        first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
+        self.problem.linearise_starts(first.model)
+        second = fit(self.problem, first.model, first.unknowns, iterations=3)
+        judgement = self.judged(second.model)
+        self.offsets = dict(judgement.model.offsets)
+        return Explanation((), second, judgement, 1.0, 0.0)
+
+    def unknowns(self, model: Model) -> tuple[Unknown, ...]:
+        """Everything that a refit of the model may change."""
+        sizes = self.shooting.sizes
+        return (*base_unknowns(self.fitted, self.start.constants, sizes), *model_unknowns(model, sizes))
+
+    def with_known_offsets(self, model: Model) -> Model:
+        """The model with joint offsets for the initialisations that it has not seen."""
+        return Model(model.constants, model.terms, {**self.offsets, **model.offsets})
+
+    def frozen(self, fitted: Fit) -> Fit:
+        """A fit with its residual and columns taken anew on this problem, to build on."""
+        self.problem.linearise_starts(fitted.model)
+        prediction, columns = self.problem.columns(fitted.model, fitted.unknowns)
+        return renewed(self.problem, fitted, prediction, columns)
+
+    def refit(
+        self, frozen: Fit, candidate: Candidate, iterations: int = 6, model: Model | None = None
+    ) -> tuple[Candidate, Fit]:
+        """Fit a candidate's numbers beside the frozen columns of its parent, started from `model` or the parent's."""
+        model, unknowns = candidate.added_to(model or frozen.model)
+        return candidate, fit(self.problem, model, unknowns, iterations, frozen=frozen)
+
+    def continued(self, frozen: Fit, fitted: Fit) -> Fit:
+        """The same fit for longer."""
+        return fit(self.problem, fitted.model, fitted.unknowns[len(frozen.unknowns) :], LONG, frozen)
+
+    def refitted(self, model: Model) -> Fit:
+        """A model with everything that it has fitted."""
+        self.problem.linearise_starts(model)
+        return fit(self.problem, model, self.unknowns(model), LONG)
+
+    def over_noise(self, fitted: Fit) -> float:
+        """RMS error of a fit in units of the sensor noise."""
+        return float(np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)))
+
+    def judged(self, model: Model) -> Judgement:
+        """How a model does on the held-out trials."""
+        found = self.with_known_offsets(model)
+        self.judges.linearise_starts(found)
+        return judge(self.judges, self.held_out, found)
+
+    def settled(self, model: Model) -> tuple[Fit, Judgement]:
+        """A model with everything refitted, and how it does on the held-out trials."""
+        fitted = self.refitted(model)
+        return fitted, self.judged(fitted.model)
+
+
+def some(windows: Windows, segments: int) -> Windows:
+    """Windows of about so many segments, spread over trials and over the time within trials."""
+    by_trial = [np.flatnonzero(windows.trial == k) for k in np.unique(windows.trial)]
+    order = [
+        int(rows[(turn + k) % len(rows)])
+        for turn in range(max(len(rows) for rows in by_trial))
+        for k, rows in enumerate(by_trial)
+        if turn < len(rows)
+    ]
+    return windows.take(np.array(sorted(order[: -(-segments // windows.segments)])))

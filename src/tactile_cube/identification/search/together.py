@@ -1,0 +1,182 @@
+"""A search from everything at once: sets of effects proposed by their fit alone, pruned, judged on trials held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tactile_cube.identification.criteria import Criteria
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.search.division import BRIEF, Division
+from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
+from tactile_cube.identification.search.explanation import Explanation, without_effect
+from tactile_cube.identification.search.residual_starts import residual_candidates
+from tactile_cube.identification.search.simplicity import named_by
+from tactile_cube.identification.search.subsets import best_subsets, candidate_columns
+
+if TYPE_CHECKING:
+    from tactile_cube.identification.search.search import Search
+
+MOST = 4  # effects in a set; one more than are looked for one by one, for pruning takes back what was too much
+REFITTED = 6  # sets of each size that are refitted briefly, of which the best ones go on
+KEPT = 2  # sets that are grown further
+JUDGED = 4  # sets that the held-out trials are asked about
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A set of effects and how it fits; no held-out trial has been asked.
+
+    Attributes:
+        effects: in the order in which they came.
+        fit: of everything together.
+    """
+
+    effects: tuple[Candidate, ...]
+    fit: Fit = field(repr=False)
+
+    def price(self, criteria: Criteria) -> float:
+        """Squared error, with as much for each number as an effect has to explain at least."""
+        return float(self.fit.cost / (1.0 - criteria.least_gain) ** sum(one.size for one in self.effects))
+
+
+class Together:
+    """The search from everything at once, beside one that adds effects one by one.
+
+    Effects that help only together are never found one by one, for the first of them alone is no gain. So sets grow
+    here by their fit alone, by one effect or two at a time; what the held-out trials are asked about is the end of it:
+    few sets, pruned of all that they do not need. Where a single division leaves too few segments to tell, every part
+    of the trials is held out in turn (cross-validation), and all of them judge.
+    """
+
+    def __init__(self, search: Search, base: Explanation, folds: Sequence[Division]) -> None:
+        """Take what is known from the search one by one.
+
+        Args:
+            search: the recording and its effects.
+            base: the refitted base model.
+            folds: further divisions of the same trials; may be none.
+        """
+        self.search, self.base, self.criteria = search, base, search.criteria
+        self.folds, few = list(folds), (base.judgement.samples > 0).sum() < search.criteria.few_segments
+        self.folds = self.folds if few else []
+        others = [fold.fit_base().judgement for fold in self.folds]
+        self.base_evidence = all_of([base.judgement, *others])
+
+    def run(self, leaders: Sequence[Proposal], best: Explanation) -> tuple[Explanation, ...]:
+        """Sets that earn their place, best first; empty unless they are clearly better than the best one known.
+
+        Args:
+            leaders: single effects that fit best.
+            best: what the search one by one came to; the base model if nothing.
+        """
+        self.search.say(f"far from the noise; which effects together? {1 + len(self.folds)} division(s) of the trials")
+        proposals = [one for one in self.proposals(leaders) if one.effects][:JUDGED]
+        judged = [self.pruned(one, self.evidence(one.fit.model)) for one in proposals]
+        known = self.evidence(best.fit.model) if best.effects else self.base_evidence
+        found: dict[frozenset[tuple[str, str]], tuple[Explanation, Judgement]] = {}
+        for one, evidence in judged:
+            explanation = self.explanation(one, evidence, len(proposals))
+            if self.search.worthwhile(explanation, self.base, self.base) and worse(known, evidence, self.criteria):
+                found.setdefault(named_by(one.effects), (explanation, evidence))
+        ordered = sorted(found.values(), key=lambda pair: pair[1].costs.sum())
+        return tuple(one for one, evidence in ordered if not worse(evidence, ordered[0][1], self.criteria))
+
+    def proposals(self, leaders: Sequence[Proposal]) -> list[Proposal]:
+        """Sets by their fit, grown as long as that pays."""
+        kept = self.best([*leaders, *self.grown(Proposal((), self.base.fit), sizes=(2,))])
+        grown = kept
+        while grown:
+            grown = [one for parent in grown[:KEPT] for one in self.grown(parent, sizes=(1, 2))]
+            grown = [one for one in self.best(grown) if one.price(self.criteria) < kept[0].price(self.criteria)]
+            kept = self.best([*kept, *grown])
+        return kept
+
+    def best(self, proposals: Sequence[Proposal]) -> list[Proposal]:
+        """The cheapest of those that name the same effects, cheapest first."""
+        cheapest: dict[frozenset[tuple[str, str]], Proposal] = {}
+        for one in sorted(proposals, key=lambda one: one.price(self.criteria)):
+            cheapest.setdefault(named_by(one.effects), one)
+        return list(cheapest.values())
+
+    def grown(self, parent: Proposal, sizes: Sequence[int]) -> list[Proposal]:
+        """A set with one or two effects more: the sets that promise most refitted, the best of them in full."""
+        search, problem = self.search, self.search.problem
+        sizes = [size for size in sizes if len(parent.effects) + size <= MOST]
+        if not sizes:
+            return []
+        frozen = search.frozen(parent.fit)
+        there = named_by(parent.effects)
+        wanted = [*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)]
+        wanted = [one for one in search.new(wanted) if there.isdisjoint(named_by([one]))]
+        columns, brief = candidate_columns(problem, frozen, wanted), []
+        for chosen in (one for size in sizes for one in best_subsets(columns, size)[:REFITTED]):
+            model = with_effects(frozen.model, chosen.candidates)
+            own = search.unknowns(model)[len(frozen.unknowns) :]
+            brief.append(Proposal((*parent.effects, *chosen.candidates), fit(problem, model, own, BRIEF, frozen)))
+        leading = self.best(brief)[:KEPT]
+        full = [replace(one, fit=search.refitted(one.fit.model)) for one in leading]
+        for one in full:
+            search.say(f"  {search.over_noise(one.fit):8.3f}  {' & '.join(c.label for c in one.effects)}")
+        return full
+
+    def evidence(self, model: Model) -> Judgement:
+        """How a model does on the held-out trials of all divisions, refitted in each."""
+        folds = [fold.settled(fold.with_known_offsets(model))[1] for fold in self.folds]
+        return all_of([self.search.settled(model)[1], *folds])
+
+    def pruned(self, proposal: Proposal, evidence: Judgement) -> tuple[Proposal, Judgement]:
+        """As simple as the held-out trials allow: without an effect, or with a special case of its law instead.
+
+        Which effect is needed least, and which special case does best, the fit says; the held-out trials say whether.
+        """
+        places = range(len(proposal.effects) if len(proposal.effects) > 1 else 0)
+        without = [self.without(proposal, place) for place in places]
+        for simpler in (without, self.special(proposal)):
+            if simpler:
+                next_one = min(simpler, key=lambda one: one.fit.cost)
+                less = self.evidence(next_one.fit.model)
+                if not worse(less, evidence, self.criteria):
+                    return self.pruned(next_one, less)
+        return proposal, evidence
+
+    def without(self, proposal: Proposal, place: int) -> Proposal:
+        """The set without one of its effects, refitted."""
+        model = without_effect(proposal.fit.model, proposal.effects, place)
+        left = proposal.effects[:place] + proposal.effects[place + 1 :]
+        return Proposal(left, self.search.refitted(model))
+
+    def special(self, proposal: Proposal) -> list[Proposal]:
+        """The set with one of its effects exchanged for one that its law contains, refitted."""
+        found = []
+        for place, effect in enumerate(proposal.effects):
+            simpler = [
+                one
+                for one in self.search.candidates
+                if one.effect.name in effect.effect.contains and one.joints == effect.joints and one.size < effect.size
+            ]
+            if not simpler:
+                continue
+            frozen = self.without(proposal, place)
+            for one in simpler:
+                model, _ = one.added_to(frozen.fit.model)
+                found.append(Proposal((*frozen.effects, one), self.search.refitted(model)))
+        return found
+
+    def explanation(self, one: Proposal, evidence: Judgement, judged: int) -> Explanation:
+        """A set with its evidence, of which so many sets are judged."""
+        corrected = min(1.0, p_value(self.base_evidence, evidence) * judged)
+        own = self.search.judged(one.fit.model)
+        found = Explanation(one.effects, one.fit, own, corrected, gain(self.base_evidence, evidence))
+        self.search.say(f"  held-out error {evidence.error:.3f}  p {corrected:.1e}  {found.label}")
+        return found
+
+
+def with_effects(model: Model, candidates: Sequence[Candidate]) -> Model:
+    """The model with all of them at their starts."""
+    for candidate in candidates:
+        model, _ = candidate.added_to(model)
+    return model

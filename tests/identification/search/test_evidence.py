@@ -1,0 +1,50 @@
+"""Significance over blocks as long as the differences remember themselves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_cube.identification.search.evidence import charged, correlation_length, in_blocks, p_value
+from tests.identification.test_verdict import judged
+
+
+def remembering(length: int, count: int = 600, seed: int = 0) -> np.ndarray:
+    """Noise of which so many neighbours are the same."""
+    return np.repeat(np.random.default_rng(seed).normal(size=count // length), length)
+
+
+@pytest.mark.parametrize("length", [1, 4, 8])
+def test_the_length_of_a_correlation_is_found(length: int) -> None:
+    found = correlation_length(remembering(length), np.arange(600) // 100)
+    assert 0.6 * length <= found <= 1.5 * length
+
+
+def test_one_trial_does_not_remember_another() -> None:
+    levels = np.repeat(np.random.default_rng(0).normal(size=60), 10)
+    assert correlation_length(levels, np.arange(600)) == 1
+
+
+def test_the_same_difference_many_times_is_no_proof() -> None:
+    before = judged(2.0)
+    six = np.repeat([1.0, 0.8, 1.2, 0.9, -0.2, 1.1], 10) * 20.0
+    slow = replace(before, costs=before.costs - six, trial=np.zeros(60, dtype=np.int64))
+    fast = replace(slow, costs=before.costs - np.random.default_rng(1).permutation(six))
+    assert p_value(before, fast) < 1e-6
+    assert p_value(before, slow) > 1e-3
+
+
+def test_blocks_keep_the_sum_and_do_not_cross_trials() -> None:
+    one = replace(judged(2.0), trial=np.arange(60) // 15)
+    difference = np.repeat([3.0, -1.0, 2.0, 0.5], 15) + np.random.default_rng(0).normal(size=60) * 0.01
+    blocks = in_blocks(difference, one)
+    assert blocks.sum() == pytest.approx(difference.sum())
+    assert 4 <= len(blocks) < 20
+
+
+def test_numbers_that_a_segment_chose_for_itself_are_charged_above_the_noise_alone() -> None:
+    samples, numbers = np.full(3, 400), np.array([0, 2, 2])
+    found = charged(np.array([4000.0, 4000.0, 390.0]), samples, numbers)
+    assert found[0] == 4000.0
+    assert found[1] == pytest.approx(400.0 + 3600.0 * (8.0 / 6.0) ** 2), "eight of 400 samples are independent"
+    assert found[2] == 390.0

@@ -1,0 +1,136 @@
+"""The search from everything at once, with fits and held-out costs that are made up."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.criteria import STANDARD
+from tactile_cube.identification.fitting.model import Model, Term
+from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.evidence import Judgement, all_of
+from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.screening import Score
+from tactile_cube.identification.search.subsets import Columns, best_subsets, possible
+from tactile_cube.identification.search.together import Proposal, Together
+from tests.identification.test_verdict import FIT, MODEL, judged
+
+
+def candidate(name: str) -> Candidate:
+    effect = find_effect(name)
+    return Candidate(effect, ("q1",), forms(effect)[0])
+
+
+def columns(names: list[str], gradient: list[float], gram: list[list[float]]) -> Columns:
+    scores = [Score(candidate(name), MODEL, 0.0, 1.0) for name in names]
+    return Columns(scores, np.array(gradient), np.array(gram))
+
+
+def test_two_effects_that_help_only_together_are_the_best_pair() -> None:
+    # the residual is the small difference of two large columns: each alone is nearly at right angles to it
+    names = ["viscous_friction", "reflected_inertia", "torque_bias"]
+    first, second, third = np.array([1.0, 0.0, 0.0]), np.array([-0.98, 0.2, 0.0]), np.array([0.0, 0.3, 1.0])
+    residual, stacked = np.array([0.02, 0.2, 0.0]), np.stack([first, second, third])
+    looked_at = columns(names, list(stacked @ residual), (stacked @ stacked.T).tolist())
+    single, pair = best_subsets(looked_at, 1)[0], best_subsets(looked_at, 2)[0]
+    assert single.gain < 0.5 * pair.gain
+    assert {one.effect.name for one in pair.candidates} == {"viscous_friction", "reflected_inertia"}
+    assert pair.gain == pytest.approx(float(residual @ residual), rel=1e-6)
+
+
+def test_a_friction_that_would_have_to_drive_the_joint_is_in_no_set() -> None:
+    names = ["coulomb_friction", "torque_gain"]
+    found = best_subsets(columns(names, [-3.0, -2.0], [[10.0, 0.0], [0.0, 10.0]]), 1)
+    assert [one.candidates[0].effect.name for one in found] == ["torque_gain"]
+    assert not possible(candidate("coulomb_friction"), -0.5)
+    assert possible(candidate("torque_gain"), -0.5)
+
+
+ERRORS = {
+    frozenset(): 20.0,
+    frozenset({"viscous_friction"}): 15.0,
+    frozenset({"position_torque"}): 19.0,
+    frozenset({"viscous_friction", "position_torque"}): 5.0,
+    frozenset({"viscous_friction", "position_torque", "cogging"}): 4.999,
+}
+
+
+class MadeUp:
+    """A division of the trials in which the error follows from the names of a model's effects."""
+
+    def __init__(self, seed: int = 0, chance: bool = False) -> None:
+        self.seed, self.chance, self.candidates = seed, chance, []
+        self.criteria, self.said = STANDARD, []
+        self.say = self.said.append
+        self.worthwhile = lambda one, *_: one.p_value < STANDARD.significant_if_large
+
+    def refitted(self, model: Model) -> object:
+        return replace(FIT, model=model, cost=ERRORS.get(names(model), 20.0) ** 2)
+
+    def judged(self, model: Model) -> Judgement:
+        if not self.chance:
+            return judged(ERRORS.get(names(model), 20.0), self.seed)
+        return judged(20.0, self.seed + 10 * len(model.terms))
+
+    def settled(self, model: Model) -> tuple[object, Judgement]:
+        return self.refitted(model), self.judged(model)
+
+    def with_known_offsets(self, model: Model) -> Model:
+        return model
+
+    def fit_base(self) -> Explanation:
+        return Explanation((), replace(FIT, cost=400.0), self.judged(MODEL), 1.0, 0.0)
+
+
+def names(model: Model) -> frozenset[str]:
+    return frozenset(term.effect.name for term in model.terms)
+
+
+class Proposed(Together):
+    """With proposals as given."""
+
+    def proposals(self, leaders: object) -> list[Proposal]:
+        effects = tuple(candidate(name) for name in ("viscous_friction", "cogging", "position_torque"))
+        terms = tuple(Term(one.effect, "q1", dict(one.form), tuple(one.form)) for one in effects)
+        model = Model({}, terms, {})
+        return [Proposal(effects, replace(FIT, model=model, cost=ERRORS.get(names(model), 20.0) ** 2))]
+
+
+def found(search: MadeUp, folds: list[MadeUp]) -> tuple[Explanation, ...]:
+    base = search.fit_base()
+    return Proposed(search, base, folds).run([], base)  # type: ignore[arg-type]
+
+
+def test_a_set_is_pruned_of_what_the_held_out_trials_do_not_ask_for() -> None:
+    (one,) = found(MadeUp(), [])
+    assert [c.effect.name for c in one.effects] == ["viscous_friction", "position_torque"]
+    assert one.gain == pytest.approx(1.0 - 25.0 / 400.0, rel=1e-6)
+
+
+def test_a_set_that_chance_makes_is_no_answer() -> None:
+    assert found(MadeUp(chance=True), []) == ()
+
+
+def test_where_segments_are_few_all_parts_of_the_trials_judge() -> None:
+    search, folds = MadeUp(), [MadeUp(1), MadeUp(2)]
+    assert len(Proposed(search, search.fit_base(), folds).base_evidence.costs) == 60, "60 segments are enough"
+    few = replace(search.fit_base().judgement, samples=np.where(np.arange(60) < 17, 100, 0))
+    base = replace(search.fit_base(), judgement=few)
+    assert len(Proposed(search, base, folds).base_evidence.costs) == 180  # type: ignore[arg-type]
+
+
+def test_parts_that_judge_together_keep_their_trials_apart() -> None:
+    both = all_of([judged(2.0), judged(4.0, 1)])
+    assert both.error == pytest.approx(np.sqrt(10.0), rel=1e-6)
+    assert len(np.unique(both.trial)) == 12
+    assert both.joint_errors[0] == pytest.approx(np.sqrt(10.0))
+
+
+def test_a_set_in_the_price_of_which_each_number_counts() -> None:
+    plain, rich = candidate("coulomb_friction"), candidate("position_torque")
+    one = Proposal((plain,), SimpleNamespace(cost=100.0))  # type: ignore[arg-type]
+    assert one.price(STANDARD) == pytest.approx(100.0 / 0.96)
+    two = Proposal((plain, rich), SimpleNamespace(cost=97.0))  # type: ignore[arg-type]
+    assert two.price(STANDARD) > one.price(STANDARD)
