@@ -1,6 +1,6 @@
 """Published measurements of real machines through the whole loop: import, diagnose, and judge on data never fitted.
 
-    python examples/real_data.py data    # folder with bam_xl330/, shadow_lfj3/ and so101_sage/ (docs/recordings.md)
+    python examples/real_data.py data    # folder with bam_xl330/, dfki_pendulum/, shadow_lfj3/, so101_sage/ (docs/recordings.md)
 
 Writes outputs/real_data/real_data.json and a table; a stage whose result is there already is left out.
 """
@@ -20,7 +20,10 @@ SOURCES = {
     "so101_rotation": ["source=so101_sage", "source.folder={data}/so101_sage", "source.joint=Rotation"],
     "bam_xl330": ["source=bam_xl330", "source.file={data}/bam_xl330/xl330.npz"],
     "shadow_lfj3": ["source=shadow_lfj3", "source.file={data}/shadow_lfj3/lfj3_openloop.npz"],
+    "dfki_pendulum": ["source=dfki_pendulum", "source.file={data}/dfki_pendulum/dfki_pendulum.npz"],
 }
+CHANGED = {"dfki_heavier": ("dfki_pendulum", "heavier")}
+"""Recordings after something was changed at a machine: diagnosed from the model that was found before."""
 NAMED = {
     "bam_xl330": ["load_dependent_friction@servo", "torque_saturation@servo"],
     "shadow_lfj3": ["viscous_friction@LFJ3", "position_torque@LFJ3", "actuator_lag@LFJ3"],
@@ -55,11 +58,25 @@ def loop(name: str, data: Path, out: Path) -> dict[str, Any]:
         words = [f"recording={recording / 'validation'}", f"model={model}", "band.simulations=0", "rerun=false"]
         stage("compare", compared, *words)
         validation[label] = json.loads(compared.read_text())["error"]["overall"]
+    return answer(diagnosed) | {"validation": validation}
+
+
+def changed(before: str, part: str, name: str, out: Path) -> dict[str, Any]:
+    """The diagnosis of a machine that was changed, beginning with the model of the one before."""
+    recording, diagnosed = out / before / "recording" / part, out / name / "diagnose"
+    model = out / before / "diagnose" / "model.yaml"
+    stage("diagnose", diagnosed / "diagnosis.json", f"recording={recording}", f"model={model}")
+    return answer(diagnosed) | {"validation": {}}
+
+
+def answer(diagnosed: Path) -> dict[str, Any]:
+    """What a diagnosis answers and the errors of its test part [rad]."""
     diagnosis = json.loads((diagnosed / "diagnosis.json").read_text())
-    kept = {key: diagnosis[key] for key in ("verdict", "effects", "error", "noise_floor_source", "held_out")}
+    keys = ("verdict", "effects", "error", "error_part", "noise_floor_source", "held_out", "tested", "seconds")
+    kept = {key: diagnosis[key] for key in keys}
     partial = diagnosis.get("partial_effects", [])
     ceilings = {one["joint"]: one["black_box"] for one in diagnosis["unexplained"]}
-    return kept | {"partial_effects": partial, "black_box": ceilings, "validation": validation}
+    return kept | {"partial_effects": partial, "black_box": ceilings}
 
 
 def main() -> None:
@@ -69,6 +86,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("outputs/real_data"))
     given = parser.parse_args()
     results = {name: loop(name, given.data, given.out) for name in SOURCES}
+    results |= {name: changed(*before, name, given.out) for name, before in CHANGED.items()}
     (given.out / "real_data.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
     for name, one in results.items():
         errors = ", ".join(f"{label} {1e3 * error:.3g} mrad" for label, error in one["validation"].items())
