@@ -1,6 +1,6 @@
 """Published measurements of real machines through the whole loop: import, diagnose, and judge on data never fitted.
 
-    python examples/real_data.py data    # folder with bam_xl330/, dfki_pendulum/, shadow_lfj3/, so101_sage/ (docs/recordings.md)
+    python examples/real_data.py data    # folder with the data sets (docs/recordings.md)
 
 Writes outputs/real_data/real_data.json and a table; a stage whose result is there already is left out.
 """
