@@ -64,6 +64,7 @@ class MadeUp:
         self.seed, self.chance, self.candidates = seed, chance, []
         self.criteria, self.said = STANDARD, []
         self.say = self.said.append
+        self.new = lambda candidates: candidates
         self.worthwhile = lambda one, *_: one.p_value < STANDARD.significant_if_large
 
     def refitted(self, model: Model) -> object:

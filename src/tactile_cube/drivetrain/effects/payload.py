@@ -27,6 +27,15 @@ class Payload(Effect):
         (form,) = super().forms_at(scales)
         return [{"mass": form["mass"]} if scales.slides else form]
 
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Little mass more or less, and as much as a tool: half the link's own, as far out as that.
+
+        From a few per cent a fit does not arrive at a mass several times the link's: the torque's gain is nearer.
+        """
+        tool = {"mass": 0.5 * scales.mass} if scales.slides else {"mass": 0.5 * scales.mass, "distance": scales.lever}
+        return [*super().starts_at(scales), tool]
+
     @staticmethod
     def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102
         chain, link = place.chain, place.outermost

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.scales import Scales
-from tactile_cube.drivetrain.model_file import EffectEstimate, ModelFile
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.identification.fitting.model import Model, Term, Unknown
 from tactile_cube.measurement.comparing.joint_offsets import LARGEST_OFFSET
 from tactile_cube.measurement.recordings.recording import Recording
@@ -30,7 +30,11 @@ CREEP, CREEP_SPREAD, LARGEST_CREEP = 0.05, 0.1, 1.0  # [rad/s per N m] where fri
 
 
 def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model:
-    """What the recording's owner states, or what is known since; of effects, numbers with an interval are free."""
+    """What the recording's owner states, or what is known since; of effects, numbers with an interval are free.
+
+    They are expected where they were found, and twice as far from there as the interval says: a machine changes between
+    two recordings. Else what was found on one would soak up what is new in another.
+    """
     constants = nominal_parameters(recording, known).constants
     terms = tuple(term for one in (known.drive_effects if known else ()) for term in _terms(one, recording))
     return Model(
@@ -41,10 +45,15 @@ def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model
 def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:
     given = {name: estimate.value for name, estimate in one.parameters.items()}
     free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
+    expected = {name: (one.parameters[name].value, _half_width(one.parameters[name])) for name in free}
     return [
-        Term(effect, joint, effect(joint, **given).values, free)
+        Term(effect, joint, effect(joint, **given).values, free, expected)
         for effect, joint in resolve([one.effect], recording.joints)
     ]
+
+
+def _half_width(estimate: Estimate) -> float:
+    return 0.5 * (estimate.high - estimate.low)
 
 
 def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -26,12 +26,21 @@ def effect_path(effect: EffectClass) -> str:
 
 @dataclass(frozen=True)
 class Term:
-    """An effect at a joint with values for all its parameters; `fitted` names those that a fit may change."""
+    """An effect at a joint with values for all its parameters.
+
+    Attributes:
+        effect: its class.
+        joint: where it acts.
+        values: of all its parameters.
+        fitted: those that a fit may change.
+        expected: of a fitted one, what is known of it beforehand: centre and standard deviation.
+    """
 
     effect: EffectClass
     joint: str
     values: Mapping[str, float]
     fitted: tuple[str, ...]
+    expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def label(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -16,6 +17,7 @@ Array = NDArray[np.float64]
 EffectClass = type[Effect]
 Sizes = Mapping[str, Scales]
 """Joint -> its sizes; a joint that is not there counts as a finger's."""
+UNKNOWN = (0.0, math.inf)  # centre and standard deviation of a number of which nothing is known
 MOST_SHOWN = 4  # fitted parameters that a label lists
 NO_SIZE = 1e6  # a limit so far off, in the units of a finger, is none
 
@@ -80,7 +82,17 @@ def term_unknowns(term: Term, place: int, sizes: Sizes | None = None) -> tuple[U
     scales = {name: known[name] or abs(parameters[name].typical) for name in term.fitted}
     fallback = max([size for size in scales.values() if size > 0.0], default=1.0)
     return tuple(
-        Unknown("effect", name, place, p.low, p.high, p.scale or scales[name] or fallback, neutral=p.neutral)
+        Unknown(
+            "effect",
+            name,
+            place,
+            p.low,
+            p.high,
+            p.scale or scales[name] or fallback,
+            neutral=p.neutral,
+            centre=term.expected.get(name, UNKNOWN)[0],
+            spread=term.expected.get(name, UNKNOWN)[1],
+        )
         for name, p in ((name, parameters[name]) for name in term.fitted)
     )
 

@@ -42,12 +42,17 @@ def with_groups(scores: Sequence[Score], needed: float) -> list[Candidate]:
 
 
 def resized(score: Score) -> Candidate:
-    """The candidate with its start as large as the first look says, where a single number makes the effect's size."""
+    """The candidate with its start as large as the first look says, where a single number makes the effect's size.
+
+    Others may say where or how fast: they have no neutral value of zero.
+    """
     (name, start), *more = score.candidate.form.items()
-    known = score.candidate.parameters(score.candidate.joints[0])[name]
-    if more or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
+    parameters = score.candidate.parameters(score.candidate.joints[0])
+    known, sizes = parameters[name], [n for n, _ in more if parameters[n].neutral == 0.0]
+    if sizes or known.neutral != 0.0 or not RESIZED[0] < score.factor < RESIZED[1]:
         return score.candidate
-    return replace(score.candidate, form={name: min(max(score.factor * start, known.low), known.high)})
+    size = min(max(score.factor * start, known.low), known.high)
+    return replace(score.candidate, form={**score.candidate.form, name: size})
 
 
 def of_each(pairs: Sequence[tuple[Candidate, Fit]], count: int) -> list[tuple[Candidate, Fit]]:

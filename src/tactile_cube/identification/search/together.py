@@ -155,7 +155,7 @@ class Together:
         for place, effect in enumerate(proposal.effects):
             simpler = [
                 one
-                for one in self.search.candidates
+                for one in self.search.new(self.search.candidates)
                 if one.effect.name in effect.effect.contains and one.joints == effect.joints and one.size < effect.size
             ]
             if not simpler:
