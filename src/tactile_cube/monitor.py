@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("monitor")
+@command("monitor")
 def main(config: DictConfig) -> None:
     """Refit the model on the newest recording, hold it against the one before, say what has changed."""
     from tactile_cube.api.comparison import modelled, opened

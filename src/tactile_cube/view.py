@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("view")
+@command("view")
 def main(config: DictConfig) -> None:
     """Run episodes, write the best and the worst as one Rerun recording, open it where there is a viewer."""
     import functools

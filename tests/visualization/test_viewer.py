@@ -20,7 +20,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
         def __init__(self, words: list[str], **_: Any) -> None:
             commands.append(words)
 
-    monkeypatch.setattr(viewer.subprocess, "Popen", Process)
+    monkeypatch.setattr("subprocess.Popen", Process)
     return commands
 
 
@@ -28,7 +28,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 def test_a_window_opens_where_there_is_a_display_and_else_the_command_is_told(
     started: list[list[str]], monkeypatch: pytest.MonkeyPatch, display: dict[str, str], expected: int
 ) -> None:
-    monkeypatch.setattr(viewer.sys, "platform", "linux")
+    monkeypatch.setattr("sys.platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     for name, value in display.items():

@@ -36,7 +36,7 @@ class Drift:
     def half_width(self) -> float:
         """Of the 95 % interval of the difference: two recordings err independently."""
         halves = [0.5 * (one.high - one.low) for one in (self.before, self.now)]
-        return float(np.hypot(*halves))
+        return float(np.hypot(halves[0], halves[1]))
 
     @property
     def p_value(self) -> float:
