@@ -153,12 +153,22 @@ def test_can_be_made_inside_a_hydra_application() -> None:
         assert GlobalHydra.instance().is_initialized()
 
 
-def test_the_example_for_stable_baselines_runs() -> None:
-    pytest.importorskip("stable_baselines3")
-    page = (Path(__file__).parents[1] / "docs" / "gymnasium.md").read_text()
-    example = page.split("```python\n")[1].split("```")[0]
+def example_of(page: str) -> dict[str, Any]:
+    """What the first piece of Python of a page leaves behind."""
+    example = (Path(__file__).parents[1] / page).read_text().split("```python\n")[1].split("```")[0]
     namespace: dict[str, Any] = {}
     exec(example, namespace)
+    return namespace
+
+
+def test_the_readmes_example_for_stable_baselines_runs() -> None:
+    pytest.importorskip("stable_baselines3")
+    assert example_of("README.md")["model"].num_timesteps == 200
+
+
+def test_the_example_for_stable_baselines_runs() -> None:
+    pytest.importorskip("stable_baselines3")
+    namespace = example_of("docs/gymnasium.md")
     assert namespace["picture"].shape == (256, 512, 3)
     assert namespace["info"]["is_success"] in (True, False)
 

@@ -21,7 +21,7 @@ from tactile_cube.hand.urdf_shapes import visual_elements
 DESCRIPTIONS = Path(__file__).parent / "descriptions"
 """URDFs that the package ships."""
 NOMINAL_OBJECT = (0.08, 0.08, 0.08)
-"""Of the start posture where a description gives none [m]."""
+"""That the start angles are for where a description names none [m]."""
 
 
 @dataclass(frozen=True)
