@@ -1,9 +1,11 @@
-"""Do memory, open files or logs of a training grow with time?
+"""Do memory, open files or logs of a training, or of many diagnoses in one process, grow?
 
     python -m tests.faults.growth --minutes 20 --out docs/results/reliability
     python -m tests.faults.growth --minutes 20 --pid PID --folder RUN      # one that runs already
+    python -m tests.faults.growth --diagnoses 200 --out docs/results/reliability
 
-Writes growth.csv (one row each ten seconds, all processes of the run together) and growth.png.
+Writes growth.csv (one row each ten seconds, all processes of the run together) and growth.png; of diagnoses
+diagnoses.csv (one row after each) and diagnoses.png.
 """
 
 import argparse
@@ -19,6 +21,8 @@ import psutil
 EVERY = 10.0
 """Seconds between two rows."""
 COLUMNS = ("seconds", "resident_mb", "private_mb", "open_files", "threads", "log_kb", "steps")
+BENCH = ("source.joints=[q3]", "source.duration=3", "source.hidden=[]", "source.validation=false")
+"""One joint and trials of 3 s: a diagnosis is short."""
 TRAINING = ("+experiment=smoke", "training.steps=100000000", "training.replay_size=20000", "name=growth")
 
 
@@ -74,6 +78,27 @@ def watch(process: psutil.Process, folder: Path, minutes: float, out: Path) -> l
     return rows
 
 
+def diagnose_often(number: int, out: Path) -> list[dict[str, float]]:
+    """Diagnose one recording again and again in this process; a row after each, the steps being diagnoses."""
+    import tactile_cube
+
+    rows: list[dict[str, float]] = []
+    out.mkdir(parents=True, exist_ok=True)
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory() as place, (out / "diagnoses.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS)
+        table.writeheader()
+        measured = tactile_cube.record(Path(place) / "bench", *BENCH)[""]
+        for done in range(1, number + 1):
+            tactile_cube.diagnose(measured, "engine=fast").write(Path(place) / "answer")
+            row = reading(psutil.Process(), Path(place), time.monotonic() - began)
+            if row is not None:
+                rows.append(row | {"steps": done})
+                table.writerow(rows[-1])
+                file.flush()
+    return rows
+
+
 def draw(rows: list[dict[str, float]], path: Path) -> None:
     """Draw each column over time."""
     from matplotlib.figure import Figure
@@ -95,7 +120,11 @@ def main() -> None:
     words.add_argument("--out", type=Path, default=Path("outputs/growth"))
     words.add_argument("--pid", type=int)
     words.add_argument("--folder", type=Path)
+    words.add_argument("--diagnoses", type=int)
     given = words.parse_args()
+    if given.diagnoses is not None:
+        draw(diagnose_often(given.diagnoses, given.out), given.out / "diagnoses.png")
+        return
     if given.pid is not None:
         rows = watch(psutil.Process(given.pid), given.folder, given.minutes, given.out)
     else:
