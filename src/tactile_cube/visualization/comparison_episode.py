@@ -13,6 +13,7 @@ from rerun.urdf import UrdfTree
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
 from tactile_cube.visualization.comparison_figures import marked
+from tactile_cube.visualization.recording_file import recording_file
 from tactile_cube.visualization.solid_links import fill_shapes
 
 Array = NDArray[np.float64]
@@ -40,16 +41,13 @@ def write_comparison(comparison: Comparison, path: Path, summary: str) -> None:
         path: file to write, `.rrd`.
         summary: Markdown shown beside the robot.
     """
-    stream = rr.RecordingStream("tactile_cube_compare", recording_id=path.stem)
-    stream.save(path, default_blueprint=blueprint(comparison))
     starts = trial_starts(comparison)
-    _log_robot(stream, comparison, starts)
-    for index, joint in enumerate(comparison.recording.joints):
-        _log_joint(stream, comparison, index, joint, starts)
-    _log_events(stream, comparison, starts)
-    stream.log("summary", rr.TextDocument(summary, media_type="text/markdown"), static=True)
-    stream.flush()
-    stream.disconnect()
+    with recording_file(path, blueprint(comparison), "tactile_cube_compare") as stream:
+        _log_robot(stream, comparison, starts)
+        for index, joint in enumerate(comparison.recording.joints):
+            _log_joint(stream, comparison, index, joint, starts)
+        _log_events(stream, comparison, starts)
+        stream.log("summary", rr.TextDocument(summary, media_type="text/markdown"), static=True)
 
 
 def trial_starts(comparison: Comparison) -> list[float]:

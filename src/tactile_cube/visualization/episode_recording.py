@@ -12,8 +12,7 @@ from tactile_cube.visualization.blueprint import episode_blueprint
 from tactile_cube.visualization.branch import Branch
 from tactile_cube.visualization.episode_scene import log_hand, log_motion
 from tactile_cube.visualization.episode_signals import log_joints, log_policy, log_task
-
-APPLICATION = "tactile_cube"
+from tactile_cube.visualization.recording_file import recording_file
 
 
 def write_recording(record: EpisodeRecord, path: Path, hand: Hand = DLR_HAND2, summary: str = "") -> None:
@@ -25,11 +24,8 @@ def write_recording(record: EpisodeRecord, path: Path, hand: Hand = DLR_HAND2, s
         hand: the hand that acted.
         summary: Markdown shown beside the episode.
     """
-    stream = rr.RecordingStream(APPLICATION, recording_id=path.stem)
-    stream.save(path, default_blueprint=episode_blueprint(record.fingers, hand.name))
-    log_episode(Branch(stream), record, hand, summary)
-    stream.flush()
-    stream.disconnect()
+    with recording_file(path, episode_blueprint(record.fingers, hand.name)) as stream:
+        log_episode(Branch(stream), record, hand, summary)
 
 
 def log_episode(branch: Branch, record: EpisodeRecord, hand: Hand, summary: str = "") -> None:

@@ -14,7 +14,8 @@ from tactile_cube.hand import Hand
 from tactile_cube.visualization.blueprint import pair_blueprint
 from tactile_cube.visualization.branch import Branch
 from tactile_cube.visualization.curves import write_learning_curves
-from tactile_cube.visualization.episode_recording import APPLICATION, log_episode
+from tactile_cube.visualization.episode_recording import log_episode
+from tactile_cube.visualization.recording_file import recording_file
 
 PICTURE = (6.0, 6.0)
 """Size of the learning curves [inch]: a column beside the episodes."""
@@ -36,18 +37,15 @@ def write_pair(
         curve: learning curve of the run; None: there is none.
         words: Markdown about the run.
     """
-    stream = rr.RecordingStream(APPLICATION, recording_id=path.stem)
     names = {root: name for root, (_, name, _) in episodes.items()}
     fingers = next(iter(episodes.values()))[0].fingers
-    stream.save(path, default_blueprint=pair_blueprint(fingers, hand.name, names, curve is not None))
-    for root, (record, _, described) in episodes.items():
-        log_episode(Branch(stream, f"{root}/"), record, hand, described)
-    branch = Branch(stream)
-    if curve is not None:
-        log_curves(branch, curve)
-    branch.always("run", rr.TextDocument(words, media_type="text/markdown"))
-    stream.flush()
-    stream.disconnect()
+    with recording_file(path, pair_blueprint(fingers, hand.name, names, curve is not None)) as stream:
+        for root, (record, _, described) in episodes.items():
+            log_episode(Branch(stream, f"{root}/"), record, hand, described)
+        branch = Branch(stream)
+        if curve is not None:
+            log_curves(branch, curve)
+        branch.always("run", rr.TextDocument(words, media_type="text/markdown"))
 
 
 def log_curves(branch: Branch, curve: Curve) -> None:
