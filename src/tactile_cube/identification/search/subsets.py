@@ -97,8 +97,8 @@ def candidate_columns(problem: Problem, base: Fit, wanted: Sequence[Candidate]) 
     if not best:
         return Columns((), np.zeros(0), np.zeros((0, 0)))
     columns = np.stack([column for _, column in best.values()], axis=-1)
-    pulls, gram = view.products(columns)
-    return Columns([score for score, _ in best.values()], pulls, gram + expected * np.eye(len(gram)))
+    gradients, gram = view.products(columns)
+    return Columns([score for score, _ in best.values()], gradients, gram + expected * np.eye(len(gram)))
 
 
 def possible(candidate: Candidate, factor: float) -> bool:
