@@ -48,3 +48,10 @@ def test_numbers_that_a_segment_chose_for_itself_are_charged_above_the_noise_alo
     assert found[0] == 4000.0
     assert found[1] == pytest.approx(400.0 + 3600.0 * (8.0 / 6.0) ** 2), "eight of 400 samples are independent"
     assert found[2] == 390.0
+
+
+def test_an_effect_that_shows_in_fast_motion_alone_is_proven_by_each_segment_of_it() -> None:
+    before = judged(2.0)
+    motion = np.repeat([1.0, 12.0, 2.0, 9.0, 0.5, 4.0], 10) * np.random.default_rng(2).uniform(0.9, 1.1, 60)
+    after = replace(before, costs=before.costs - motion, trial=np.zeros(60, dtype=np.int64))
+    assert p_value(before, after) < 1e-9, "sizes that follow the motion are no dependence"

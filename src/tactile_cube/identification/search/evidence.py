@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata, wilcoxon
+from scipy.stats import wilcoxon
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
@@ -134,17 +134,18 @@ def in_blocks(difference: Array, judged: Judgement) -> Array:
 def correlation_length(difference: Array, trial: NDArray[np.int64]) -> int:
     """How many neighbouring differences (G,) say as much as one: 1 + 2 x the sum of their autocorrelation.
 
-    Of ranks, as the test takes them, so that a single huge one does not hide it; up to the first lag at which it cannot
-    be told from none. Source: Geyer, Practical Markov chain Monte Carlo, Statistical Science 7, 1992.
+    Of signs, for these are what a signed-rank test takes as independent; sizes follow the motion. Up to the first lag
+    at which they cannot be told from independent ones. Source: Geyer, Practical Markov chain Monte Carlo, Statistical
+    Science 7, 1992.
     """
-    ranks = rankdata(difference) - 0.5 * (len(difference) + 1)
-    variance = float(np.mean(ranks**2)) if len(ranks) else 0.0
+    signs = np.sign(difference) - np.mean(np.sign(difference)) if len(difference) else difference
+    variance = float(np.mean(signs**2)) if len(signs) else 0.0
     length = 1.0
-    for lag in range(1, len(ranks) // FEWEST_BLOCKS):
+    for lag in range(1, len(signs) // FEWEST_BLOCKS):
         same = trial[lag:] == trial[:-lag]
         if variance == 0.0 or np.count_nonzero(same) < FEWEST_PAIRS:
             break
-        correlation = float(np.mean((ranks[lag:] * ranks[:-lag])[same])) / variance
+        correlation = float(np.mean((signs[lag:] * signs[:-lag])[same])) / variance
         if correlation < NORMAL_95 / np.sqrt(np.count_nonzero(same)):
             break
         length += 2.0 * correlation
