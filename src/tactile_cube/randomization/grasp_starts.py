@@ -68,9 +68,10 @@ class Grasps:
         """
         try:
             with np.load(path, allow_pickle=False) as data:
-                columns = {name: np.asarray(data[name], dtype=np.float64) for name in COLUMNS}
+                angles, targets, positions, quaternions = (np.asarray(data[name], np.float64) for name in COLUMNS)
                 rest = json.loads(str(data["description"]))
-            made = cls(**columns, **rest | {"size": tuple(rest["size"])})
+            size, origin = tuple(rest["size"]), dict(rest["origin"])
+            made = cls(angles, targets, positions, quaternions, rest["hand"], rest["shape"], size, origin)
         except FileNotFoundError:
             raise InputError(f"start.file={path}: no such file; write one with tactile_cube.search_grasps") from None
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
