@@ -35,12 +35,21 @@ def test_off_centre_is_the_squared_horizontal_distance_from_the_start() -> None:
     assert terms.off_centre(STILL._replace(x=0.1), STILL._replace(x=0.13, y=-0.04, z=0.5)) == pytest.approx(0.0025)
 
 
+def test_advance_counts_fingers_that_go_back_and_not_those_that_turn_with_the_object() -> None:
+    tips = np.array([-1.5, 0.0, 1.5, 3.1])
+    assert terms.advance(0.1, -1, tips, tips - 0.1) == pytest.approx(0.0)
+    assert terms.advance(0.0, -1, tips, tips + np.array([0.0, 0.0, 0.0, 0.3])) == pytest.approx(0.3)
+    assert terms.advance(0.0, 1, tips, tips + np.array([0.3, 0.0, 0.0, 0.0])) == pytest.approx(-0.3)
+    assert terms.advance(0.05, 1, tips, tips) == pytest.approx(0.2)
+    assert terms.advance(0.0, -1, np.zeros(0), np.zeros(0)) == 0.0
+
+
 def test_published_weights_and_their_signs() -> None:
-    assert Reward().weights().tolist() == [16, -100, -300, -50, -25, 0, -10]
+    assert Reward().weights().tolist() == [16, -100, -300, -50, -25, 0, -10, 0]
 
 
 def test_penalty_scale_changes_the_motion_weights_only() -> None:
-    ratio = Reward(off_centre=1.0).weights(0.2) / Reward(off_centre=1.0).weights(1.0)
+    ratio = Reward(off_centre=1.0, advance=1.0).weights(0.2) / Reward(off_centre=1.0, advance=1.0).weights()
     scaled = {name for name, r in zip(REWARD_TERMS, ratio, strict=True) if r != 1.0}
     assert scaled == {"height", "plane", "tilt"}
     assert ratio[1:4] == pytest.approx([0.2] * 3)

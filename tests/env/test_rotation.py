@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactile_cube.env import OUTCOMES, Reward, RotationEnv, Task
+from tactile_cube.env import OUTCOMES, REWARD_TERMS, Reward, RotationEnv, Task
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.randomization import Randomization, Uniform
 
@@ -52,6 +52,15 @@ def test_reward_is_the_weighted_sum_of_the_terms(scripted_world: Any, rotation_t
     assert moment.reward_terms[2] == pytest.approx(0.001)
 
 
+def test_fingers_that_stand_still_advance_around_a_cube_that_turns(
+    scripted_world: Any, rotation_task: MakeTask
+) -> None:
+    env = rotation_task(scripted_world(turn=0.05), reward=Reward(advance=1.0))
+    first = env.reset()
+    still = DLR_HAND2.action_of(first.joint_position - 0.01)
+    assert env.step(still).reward_terms[REWARD_TERMS.index("advance")] == pytest.approx(4 * 0.05, abs=0.01)
+
+
 def test_time_limit_truncates_and_a_lost_cube_terminates(scripted_world: Any, rotation_task: MakeTask) -> None:
     env = rotation_task(task=Task("full", episode_steps=3))
     env.reset()
@@ -62,7 +71,7 @@ def test_time_limit_truncates_and_a_lost_cube_terminates(scripted_world: Any, ro
     env.step(np.zeros(12))
     last = env.step(np.zeros(12))
     assert (last.truncated, last.terminated) == (False, True)
-    assert last.reward_terms[-1] == 1.0
+    assert last.reward_terms[REWARD_TERMS.index("leaving")] == 1.0
 
 
 @pytest.mark.parametrize("damage", ["unhealthy", "not a number"])

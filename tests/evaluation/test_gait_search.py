@@ -32,7 +32,7 @@ class TurnsBySwing:
 
     def _moment(self, step: int, outcome: int) -> Moment:
         self._step = step
-        return Moment(np.zeros(12), np.zeros(12), np.zeros(25), self._theta, np.zeros(7), 0.0, outcome, step)
+        return Moment(np.zeros(12), np.zeros(12), np.zeros(25), self._theta, np.zeros(8), 0.0, outcome, step)
 
 
 class DropsAtOnce(TurnsBySwing):

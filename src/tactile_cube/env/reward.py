@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tactile_cube.env.cube_pose import CubePose
 from tactile_cube.errors import InputError
 
-REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "off_centre", "leaving")
+REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "off_centre", "leaving", "advance")
 """Names and order of the terms in the key "reward_terms"."""
 
 
@@ -58,6 +58,23 @@ def leaving(lost: bool) -> float:
     return float(lost)
 
 
+def advance(turned: float, direction: int, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+    """How far the fingertips went ahead of the object, against its rotation, in sum [rad]. Not in the paper.
+
+    A finger that turns with the object adds nothing, one that goes back to grasp anew adds its way at once, long before
+    the turn that this makes possible. The sum over an episode is bounded by the fingers' reach unless the object turns:
+    going to and fro earns nothing.
+
+    Args:
+        turned: rotation of the object in the rewarded direction, as in `spin` [rad].
+        direction: that is rewarded, +1 or -1.
+        before: azimuth of each fingertip about the object's middle `(fingers,)` [rad].
+        after: the same after the step.
+    """
+    way = np.remainder(after - before + np.pi, 2.0 * np.pi) - np.pi
+    return float(len(way) * turned - direction * way.sum())
+
+
 @dataclass(frozen=True)
 class Reward:
     """Weights of the terms, all given as positive numbers. Source: website, table of the reward.
@@ -70,6 +87,7 @@ class Reward:
         proximal: lambda_proxy [1/rad^4].
         off_centre: penalty for a cube away from where it began [1/m^2]; 0 in the paper.
         leaving: penalty for losing the cube (size not published). Must exceed what going on costs, or dropping pays.
+        advance: of fingertips that go ahead of the object [1/rad]; 0 in the paper.
         fastest: rotation above this rate earns nothing more [rad/s].
     """
 
@@ -80,6 +98,7 @@ class Reward:
     proximal: float = 25.0
     off_centre: float = 0.0
     leaving: float = 10.0
+    advance: float = 0.0
     fastest: float = 1.0
 
     def __post_init__(self) -> None:
@@ -91,10 +110,11 @@ class Reward:
                 )
 
     def weights(self, penalty_scale: float = 1.0) -> NDArray[np.float32]:
-        """Signed weights (7,) in the order of REWARD_TERMS: reward = reward_terms @ weights.
+        """Signed weights (8,) in the order of REWARD_TERMS: reward = reward_terms @ weights.
 
         Args:
             penalty_scale: factor on height, plane and tilt, from the curriculum.
         """
         motion = [-penalty_scale * w for w in (self.height, self.plane, self.tilt)]
-        return np.array([self.spin, *motion, -self.proximal, -self.off_centre, -self.leaving], dtype=np.float32)
+        others = [-self.proximal, -self.off_centre, -self.leaving, self.advance]
+        return np.array([self.spin, *motion, *others], dtype=np.float32)

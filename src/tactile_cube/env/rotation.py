@@ -13,7 +13,7 @@ from tactile_cube.env.conditions import Conditions
 from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
 from tactile_cube.env.reward import REWARD_TERMS, Reward
 from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
-from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses
 from tactile_cube.simulation import EpisodeConstants, World
 
@@ -35,7 +35,7 @@ class Moment:
         object_state: what only the critic may see `(13 + joints,)`: cube position (3) [m], sin 4theta, cos 4theta, phi,
             psi, linear velocity (3) [m/s], angular velocity (3) [rad/s], q_f (joints) [rad]. Source: paper, section II.
         theta: rotation since the start in the rewarded direction, unwrapped [rad].
-        reward_terms: the terms before weighing, in the order of REWARD_TERMS `(7,)`.
+        reward_terms: the terms before weighing, in the order of REWARD_TERMS `(8,)`.
         reward: their weighted sum.
         outcome: index into OUTCOMES; anything but 0 ends the episode.
         step: policy steps since the start.
@@ -130,6 +130,7 @@ class RotationEnv:
         self._weights = self.reward.weights(self.conditions.penalty_scale)
         self._limit = self.reward.fastest * self.world.options.policy_dt
         self._first = self._pose = self._pose_now(None)
+        self._tips = self._azimuths()
         self._moment = self._observe(np.zeros(len(REWARD_TERMS)), RUNNING, 0)
         return self._moment
 
@@ -156,16 +157,27 @@ class RotationEnv:
         quaternion = seen_along(self._frame, self.world.cube_quaternion.tolist())
         return cube_pose(self.world.cube_position.tolist(), quaternion, previous_theta)
 
+    def _azimuths(self) -> Array:
+        """Where the fingertips stand about the object (fingers,) [rad]; none where that earns nothing."""
+        if self.reward.advance == 0.0:
+            return np.zeros(0)
+        places = tip_positions(self.hand, self.world.q) - self.world.cube_position
+        places = places if self._frame is None else self._frame.inv().apply(places)
+        return np.arctan2(places[:, 1], places[:, 0])
+
     def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
+        turned = terms.spin(before, after, self.task.direction, self._limit)
+        tips, self._tips = self._tips, self._azimuths()
         return np.array(
             (
-                terms.spin(before, after, self.task.direction, self._limit),
+                turned,
                 terms.height(before, after),
                 terms.plane(before, after),
                 terms.tilt(before, after),
                 terms.proximal(self.world.q.tolist(), self.hand.joints_per_finger),
                 terms.off_centre(self._first, after),
                 terms.leaving(outcome in LOST),
+                terms.advance(turned, self.task.direction, tips, self._tips),
             )
         )
 
