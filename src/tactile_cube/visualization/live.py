@@ -77,9 +77,12 @@ class LiveView:
 
 
 def _start(folder: Path, viewer: str) -> subprocess.Popen[bytes] | None:
-    """Start the process that draws; Ctrl-C at the terminal is the run's alone."""
+    """Start the process that draws; Ctrl-C at the terminal is the run's alone.
+
+    It stays in the run's session: Linux shares the processor among sessions first, and priorities count within one.
+    """
     words = [sys.executable, "-m", "tactile_cube.visualization.live_episodes", str(folder), viewer]
     one = {"OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
-    process = subprocess.Popen(words, stdin=subprocess.PIPE, env=os.environ | one, bufsize=0, start_new_session=True)
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, env=os.environ | one, bufsize=0, process_group=0)
     os.set_blocking(process.stdin.fileno(), False)  # type: ignore[union-attr]
     return process
