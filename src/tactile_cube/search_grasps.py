@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from tactile_cube.cli import verb
+from tactile_cube.cli import command
 
 
-@verb("search_grasps")
+@command("search_grasps")
 def main(config: DictConfig) -> None:
     """Search until enough grasps held, write grasps.npz."""
     import shlex

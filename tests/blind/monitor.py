@@ -36,7 +36,7 @@ def quiet(line: str) -> None:
     """Takes lines of progress."""
 
 
-def drawn(draw: int, seed: int, folder: Path) -> dict[str, Any]:
+def drawn(draw: int, seed: int, significance: float, folder: Path) -> dict[str, Any]:
     """What monitor says of an unchanged and of a changed machine."""
     rng = np.random.default_rng([seed, draw])
     urdf = folder / f"{draw}.urdf"
@@ -53,7 +53,8 @@ def drawn(draw: int, seed: int, folder: Path) -> dict[str, Any]:
 
     model = tactile_cube.identify(recorded("reference"), [f"{KNOWN}@j"], "engine=fast", say=quiet).model
     altered = recorded("other", friction=1.5 * damping) if change == MORE_FRICTION else recorded("other", change)
-    same, other = (tactile_cube.monitor(one, model, say=quiet) for one in (recorded("same"), altered))
+    setting = f"significance={significance}"
+    same, other = (tactile_cube.monitor(one, model, setting, say=quiet) for one in (recorded("same"), altered))
     return {"draw": draw, "change": change, "null": row(same), "changed": row(other)}
 
 
@@ -85,13 +86,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--significance", type=float, default=0.001, help="as of monitor")
     parser.add_argument("--out", type=Path, default=Path("outputs/monitor"))
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder:
         for draw in range(given.draws):
-            rows.append(drawn(draw, given.seed, Path(folder)))
+            rows.append(drawn(draw, given.seed, given.significance, Path(folder)))
             (given.out / "monitor.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
             print(f"{draw + 1} of {given.draws} draws: {rows[-1]}", flush=True)
     print(summary(rows))
