@@ -1,14 +1,16 @@
 """Scalar Python into machine code: the decorator that the physics uses, with its types kept."""
 
 from collections.abc import Callable
+from math import prod
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
 import numpy.typing as npt
-from numba import types
-from numba.extending import intrinsic
+from numba import carray, types
+from numba.extending import intrinsic, overload
 
+Array = npt.NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
@@ -30,8 +32,7 @@ def _as_pointer(context: Any, address: Any) -> Any:
     return types.CPointer(types.float64)(address), build  # type: ignore[no-untyped-call]
 
 
-@compiled
-def borrowed(array: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def borrowed(array: Array) -> Array:
     """The same flat float64 array without an owner: slicing it in compiled code then counts no references.
 
     Counting is atomic and costs more than the arithmetic of a small slice. The caller keeps the array alive.
@@ -41,13 +42,30 @@ def borrowed(array: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """
     if array.strides[0] != array.itemsize:
         raise ValueError("an array with gaps: pass a contiguous one")
-    return numba.carray(_as_pointer(array.ctypes.data), array.shape)  # type: ignore
+    return array
 
 
-@compiled
-def shaped_view(array: npt.NDArray[np.float64], start: int, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+def shaped_view(array: Array, start: int, shape: tuple[int, ...]) -> Array:
     """The numbers from `start` on as an array of another shape; numpy's reshape is an outside call in compiled code.
 
-    Nothing is checked: the caller keeps the array alive, contiguous and long enough.
+    In compiled code nothing is checked: the caller keeps the array alive, contiguous and long enough.
     """
-    return numba.carray(_as_pointer(array.ctypes.data + start * array.itemsize), shape)  # type: ignore
+    return array[start : start + prod(shape)].reshape(shape)
+
+
+@overload(borrowed)
+def _borrowed(array: Any) -> Any:
+    def machine_code(array: Any) -> Any:
+        if array.strides[0] != array.itemsize:
+            raise ValueError("an array with gaps: pass a contiguous one")
+        return carray(_as_pointer(array.ctypes.data), array.shape)  # type: ignore[call-arg]
+
+    return machine_code
+
+
+@overload(shaped_view)
+def _shaped_view(array: Any, start: Any, shape: Any) -> Any:
+    def machine_code(array: Any, start: Any, shape: Any) -> Any:
+        return carray(_as_pointer(array.ctypes.data + start * array.itemsize), shape)  # type: ignore[call-arg]
+
+    return machine_code

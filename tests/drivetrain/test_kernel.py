@@ -2,8 +2,10 @@
 
 import ctypes
 import importlib
+import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +13,12 @@ import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect, import_own_effects
+from tactile_cube.drivetrain.effects.backlash import Backlash
 from tactile_cube.drivetrain.kernel import cache_directory, load_kernel
 from tactile_cube.errors import InputError
 from tests.drivetrain.rigs import finger, wheel
 
+ROOT = Path(__file__).parents[2]
 LAW = """
 from tactile_cube.drivetrain.effects import JOINT_TORQUE, Effect, Parameter, Stage
 
@@ -68,8 +72,16 @@ def test_an_effect_that_cannot_be_imported_is_refused() -> None:
         stage = Stage.FRICTION
         parameters = (Parameter("size", "N m", 0.0, 0.0, 1.0, 0.1, "test"),)
 
+        @staticmethod
+        def law(x, j, p, s, dt):
+            return 0.0
+
     with pytest.raises(InputError, match="file of its own"):
         _ = Plant([wheel()], dt=0.002, effects=[Local]).kernel
+
+
+def c_function(plant: Plant) -> Callable[..., None]:
+    return ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 4)(plant.kernel.control_address)
 
 
 def test_the_c_function_gives_the_same_torques_to_the_bit() -> None:
@@ -79,11 +91,31 @@ def test_the_c_function_gives_the_same_torques_to_the_bit() -> None:
     q, v = np.array([0.1, 0.2, 0.3, 0.31]), np.array([0.5, -0.2, 0.1, 0.1])
     torque, other, copy = np.zeros(4), np.zeros(4), memory.copy()
     plant.kernel.control_step(0, q, v, torque, memory)
-    address = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 4)(plant.kernel.control_address)
-    address(0, *(array.ctypes.data for array in (q, v, other, copy)))
+    c_function(plant)(0, *(array.ctypes.data for array in (q, v, other, copy)))
     assert np.array_equal(torque, other)
     assert np.array_equal(memory, copy)
     assert np.any(torque != 0.0)
+
+
+def numbers() -> str:
+    """What a finger's control step and a wheel's steps with a gap leave in memory, as text."""
+    driven = Plant([finger()], dt=0.002)
+    torques = driven.memory(DrivetrainConstants())
+    state = np.linspace(0.1, 0.4, 12)  # q, v, torque
+    c_function(driven)(0, *(state[k : k + 4].ctypes.data for k in (0, 4, 8)), torques.ctypes.data)
+    free = Plant([wheel()], dt=0.002, effects=(Backlash,))
+    moved = free.memory(DrivetrainConstants(), effects=[Backlash("q")])
+    for command in np.sin(np.linspace(0.0, 9.0, 100)):
+        free.kernel.step(np.array([command]), moved)
+    return str([number.hex() for number in np.concatenate([state, torques, moved])])
+
+
+def test_without_compilation_the_steps_give_the_same_numbers_to_the_bit() -> None:
+    program = "from tests.drivetrain.test_kernel import numbers; print(numbers(), end='')"
+    interpreted = subprocess.check_output(
+        [sys.executable, "-c", program], cwd=ROOT, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, text=True
+    )
+    assert interpreted == numbers()
 
 
 def test_processes_that_start_at_once_share_one_cache(tmp_path) -> None:
@@ -92,15 +124,13 @@ def test_processes_that_start_at_once_share_one_cache(tmp_path) -> None:
         "from tests.drivetrain.rigs import wheel; p = Plant([wheel()], dt=0.002); "
         "m = p.memory(DrivetrainConstants()); p.kernel.step(np.ones(1), m); print(p.view(m, 'v')[0])"
     )
-    root = Path(__file__).parents[2]
-    environment = {"XDG_CACHE_HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "PYTHONPATH": str(root)}
+    environment = {"XDG_CACHE_HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT)}
     jobs = [
-        subprocess.Popen([sys.executable, "-c", program], env=environment, cwd=root, stdout=subprocess.PIPE)
+        subprocess.Popen([sys.executable, "-c", program], env=environment, cwd=ROOT, stdout=subprocess.PIPE)
         for _ in range(2)
     ]
     outputs = [job.communicate(timeout=250)[0] for job in jobs]
     assert all(job.returncode == 0 for job in jobs)
     assert outputs[0] == outputs[1] != b""
-    files = list((tmp_path / "tactile_cube").glob("*.py"))
-    assert len(files) == 1
-    assert not list((tmp_path / "tactile_cube").glob("tmp*"))
+    files = list((tmp_path / "tactile_cube").rglob("*.py"))
+    assert sorted(file.name for file in files) == ["entry_points.py", "plant.py"]

@@ -1,15 +1,15 @@
-"""Turns a kernel's source into machine code, kept on disk so that the next process starts at once."""
+"""Turns the steps into machine code for one plant, kept on disk so that the next process starts at once."""
 
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import inspect
 import os
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
@@ -25,6 +25,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body_equations
 
 _PHYSICS = (coupled_joints, decorator, dry_friction, impedance, rigid_body_equations, signals, target_filter)
+_STEPS = Path(__file__).parent / "steps"
+_ENTRY_POINTS = "entry_points"
 
 
 class Kernel:
@@ -48,22 +50,29 @@ class Kernel:
         self.segments_batch: Callable[..., None] = self._module.segments_batch
 
     @cached_property
-    def _callback(self) -> object:
-        return self._module.control_callback()
+    def _callback(self) -> tuple[object, int]:
+        made: tuple[object, int] = self._module.control_callback()
+        return made
 
     @property
     def control_address(self) -> int:
         """Address of the control step as void(int64 i, double *q, double *v, double *torque, double *memory)."""
-        return int(self._callback.address)  # type: ignore[attr-defined]
+        return self._callback[1]
 
 
 def load_kernel(topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> ModuleType:
-    """The kernel's module, written to the cache directory if it is not there yet."""
-    source = kernel_source(topology, effects, layout)
-    name = "kernel_" + _fingerprint(source, effects)
+    """The entry points of the steps for a plant, in a package of its own: a folder in the cache, and the steps' own."""
+    plant = kernel_source(topology, effects, layout)
+    name = "kernel_" + _fingerprint(plant, effects)
     if name not in sys.modules:
-        _import_file(name, _write_once(cache_directory() / f"{name}.py", source))
-    return sys.modules[name]
+        folder = cache_directory() / name
+        folder.mkdir(exist_ok=True)
+        _write_once(folder / "plant.py", plant)
+        _write_once(folder / f"{_ENTRY_POINTS}.py", (_STEPS / f"{_ENTRY_POINTS}.py").read_text(encoding="utf-8"))
+        package = ModuleType(name, "The steps of one plant.")
+        package.__path__ = [str(folder), str(_STEPS)]
+        sys.modules[name] = package
+    return import_module(f"{name}.{_ENTRY_POINTS}")
 
 
 def cache_directory() -> Path:
@@ -83,6 +92,8 @@ def cache_directory() -> Path:
 def _fingerprint(source: str, effects: Sequence[type[Effect]]) -> str:
     """Of everything that the machine code depends on: any change of a law or a library asks for a new file."""
     digest = hashlib.sha256(source.encode())
+    for step in sorted(_STEPS.glob("*.py")):
+        digest.update(step.read_bytes())
     for module in _PHYSICS:
         digest.update(inspect.getsource(module).encode())
     for effect in effects:
@@ -98,7 +109,7 @@ def _source_of(effect: type[Effect]) -> str:
     return inspect.getsource(module)
 
 
-def _write_once(path: Path, source: str) -> Path:
+def _write_once(path: Path, source: str) -> None:
     """Writes a file that other processes may be writing too: all write the same, the last one replaces the others."""
     if not path.exists():
         handle, draft = tempfile.mkstemp(dir=path.parent, suffix=".py")
@@ -106,13 +117,3 @@ def _write_once(path: Path, source: str) -> Path:
             file.write(source)
         os.utime(draft, (0, 0))  # Numba tells versions of a file apart by its time: equal files, equal time
         os.replace(draft, path)
-    return path
-
-
-def _import_file(name: str, path: Path) -> None:
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"cannot load {path}")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)

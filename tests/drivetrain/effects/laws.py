@@ -30,9 +30,4 @@ class HeavyTip(Effect):
         view("mass")[..., place.chain, place.link] += p[..., 0]
 
 
-class Nameless(Effect):
-    stage = Stage.FRICTION
-    parameters = ()
-
-
 NOT_AN_EFFECT = 3

@@ -35,7 +35,6 @@ def test_a_finger_s_joint_stands_for_that_joint_of_every_finger() -> None:
         ("no_such_rig.Drag", "whose code no file can have run"),
         ("tests.drivetrain.effects.laws.Nothing", "no subclass of Effect named 'Nothing'"),
         ("tests.drivetrain.effects.laws.NOT_AN_EFFECT", "no subclass of Effect"),
-        ("tests.drivetrain.effects.laws.Nameless", "lacks 'name'"),
         ("stribeck_friction@q9", "joint 'q9' is unknown; the joints are q1, q2"),
         ("stribeck_friction@", "joint '' is unknown"),
     ],

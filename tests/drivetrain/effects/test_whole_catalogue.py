@@ -62,10 +62,10 @@ def run(effect: type[Effect], values: dict[str, float]) -> tuple[np.ndarray, np.
     for seed in range(6):
         x = signals(seed)
         before.append(x[effect.stage.value, 1])
-        if effect.acts_ahead:
+        if effect.defines("ahead_law"):
             effect.ahead_law(x.copy(), 1, p, s, DT)
         x[effect.stage.value, 1] = effect.law(x, 1, p, s, DT)
-        if effect.acts_on_torque:
+        if effect.defines("torque_law"):
             x[12, 1] += effect.torque_law(x, 1, p, s, DT) - x[9, 1]
         after.append(x[[effect.stage.value, 12], 1].sum())
         before[-1] += signals(seed)[12, 1] if effect.stage.value != 12 else before[-1]

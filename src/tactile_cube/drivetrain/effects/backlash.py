@@ -18,7 +18,6 @@ class Backlash(Effect):
 
     name = "backlash"
     stage = Stage.POSITION_SENSOR
-    acts_ahead = True
     contains = ("elasticity",)
     parameters = (
         Parameter("play", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.01, source="0.1-1 deg"),

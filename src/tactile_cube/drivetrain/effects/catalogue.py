@@ -138,14 +138,7 @@ def _own_effect(path: str) -> EffectClass:
     found = getattr(sys.modules[module_name], class_name, None)
     if not (isinstance(found, type) and issubclass(found, Effect)):
         raise InputError(f"effect '{path}': '{module_name}' has no subclass of Effect named '{class_name}'")
-    _check(found, path)
     return found
-
-
-def _check(effect: EffectClass, path: str) -> None:
-    for key in ("name", "stage", "parameters"):
-        if not hasattr(effect, key):
-            raise InputError(f"effect '{path}': the class lacks '{key}'; see tactile_cube.drivetrain.effects.Effect")
 
 
 def _defines_effect(value: object, module: str) -> bool:

@@ -18,7 +18,6 @@ class Cogging(Effect):
 
     name = "cogging"
     stage = Stage.JOINT_TORQUE
-    acts_on_torque = True
     parameters = (
         Parameter("sine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.01, source=RIPPLE),
         Parameter("cosine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),

@@ -20,7 +20,6 @@ class CommandDeadZone(Effect):
 
     name = "command_dead_zone"
     stage = Stage.COMMAND
-    acts_on_torque = True
     parameters = (
         Parameter("error", unit="rad", neutral=0.0, low=0.0, high=0.2, typical=0.005, source="0.1-1 deg"),
         Parameter("gate", unit="rad", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="0.1-1 deg"),

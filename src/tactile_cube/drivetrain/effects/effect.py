@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import isfinite
+from math import isfinite, nan
 from typing import ClassVar
 
 import numpy as np
@@ -89,8 +89,8 @@ class Place:
 class Effect:
     """An effect on one joint, with values; subclass it to describe a new one.
 
-    A subclass states `name`, `stage`, `parameters`, and gives `law` (or `configure` for a MECHANISM). With every
-    parameter at its neutral value the law returns the row's own value, bit for bit.
+    A subclass states `name`, `stage`, `parameters`, and gives `law` (or `configure` for a MECHANISM); without them it
+    cannot be defined. With every parameter at its neutral value the law returns the row's own value, bit for bit.
 
     Example:
         >>> class CableDrag(Effect):
@@ -116,10 +116,25 @@ class Effect:
     """The parameter by which it adds a constant to the reading of the position, as every initialisation does."""
     from_residual: ClassVar[tuple[str, ...]] = ("harmonic", "torque_0")
     """Parameters whose start is read from what is missing: a form that has one waits for a fitted model."""
-    acts_on_torque: ClassVar[bool] = False
-    """Whether the effect has a `torque_law` beside its `law`."""
-    acts_ahead: ClassVar[bool] = False
-    """Whether the effect has an `ahead_law` beside its `law`."""
+
+    def __init_subclass__(cls) -> None:
+        """Refuse a class that lacks what its stage asks for.
+
+        Raises:
+            InputError: it has no name, stage, parameters or law.
+        """
+        lacks = [key for key in ("name", "stage", "parameters") if not hasattr(cls, key)]
+        if not lacks and cls.stage is Stage.MECHANISM and not cls.defines("configure"):
+            lacks = ["a static method configure(view, place, p)"]
+        if not lacks and cls.stage is not Stage.MECHANISM and not cls.defines("law"):
+            lacks = ["a static method law(x, j, p, s, dt)"]
+        if lacks:
+            raise InputError(f"effect class {cls.__module__}.{cls.__qualname__} lacks {', '.join(lacks)}")
+
+    @classmethod
+    def defines(cls, law: str) -> bool:
+        """Whether the class has its own `law`, `torque_law`, `ahead_law` or `configure`."""
+        return getattr(cls, law) is not getattr(Effect, law)
 
     def __init__(self, joint: str, **values: float) -> None:
         """Place the effect on `joint`; parameters not given take their typical value.
@@ -188,17 +203,17 @@ class Effect:
             s: (state_size,) the law's own memory, to be changed in place.
             dt: step [s].
         """
-        raise NotImplementedError
+        return nan  # of a MECHANISM, which is never asked
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """The new motor torque of joint j [N m], for effects that act there too; arguments as of `law`."""
-        raise NotImplementedError
+        return x[signals.TORQUE, j]
 
     @staticmethod
     def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """The part of a POSITION_SENSOR law [rad] that is known before the torque, which feels it without delay."""
-        raise NotImplementedError
+        return x[signals.MOTOR_POSITION, j]
 
     @staticmethod
     def configure(view: View, place: Place, p: Array) -> None:
@@ -209,7 +224,6 @@ class Effect:
             place: the joint.
             p: (..., parameters) with the same leading dimensions.
         """
-        raise NotImplementedError
 
     def __repr__(self) -> str:  # noqa: D105
         values = ", ".join(f"{key}={value:g}" for key, value in self.values.items())

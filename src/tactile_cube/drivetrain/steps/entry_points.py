@@ -1,0 +1,107 @@
+"""What a plant's kernel can be asked for, see `drivetrain.kernel.Kernel`.
+
+Numba keeps machine code beside the file that a function stands in, and plants differ in their code: this file is copied
+into each kernel's folder, the other steps are loaded from where they are.
+"""
+
+from ctypes import CFUNCTYPE, POINTER, c_double, c_int64, c_void_p, cast
+
+import numpy as np
+import numpy.typing as npt
+from numba import carray, cfunc, config, types
+
+from tactile_cube.compiled import borrowed, compiled_once
+
+from .engine_step import control
+from .free_step import free_step, roll, roll_segments
+from .plant import C, N
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+@compiled_once
+def control_step(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
+    """Torques for an engine's joints."""
+    control(i, borrowed(q), borrowed(v), borrowed(torque), borrowed(memory))
+
+
+@compiled_once
+def step(command: Array, memory: Array) -> None:
+    """One step without contacts."""
+    free_step(command, borrowed(memory))
+
+
+@compiled_once
+def rollout(commands: Array, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
+    """Signals of each command row after the history."""
+    roll(commands, len(out), history, substeps, borrowed(memory), rows, out)
+
+
+@compiled_once
+def rollout_batch(
+    commands: Array,
+    which: Integers,
+    lengths: Integers,
+    history: int,
+    substeps: int,
+    memory: Array,
+    rows: Integers,
+    out: Array,
+) -> None:
+    """`rollout` of commands[which[b]] with memory[b]."""
+    for b in range(len(memory)):
+        roll(commands[which[b]], lengths[which[b]], history, substeps, borrowed(memory[b]), rows, out[b])
+
+
+@compiled_once
+def segments_batch(
+    commands: Array,
+    which: Integers,
+    lengths: Integers,
+    history: int,
+    substeps: int,
+    segment: int,
+    position: Array,
+    speed: Array,
+    initial_state: Array,
+    correction: Array,
+    memory: Array,
+    rows: Integers,
+    first: int,
+    last: int,
+    out: Array,
+) -> None:
+    """Blocks first..last of a batch, started anew from `position`, `speed` (S, K, C n) every `segment` rows."""
+    for b in range(first, last):
+        s = which[b]
+        roll_segments(
+            commands[s],
+            lengths[s],
+            history,
+            substeps,
+            segment,
+            position[s],
+            speed[s],
+            initial_state[s],
+            correction[b],
+            borrowed(memory[b]),
+            rows,
+            out[b],
+        )
+
+
+def callback(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
+    """The control step for C, whose arrays do not know their size."""
+    size = int(carray(memory, (1,))[0])
+    control(i, carray(q, (C * N,)), carray(v, (C * N,)), carray(torque, (C * N,)), carray(memory, (size,)))
+
+
+def control_callback() -> tuple[object, int]:
+    """A C function void(int64 i, double *q, double *v, double *torque, double *memory), to be kept; its address."""
+    if config.DISABLE_JIT:
+        interpreted = CFUNCTYPE(None, c_int64, *[POINTER(c_double)] * 4)(callback)
+        return interpreted, cast(interpreted, c_void_p).value or 0
+    pointer = types.CPointer(types.float64)
+    compiled = cfunc(types.void(types.int64, *[pointer] * 4), error_model="numpy", cache=True)(callback)
+    return compiled, compiled.address

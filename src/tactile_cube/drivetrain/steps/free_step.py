@@ -1,0 +1,171 @@
+"""Stepping the mechanism without contacts: single steps, rollouts, multiple shooting."""
+
+import numpy as np
+import numpy.typing as npt
+
+from tactile_cube.compiled import compiled
+from tactile_cube.drivetrain.coupled_joints import expand
+from tactile_cube.drivetrain.signals import (
+    ACCELERATION,
+    COMMAND,
+    CONTACT,
+    GAP,
+    LOAD,
+    MOTOR_POSITION,
+    POSITION,
+    ROWS,
+    TIME,
+    VELOCITY,
+)
+
+from . import plant
+from .joint_step import block, drive, find_equations, next_speeds, signals_of
+from .plant import C, N, n
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+@compiled
+def free_step(command: Array, memory: Array) -> None:
+    """One step of the mechanism without contacts: semi-implicit Euler, as Bullet."""
+    dt = memory[plant.DT]
+    for c in range(C):
+        x = signals_of(c, memory)
+        q, v = block(memory, plant.Q, (n,), c), block(memory, plant.V, (n,), c)
+        q_all, v_all = block(memory, plant.Q_ALL, (N,)), block(memory, plant.V_ALL, (N,))
+        ratio, offset = block(memory, plant.RATIO, (N,), c), block(memory, plant.OFFSET, (N,), c)
+        expand(plant.FOLLOW, ratio, offset, q, v, q_all, v_all)
+        find_equations(c, q_all, v_all, memory)
+        for j in range(n):
+            x[POSITION, j] = q[j]
+            x[VELOCITY, j] = v[j]
+            x[CONTACT, j] = memory[plant.EXTERNAL_TORQUE + c * n + j]
+            x[LOAD, j] = memory[plant.JOINT_BIAS + j] - x[CONTACT, j]
+            x[TIME, j] = memory[plant.STEP] * dt
+            x[COMMAND, j] = command[c * n + j]
+        plant.effects_command(x, c, dt, memory)
+        drive(x, c, dt, memory)
+        next_speeds(x, c, dt, memory)
+        for j in range(n):
+            x[ACCELERATION, j] = memory[plant.JOINT_ACCELERATION + j]
+            v[j] = memory[plant.SPEED + j]
+            q[j] += dt * v[j]
+    memory[plant.STEP] += 1.0
+
+
+@compiled
+def advance_commands(command: Array, memory: Array) -> None:
+    """A step before the start: only effects on the command remember it."""
+    for c in range(C):
+        x = signals_of(c, memory)
+        for j in range(n):
+            x[COMMAND, j] = command[c * n + j]
+        plant.effects_command(x, c, memory[plant.DT], memory)
+
+
+@compiled
+def row_of_steps(
+    k: int, command: Array, history: int, substeps: int, memory: Array, rows: Integers, out: Array
+) -> None:
+    """The steps of command row k; its signals are read at one of them, the last one or memory[READING] if earlier."""
+    reading = min(int(memory[plant.READING]), substeps - 1)
+    for s in range(substeps):
+        if k < history:
+            advance_commands(command, memory)
+            continue
+        free_step(command, memory)
+        if s == reading:
+            for r in range(len(rows)):
+                for a in range(C * n):
+                    out[k - history, r, a] = memory[plant.SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+
+
+@compiled
+def roll(commands: Array, length: int, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
+    """Signals of each command row after the history."""
+    for k in range(history + length):
+        row_of_steps(k, commands[k], history, substeps, memory, rows, out)
+
+
+@compiled
+def note_free(memory: Array, free: Array) -> None:
+    """Marks the joints that their sensors do not show, within a gap of the transmission."""
+    for a in range(C * n):
+        if signals_of(a // n, memory)[GAP, a % n] == 2.0:
+            free[a] = 1.0
+
+
+@compiled
+def look_ahead(commands: Array, memory: Array, trial: Array, free: Array) -> None:
+    """Notes free joints in the steps to come, if any joint has a gap at all."""
+    gaps = 0.0
+    for a in range(C * n):
+        gaps += signals_of(a // n, memory)[GAP, a % n]
+    if gaps > 0.0:
+        trial[:] = memory
+        for command in commands:
+            free_step(command, trial)
+            note_free(trial, free)
+
+
+@compiled
+def start_segment(position: Array, speed: Array, free: Array, trial: Array, memory: Array) -> None:
+    """Puts the sensor to its measured position and the joints to their measured speed; effects keep their past.
+
+    `trial` has made the coming step already, which says how far the sensor is from the joint. A joint that is `free` of
+    its sensor around the start goes on as it was.
+    """
+    for a in range(C * n):
+        column = a % n
+        x = signals_of(a // n, trial)
+        if free[a] == 0.0:
+            memory[plant.Q + a] = position[a] - (x[MOTOR_POSITION, column] - x[POSITION, column])
+            memory[plant.V + a] = speed[a]
+
+
+@compiled
+def move(by: Array, memory: Array) -> None:
+    """Moves all joints by so much, in position and in speed."""
+    for a in range(C * n):
+        memory[plant.Q + a] += by[a]
+        memory[plant.V + a] += by[C * n + a]
+
+
+@compiled
+def roll_segments(
+    commands: Array,
+    length: int,
+    history: int,
+    substeps: int,
+    segment: int,
+    position: Array,
+    speed: Array,
+    initial_state: Array,
+    correction: Array,
+    memory: Array,
+    rows: Integers,
+    out: Array,
+) -> None:
+    """As `roll`, started anew from the measured `position` and `speed` (K, C n) every `segment` rows.
+
+    `initial_state` (2 C n,) moves the first start in position and speed, `correction` (2 C n,) every start.
+    """
+    trial, free = memory.copy(), np.zeros(C * n)
+    around = round(memory[plant.UNSURE] / memory[plant.DT])  # steps from which the measured speed is read
+    for k in range(history + length):
+        if k >= history and (k - history) % segment == 0:
+            part = (k - history) // segment
+            if part > 0:
+                look_ahead(commands[k : k + around], memory, trial, free)
+            for _ in range(4 if part == 0 else 1):  # the first start's torque is a guess at first
+                trial[:] = memory
+                free_step(commands[k], trial)
+                start_segment(position[part], speed[part], free, trial, memory)
+            if part == 0:
+                move(initial_state, memory)
+            move(correction, memory)
+            free[:] = 0.0
+        elif (k - history) % segment >= segment - around:
+            note_free(memory, free)
+        row_of_steps(k, commands[k], history, substeps, memory, rows, out)

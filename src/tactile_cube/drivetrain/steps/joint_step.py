@@ -1,0 +1,182 @@
+"""What every step of a chain computes: equations, drive, speeds under dry friction."""
+
+import numpy as np
+import numpy.typing as npt
+
+from tactile_cube.compiled import compiled, shaped_view
+from tactile_cube.drivetrain.coupled_joints import reduce_equations
+from tactile_cube.drivetrain.dry_friction import solve_speeds
+from tactile_cube.drivetrain.impedance import impedance_torque
+from tactile_cube.drivetrain.signals import (
+    ANGLE,
+    COMMAND,
+    CONTROLLER_TORQUE,
+    DAMPING,
+    DEFLECTION,
+    DIRECTION,
+    FRICTION,
+    GAP,
+    JOINT_TORQUE,
+    LEAD,
+    LOAD,
+    MEASURED_VELOCITY,
+    MOTOR_POSITION,
+    POSITION,
+    ROWS,
+    TORQUE,
+    VELOCITY,
+)
+from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, mass_matrix_and_bias
+
+from . import plant
+from .plant import N, n
+
+Array = npt.NDArray[np.float64]
+
+
+@compiled
+def block(memory: Array, offset: int, shape: tuple[int, ...], c: int = 0) -> Array:
+    """Chain c's part of what lies at an offset, as an array of this shape."""
+    size = 1
+    for length in shape:
+        size *= length
+    return shaped_view(memory, offset + c * size, shape)
+
+
+@compiled
+def signals_of(c: int, memory: Array) -> Array:
+    """The signals x (ROWS, n) of chain c."""
+    return block(memory, plant.SIGNALS, (ROWS, n), c)
+
+
+@compiled
+def find_equations(c: int, q: Array, v: Array, memory: Array) -> None:
+    """Fills M, h of all dofs of chain c and their actuated-joint form."""
+    M, h = block(memory, plant.MASS_MATRIX, (N, N)), block(memory, plant.BIAS, (N,))
+    mass_matrix_and_bias(
+        plant.PARENT,
+        plant.PRISMATIC,
+        block(memory, plant.PLACEMENT_ROTATION, (N, 3, 3), c),
+        block(memory, plant.PLACEMENT_TRANSLATION, (N, 3), c),
+        block(memory, plant.AXIS, (N, 3), c),
+        block(memory, plant.MASS, (N,), c),
+        block(memory, plant.COM, (N, 3), c),
+        block(memory, plant.INERTIA, (N, 3, 3), c),
+        q,
+        v,
+        block(memory, plant.GRAVITY, (3,), c),
+        block(memory, plant.WORK, (N + 1, WORK_COLUMNS)),
+        M,
+        h,
+    )
+    M_joint, h_joint = block(memory, plant.JOINT_MASS_MATRIX, (n, n)), block(memory, plant.JOINT_BIAS, (n,))
+    ratio, rotor = block(memory, plant.RATIO, (N,), c), block(memory, plant.REFLECTED_INERTIA, (n,), c)
+    reduce_equations(plant.FOLLOW, ratio, M, h, rotor, M_joint, h_joint)
+
+
+@compiled
+def drive(x: Array, c: int, dt: float, memory: Array) -> None:
+    """Command to motor torque, q_m and the further torques on the joint."""
+    read_sensors(x, c, dt, memory)
+    control_torque(x, c, memory)
+    plant.effects_motor_torque(x, c, dt, memory)
+    for j in range(n):
+        x[DEFLECTION, j] = memory[plant.COMPLIANCE + c * n + j] * x[TORQUE, j]
+    plant.effects_deflection(x, c, dt, memory)
+    for j in range(n):
+        x[MOTOR_POSITION, j] = x[POSITION, j] + x[DEFLECTION, j]
+    plant.effects_position_sensor(x, c, dt, memory)
+    note_extra_deflection(x, c, memory)
+    for j in range(n):
+        x[JOINT_TORQUE, j] = 0.0
+    plant.effects_joint_torque(x, c, dt, memory)
+
+
+@compiled
+def read_sensors(x: Array, c: int, dt: float, memory: Array) -> None:
+    """The measured speed, and the part of q_m that needs no torque to be known."""
+    for j in range(n):
+        x[MEASURED_VELOCITY, j] = x[VELOCITY, j]
+        x[DAMPING, j] = 1.0
+        x[MOTOR_POSITION, j] = x[POSITION, j]
+        x[ANGLE, j] = x[POSITION, j] + memory[plant.ANGLE_OFFSET + c * n + j]
+    plant.effects_velocity_sensor(x, c, dt, memory)
+    for j in range(n):
+        damped = memory[plant.KD + c * n + j] * x[MEASURED_VELOCITY, j] / memory[plant.KP + c * n + j]
+        x[LEAD, j] = x[COMMAND, j] - x[POSITION, j] - damped
+        x[GAP, j] = 0.0
+    plant.effects_position_sensor_ahead(x, c, dt, memory)
+
+
+@compiled
+def control_torque(x: Array, c: int, memory: Array) -> None:
+    """The impedance law's torque and its slope against the present speed."""
+    for j in range(n):
+        a = c * n + j
+        kp, kd = memory[plant.KP + a], memory[plant.KD + a]
+        compliance, limit = (
+            memory[plant.COMPLIANCE + a] + memory[plant.EXTRA_COMPLIANCE + a],
+            memory[plant.TORQUE_LIMIT + a],
+        )
+        ahead = x[MOTOR_POSITION, j] - x[POSITION, j]  # of sensor laws that need no torque: known now, not a step late
+        extra = memory[plant.EXTRA + a] + ahead
+        torque = impedance_torque(
+            x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j], kp, kd, compliance, extra, limit
+        )
+        memory[plant.EXTRA + a] = -ahead
+        x[CONTROLLER_TORQUE, j] = torque
+        x[TORQUE, j] = torque
+        x[DAMPING, j] = 0.0 if abs(torque) >= limit else x[DAMPING, j] * kd / (1.0 + kp * compliance)
+
+
+@compiled
+def note_extra_deflection(x: Array, c: int, memory: Array) -> None:
+    """What the closed form of the next step's torque does not know, exactly zero without effects that deflect.
+
+    The slope of a further deflection, which would not converge if it was taken for a constant, and the rest.
+    """
+    for j in range(n):
+        compliance = memory[plant.COMPLIANCE + c * n + j]
+        more = x[DEFLECTION, j] - compliance * x[TORQUE, j]
+        slope = max(more / x[TORQUE, j], 0.0) if abs(x[TORQUE, j]) > 1e-9 else 0.0
+        memory[plant.EXTRA_COMPLIANCE + c * n + j] = slope
+        memory[plant.EXTRA + c * n + j] += (
+            (x[MOTOR_POSITION, j] - (x[POSITION, j] + x[DEFLECTION, j]))
+            + (more - slope * x[TORQUE, j])
+            + (compliance + slope) * (x[TORQUE, j] - x[CONTROLLER_TORQUE, j])
+        )
+
+
+@compiled
+def next_speeds(x: Array, c: int, dt: float, memory: Array) -> None:
+    """Speeds of chain c after the step, under dry friction, in memory[SPEED]; its accelerations beside them."""
+    for j in range(n):
+        net = x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j]
+        x[DIRECTION, j] = np.sign(x[VELOCITY, j]) if x[VELOCITY, j] != 0.0 else np.sign(net)
+        x[FRICTION, j] = memory[plant.STATIC_FRICTION + c * n + j]
+        memory[plant.SPEED + j] = x[VELOCITY, j]
+    plant.effects_friction(x, c, dt, memory)  # may also add to JOINT_TORQUE: bristles in place of dry friction
+    M = block(memory, plant.JOINT_MASS_MATRIX, (n, n))
+    # damping acts on the mean of the speeds before and after the step, second order in dt: an explicit K_D dq would act
+    # half a step late, which fitting to a measurement takes for a delay
+    for j in range(n):
+        M[j, j] += 0.5 * dt * x[DAMPING, j]
+    for j in range(n):
+        memory[plant.MOMENTUM + j] = dt * (x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j])
+        for k in range(n):
+            memory[plant.MOMENTUM + j] += M[j, k] * x[VELOCITY, k]
+        memory[plant.FRICTION_IMPULSE + j] = dt * (max(x[FRICTION, j], 0.0) + memory[plant.BRAKE + c * n + j])
+        creep = memory[plant.FRICTION_CREEP + c * n + j]
+        memory[plant.GRIP + j] = dt / creep if creep > 0.0 else 0.0
+    solve_speeds(
+        M,
+        block(memory, plant.MOMENTUM, (n,)),
+        block(memory, plant.FRICTION_IMPULSE, (n,)),
+        block(memory, plant.GRIP, (n,)),
+        block(memory, plant.SPEED, (n,)),
+        block(memory, plant.SIDE, (n,)),
+        block(memory, plant.FACTOR, (n, n)),
+        block(memory, plant.TRIAL, (n,)),
+    )
+    for j in range(n):
+        memory[plant.JOINT_ACCELERATION + j] = (memory[plant.SPEED + j] - x[VELOCITY, j]) / dt
