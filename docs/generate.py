@@ -13,7 +13,7 @@ from pathlib import Path
 
 import yaml
 
-from tactile_cube.cli import CONFIG, commands
+from tactile_cube.command_help import CONFIG, commands
 from tactile_cube.drivetrain.effects import Effect, catalogue
 
 DOCS = Path(__file__).parent

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 from tactile_cube.hand import UrdfHand, hand_from_urdf
 
 

@@ -74,10 +74,3 @@ def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str
         cli.fail("no such thing")
     assert info.value.code == 2
     assert capsys.readouterr().err == "error: no such thing\n"
-
-
-def test_help_marks_the_default_of_each_group() -> None:
-    text = cli.help_text("train")
-    assert "*full" in text
-    assert "*multi_sync" in text
-    assert " seed: 0" in text

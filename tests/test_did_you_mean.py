@@ -2,7 +2,7 @@
 
 import pytest
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 from tactile_cube.did_you_mean import did_you_mean
 from tactile_cube.sweep import sweep_folder
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import runpy
 import sys
 
-from tactile_cube.cli import commands, fail
+from tactile_cube.cli import fail
+from tactile_cube.command_help import commands
 
 USAGE_ERROR = 2
 

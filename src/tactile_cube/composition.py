@@ -25,7 +25,7 @@ def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False
     from hydra import compose, initialize_config_dir
     from hydra.core.global_hydra import GlobalHydra
 
-    from tactile_cube.cli import CONFIG
+    from tactile_cube.command_help import CONFIG
 
     application = GlobalHydra.instance().hydra
     GlobalHydra.instance().hydra = None

@@ -12,7 +12,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 
 PINNED = Path(__file__).with_name("experiments.yaml")
 EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))

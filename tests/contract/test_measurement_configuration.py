@@ -8,7 +8,7 @@ from hydra import compose, initialize_config_dir
 from hydra.utils import get_class
 from omegaconf import OmegaConf
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 
 SOURCES = sorted(path.stem for path in (Path(CONFIG) / "source").glob("*.yaml"))
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from tactile_cube import cli
 from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.cli import with_recipe
+from tactile_cube.command_help import help_text
 from tactile_cube.evaluation.policy_path import SHIPPED
 
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
@@ -40,7 +41,7 @@ def test_help_lists_verbs_and_groups_without_importing_anything_slow(tmp_path: P
     for word in ("python -m tactile_cube.train", "task=", "table", "experiment=", "curriculum", "agent=", "sac_fast"):
         assert word in text
     began = time.process_time()
-    cli.help_text("train")
+    help_text("train")
     assert time.process_time() - began < 0.5
 
 
@@ -63,8 +64,8 @@ def test_cfg_job_shows_the_configuration_without_importing_torch(tmp_path: Path)
     ],
 )
 def test_train_takes_the_recipe_unless_an_experiment_is_named(words: list[str], taken: list[str]) -> None:
-    assert cli.with_recipe("train", words) == taken
-    assert cli.with_recipe("evaluate", words) == words
+    assert with_recipe("train", words) == taken
+    assert with_recipe("evaluate", words) == words
 
 
 def test_train_without_words_is_the_recipe_and_not_the_published_run(tmp_path: Path) -> None:

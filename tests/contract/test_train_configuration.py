@@ -9,7 +9,8 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from tactile_cube.agent.batch import Sizes
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
+from tactile_cube.env import Conditions
 from tactile_cube.training.environment import as_environment
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
@@ -35,7 +36,8 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
     assert isinstance(plain, dict)
     environment = as_environment(instantiate(config.env))
     assert environment.sizes == Sizes(120, 25, 12)
-    assert environment.reward_weights({}).shape == (environment.reward_terms,)
+    weights = environment.reward_weights(Conditions(0.12, 1.0, 1.0))
+    assert weights.shape == (environment.reward_terms,)
     agent = instantiate(config.agent, _partial_=True)(environment.sizes)
     assert agent.sizes == environment.sizes
     CollectorSettings(**plain["collector"])

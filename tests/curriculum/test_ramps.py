@@ -4,13 +4,13 @@ from tactile_cube.curriculum import LinearCurriculum, NoCurriculum, PerformanceC
 from tactile_cube.env import Conditions
 from tactile_cube.errors import InputError
 
-FINAL = Conditions(filter_time=0.5, gravity_scale=1.0)
+FINAL = Conditions(filter_time=0.5, gravity_scale=1.0, penalty_scale=1.0)
 
 
 def test_linear_curriculum_has_the_published_ramp() -> None:
     curriculum = LinearCurriculum()
-    assert curriculum.conditions(0, 9.0, FINAL) == Conditions(0.12, 0.05)
-    assert curriculum.conditions(2_000_000, 9.0, FINAL) == Conditions(0.12, 0.05)
+    assert curriculum.conditions(0, 9.0, FINAL) == Conditions(0.12, 0.05, 1.0)
+    assert curriculum.conditions(2_000_000, 9.0, FINAL) == Conditions(0.12, 0.05, 1.0)
     middle = curriculum.conditions(4_000_000, 0.0, FINAL)
     assert (middle.filter_time, middle.gravity_scale) == pytest.approx((0.31, 0.525))
     assert curriculum.conditions(6_000_000, 0.0, FINAL) == FINAL

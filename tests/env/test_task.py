@@ -37,7 +37,9 @@ def test_table_stands_under_the_cube_of_this_episode() -> None:
 
 
 def test_conditions_reach_the_constants() -> None:
-    constants = Task("full").apply(EpisodeConstants(), Conditions(filter_time=0.2, gravity_scale=0.3))
+    constants = Task("full").apply(
+        EpisodeConstants(), Conditions(filter_time=0.2, gravity_scale=0.3, penalty_scale=1.0)
+    )
     assert (constants.filter_time, constants.gravity_scale, constants.gravity_onset) == (0.2, 0.3, 4)
 
 

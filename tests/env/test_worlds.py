@@ -68,7 +68,7 @@ def test_progress_acts_at_the_next_reset(rotation_task: MakeTask) -> None:
     env.reset()
     assert env.tasks[0].constants.filter_time == pytest.approx(0.12)
     shown = env.set_progress(150, 0.0)
-    assert shown == pytest.approx({"T_s": 0.31, "gravity": 0.525, "penalty": 1.0})
+    assert shown.columns() == pytest.approx({"T_s": 0.31, "gravity": 0.525, "penalty": 1.0})
     assert env.tasks[0].constants.filter_time == pytest.approx(0.12)
     env.reset()
     assert env.tasks[0].constants.filter_time == pytest.approx(0.31)

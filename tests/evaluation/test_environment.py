@@ -1,7 +1,7 @@
 import pytest
 from omegaconf import OmegaConf
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import _checked, environment

@@ -8,6 +8,7 @@ import torch
 from hydra.utils import instantiate
 
 from tactile_cube.composition import composed
+from tactile_cube.env import Conditions
 from tactile_cube.training.checkpoint import Checkpoints
 from tactile_cube.training.environment import as_environment
 from tactile_cube.training.replay import Replay
@@ -25,7 +26,7 @@ def main(folder: Path) -> None:
         rows = replay.capacity if barrier == 0 else fresh
         replay.extend({name: torch.randn(rows, width) for name, width in replay.widths.items()})
         agent.update(
-            replay.sample(agent.settings.batch_size, environment.reward_weights({}))
+            replay.sample(agent.settings.batch_size, environment.reward_weights(Conditions(0.12, 1.0, 1.0)))
         )  # the optimiser's state too
         before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
         began, cpu = time.perf_counter(), time.process_time()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import yaml
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 from tactile_cube.identification.criteria import STANDARD, Criteria
 
 

@@ -13,7 +13,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 from tactile_cube.evaluation.sweep_table import PAPER_TABLE_1
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.randomization import Constant, LogUniform, Uniform

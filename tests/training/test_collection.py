@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from tactile_cube.agent.networks import Actor
+from tactile_cube.env import Conditions
 from tactile_cube.training.collection import CollectionError, MultiSyncCollection, SingleCollection
 from tests.training.tiny_env import LENGTH, SIZES, TinyEnv, tiny_environment
 
@@ -22,11 +23,11 @@ class StuckEnv(TinyEnv):
 
 
 class ColdEnv(TinyEnv):
-    """Takes its time before the first step, as if it had to compile."""
+    """Takes its time before the first step, as if it had to compile, and once more in its second block."""
 
     def _step(self, tensordict):  # type: ignore[no-untyped-def]
-        if self._calls == 0:
-            time.sleep(1.0)
+        if self._calls in (0, 7):
+            time.sleep(2.0)
         return super()._step(tensordict)
 
 
@@ -67,7 +68,10 @@ def test_stuck_worker_is_reported_after_the_timeout() -> None:
 
 def test_a_cold_start_is_not_taken_for_a_stuck_worker() -> None:
     collection = start(make=ColdEnv, timeout=0.5)
-    collect(collection)
+    collection.launch(Actor(SIZES, (8,)), False, (0, 0.0))
+    assert collection.take().batch_size == (4, 5)
+    with pytest.raises(CollectionError, match=r"collector\.timeout=0\.5 s"):
+        collect(collection)
     collection.close()
 
 
@@ -92,7 +96,7 @@ def test_restart_makes_blocks_repeat_and_tells_the_curriculum() -> None:
     blocks = []
     for _ in range(2):
         collection.restart(11, (500, 0.0))
-        assert collection.launch(actor, False, (500, 0.0)) == {"scale": 1.5}
+        assert collection.launch(actor, False, (500, 0.0)) == Conditions(0.12, 1.5, 1.0)
         blocks.append(collection.take())
     assert torch.equal(blocks[0]["next", "theta"], blocks[1]["next", "theta"])
     assert blocks[0].batch_size == (4, LENGTH)

@@ -9,6 +9,7 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from tactile_cube.agent.batch import Sizes
+from tactile_cube.env import Conditions
 from tactile_cube.training.environment import Environment
 
 SIZES = Sizes(observation=6, privileged=3, action=2)
@@ -42,9 +43,9 @@ class TinyEnv(EnvBase):
         self.scale = 1.0
         self.set_seed(seed)
 
-    def set_progress(self, environment_steps: int, performance: float) -> dict[str, float]:
+    def set_progress(self, environment_steps: int, performance: float) -> Conditions:
         self.scale = 1.0 + environment_steps / 1000.0
-        return {"scale": self.scale}
+        return Conditions(filter_time=0.12, gravity_scale=self.scale, penalty_scale=1.0)
 
     def _set_seed(self, seed: int | None) -> None:
         torch.manual_seed(seed or 0)
@@ -93,7 +94,7 @@ class TinyEnv(EnvBase):
         return TensorDict(data, batch_size=self.batch_size)
 
 
-def tiny_weights(conditions: dict[str, float]) -> torch.Tensor:
+def tiny_weights(conditions: Conditions) -> torch.Tensor:
     return torch.tensor([1.0, 0.5])
 
 

@@ -9,7 +9,7 @@ from hydra import compose, initialize_config_dir
 from hydra.errors import InstantiationException
 from hydra.utils import instantiate
 
-from tactile_cube.cli import CONFIG
+from tactile_cube.command_help import CONFIG
 from tactile_cube.curriculum import LinearCurriculum
 from tactile_cube.env import Reward
 from tactile_cube.errors import InputError
@@ -58,7 +58,7 @@ def test_option_makes_an_environment_that_runs(group: str, option: str) -> None:
     env = make_env(config, worlds=1, seed=0, teacher=idle if option == "teacher" else None)
     data = env.rollout(2)
     assert not data["next", "faulty"].any()
-    assert set(env.set_progress(3_000_000, 2.5)) == {"T_s", "gravity", "penalty"}
+    assert set(env.set_progress(3_000_000, 2.5).columns()) == {"T_s", "gravity", "penalty"}
     env.close()
 
 

@@ -18,7 +18,11 @@ class Conditions:
 
     filter_time: float
     gravity_scale: float
-    penalty_scale: float = 1.0
+    penalty_scale: float
+
+    def columns(self) -> dict[str, float]:
+        """By the names that they have in logs: "T_s" [s], "gravity" and "penalty" (scales)."""
+        return {"T_s": self.filter_time, "gravity": self.gravity_scale, "penalty": self.penalty_scale}
 
 
 class Curriculum(Protocol):

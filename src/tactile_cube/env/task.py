@@ -79,7 +79,7 @@ class Task:
 
     def conditions(self) -> Conditions:
         """The task's own conditions, which a curriculum ends at."""
-        return Conditions(self.filter_time, self.gravity_scale)
+        return Conditions(self.filter_time, self.gravity_scale, penalty_scale=1.0)
 
     def apply(self, constants: EpisodeConstants, conditions: Conditions) -> EpisodeConstants:
         """The constants of an episode of this task: T_s, weight, onset of gravity and table as the task wants them."""

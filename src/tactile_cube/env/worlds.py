@@ -64,7 +64,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
         self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
 
-    def set_progress(self, environment_steps: int, performance: float) -> dict[str, float]:
+    def set_progress(self, environment_steps: int, performance: float) -> Conditions:
         """Sets the conditions of the episodes that start from now on.
 
         Args:
@@ -72,18 +72,14 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
             performance: mean final angle of recent episodes [rad].
 
         Returns:
-            The conditions in force, for logs: "T_s" [s], "gravity" and "penalty" (scales).
+            The conditions in force.
         """
-        conditions: Conditions = self.tasks[0].task.conditions()
+        conditions = self.tasks[0].task.conditions()
         if self.curriculum is not None:
             conditions = self.curriculum.conditions(environment_steps, performance, conditions)
         for task in self.tasks:
             task.set_conditions(conditions)
-        return {
-            "T_s": conditions.filter_time,
-            "gravity": conditions.gravity_scale,
-            "penalty": conditions.penalty_scale,
-        }
+        return conditions
 
     def _set_seed(self, seed: int | None) -> None:
         """Seeds every world, and torch's global generator, which the transforms draw from."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, Array, Integers, mass_matrix_and_bias
-from tactile_cube.hand.urdf_tree import Coupling, Joint, read_movable_joints
+from tactile_cube.hand.urdf_elements import Coupling, Joint
+from tactile_cube.hand.urdf_tree import read_movable_joints
 
 __all__ = ["Coupling", "RigidBodyTree"]
 

@@ -13,8 +13,8 @@ from tactile_cube.hand.chain import Chain
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.shape import Array, Shape
 from tactile_cube.hand.urdf import number_list, origin_element
+from tactile_cube.hand.urdf_elements import Placement, placement_of
 from tactile_cube.hand.urdf_shapes import collision_element, moved, read_shapes, visual_elements
-from tactile_cube.hand.urdf_tree import Placement, placement_of
 
 _COLOURS = ("0.72 0.74 0.78 1", "0.13 0.15 0.18 1")
 """Of links and of the last one."""

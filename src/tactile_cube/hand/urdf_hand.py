@@ -163,43 +163,50 @@ def hand_from_urdf(
     Raises:
         InputError: what does not fit, by its key.
     """
-    file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.is_file()), None)
-    if file is None:
-        raise InputError(f"hand.urdf={urdf}: no such file, nor one of the package's in {DESCRIPTIONS.name}/")
-    if not fingers:
-        raise InputError("hand.fingers is empty; describe at least one finger")
+    file = _file(urdf)
     text = file.read_text(encoding="utf-8")
-    chains, bases = [], []
-    for key, one in fingers.items():
-        chain, base = _finger(str(key), one, text, file.parent)
-        chains.append(chain)
-        bases.append(base)
-    shapes = {(len(chain.joints), chain.columns) for chain in chains}
-    if len(shapes) > 1:
-        counts = ", ".join(f"{base.name} {len(chain.joints)}" for base, chain in zip(bases, chains, strict=True))
-        raise InputError(
-            f"hand.fingers have different joints ({counts}); fingers of equally many joints can be simulated"
-        )
+    chains, bases = _fingers(fingers, text, file.parent)
     own = sorted({chains[0].columns.index(column) for column in chains[0].columns})
     limits = np.concatenate([chain.limits[own] for chain in chains])
-    reach = _action_limits(action, limits, len(chains))
+    lower, upper = _action_limits(action, limits, len(chains))
     moving = tuple(joint for chain in chains for joint in chain.joints)
     hand = UrdfHand(
-        fingers=tuple(bases),
+        fingers=bases,
         lower=limits[:, 0],
         upper=limits[:, 1],
-        action_lower=reach[0],
-        action_upper=reach[1],
+        action_lower=lower,
+        action_upper=upper,
         position=_vector("position", position),
         rotation=Rotation.from_euler("xyz", _vector("rotation", rotation)).as_matrix(),
         start_angles=np.zeros(len(limits)),
         drive={key: np.asarray(value) if np.ndim(value) else float(value) for key, value in (drive or {}).items()},  # type: ignore[arg-type]
         label=name,
-        chains=tuple(chains),
+        chains=chains,
         palm=tuple(palm_shapes(text, moving, file.parent)),
         radius=float(tip_radius),
     )
     return replace(hand, start_angles=_start(hand, start))
+
+
+def _file(urdf: str) -> Path:
+    file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.is_file()), None)
+    if file is None:
+        raise InputError(f"hand.urdf={urdf}: no such file, nor one of the package's in {DESCRIPTIONS.name}/")
+    return file
+
+
+def _fingers(
+    fingers: Mapping[str, Mapping[str, Any]], text: str, folder: Path
+) -> tuple[tuple[UrdfFinger, ...], tuple[FingerBase, ...]]:
+    if not fingers:
+        raise InputError("hand.fingers is empty; describe at least one finger")
+    chains, bases = zip(*(_finger(str(key), one, text, folder) for key, one in fingers.items()), strict=True)
+    if len({(len(chain.joints), chain.columns) for chain in chains}) > 1:
+        counts = ", ".join(f"{base.name} {len(chain.joints)}" for base, chain in zip(bases, chains, strict=True))
+        raise InputError(
+            f"hand.fingers have different joints ({counts}); fingers of equally many joints can be simulated"
+        )
+    return chains, bases
 
 
 def _finger(name: str, one: Mapping[str, Any], text: str, folder: Path) -> tuple[UrdfFinger, FingerBase]:

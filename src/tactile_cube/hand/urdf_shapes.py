@@ -10,7 +10,7 @@ import numpy as np
 from tactile_cube.errors import InputError
 from tactile_cube.hand.shape import Array, Shape
 from tactile_cube.hand.urdf import origin_element
-from tactile_cube.hand.urdf_tree import Placement, number, placement_of, triple
+from tactile_cube.hand.urdf_elements import Placement, number, placement_of, triple
 
 
 def read_shapes(link: ElementTree.Element, place: Placement, folder: Path) -> list[Shape]:

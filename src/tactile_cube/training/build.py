@@ -68,18 +68,42 @@ def build_run(
         torch.manual_seed(seed)
         checkpoints = Checkpoints(folder)
         saved = _saved_state(checkpoints, training, config)
-        agent = make_agent(environment.sizes)
-        training = protected(training)
-        if saved is None and training.init_from:
-            warm_start(agent, Path(training.init_from))
-        collection = build_collection(environment, agent.policy(), collector, training)
-        held.callback(collection.close)  # worker processes would keep the program from ending
+        learner = build_learner(seed, environment, make_agent, collector, training, saved)
+        held.callback(learner.collection.close)  # worker processes would keep the program from ending
+        in_process = isinstance(learner.collection, SingleCollection)
+        processes = 1 if in_process else collector.workers + 1
+        ledger = Ledger(folder / LEDGER, processes, learner.collection.cpu_seconds, in_process)
+        made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
+        seconds = expected_seconds(training.steps - learner.steps, learner.agent.settings, collector, training)
+        notices = [*environment.approximations, *learner.agent.approximations()]
+        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, notices)
+        held.pop_all()  # it is the run's from here
+    run.best_angle = saved["best_angle"] if saved is not None else 0.0
+    return run
+
+
+def build_learner(
+    seed: int,
+    environment: Environment,
+    make_agent: Callable[[Sizes], Agent],
+    collector: CollectorSettings,
+    training: TrainingSettings,
+    saved: dict[str, Any] | None,
+) -> Learner:
+    """Agent, experience and workers: as a checkpoint's contents `saved` say, from `init_from`, or new."""
+    agent = make_agent(environment.sizes)
+    settings = protected(training)
+    if saved is None and training.init_from:
+        warm_start(agent, Path(training.init_from))
+    with contextlib.ExitStack() as held:
+        collection = build_collection(environment, agent.policy(), collector, settings)
+        held.callback(collection.close)
         learner = Learner(
             agent=agent,
-            replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
+            replay=Replay(settings.replay_size, environment.sizes, environment.reward_terms, seed),
             collection=collection,
             episodes=EpisodeStatistics(environment.outcomes),
-            settings=training,
+            settings=settings,
             reward_weights=environment.reward_weights,
             seed=seed,
         )
@@ -87,16 +111,8 @@ def build_run(
             learner.load_state_dict(saved["learner"])
         elif training.init_replay:
             learner.replay.load_state_dict(replay_of(training.init_from))
-        in_process = isinstance(collection, SingleCollection)
-        processes = 1 if in_process else collector.workers + 1
-        ledger = Ledger(folder / LEDGER, processes, collection.cpu_seconds, in_process)
-        made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
-        seconds = expected_seconds(training.steps - learner.steps, agent.settings, collector, training)
-        notices = [*environment.approximations, *agent.approximations()]
-        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, notices)
-        held.pop_all()  # it is the run's from here
-    run.best_angle = saved["best_angle"] if saved is not None else 0.0
-    return run
+        held.pop_all()
+    return learner
 
 
 def build_collection(

@@ -23,6 +23,7 @@ from torchrl.envs import EnvBase
 
 from tactile_cube.agent.behaviour import Behaviour
 from tactile_cube.agent.networks import Actor
+from tactile_cube.env import Conditions
 from tactile_cube.training.background import Background
 
 MakeEnv = Callable[..., EnvBase]
@@ -42,8 +43,8 @@ class Collection(Protocol):
     def restart(self, seed: int, progress: Progress) -> None:
         """Reset all worlds and seed everything random in them."""
 
-    def launch(self, actor: Actor, random: bool, progress: Progress) -> dict[str, float]:
-        """Begin collecting one block with these weights; gives the curriculum's values in force, e.g. {"T_s": 0.2}."""
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
+        """Begin collecting one block with these weights; gives the conditions in force."""
 
     def take(self) -> TensorDictBase:
         """Wait for the block begun last; it is the caller's to keep."""
@@ -87,9 +88,9 @@ class SingleCollection:
         self._env.set_progress(*progress)
         self._aside(partial(self._seed_and_reset, seed))
 
-    def launch(self, actor: Actor, random: bool, progress: Progress) -> dict[str, float]:
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Collect one block."""
-        conditions: dict[str, float] = self._env.set_progress(*progress)
+        conditions: Conditions = self._env.set_progress(*progress)
         self._behaviour.actor.load_state_dict(actor.state_dict())
         self._behaviour.random.fill_(float(random))
         self._block = self._aside(lambda: next(self._blocks).clone())
@@ -189,7 +190,7 @@ class MultiSyncCollection:
         self._set_progress(progress)
         self._wait(self._thread.submit(partial(self._collector.set_seed, seed)), "restart")
 
-    def launch(self, actor: Actor, random: bool, progress: Progress) -> dict[str, float]:
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Hand the weights to the workers and let them collect one block."""
         conditions = self._set_progress(progress)
         self._behaviour.actor.load_state_dict(actor.state_dict())
@@ -198,9 +199,9 @@ class MultiSyncCollection:
         self._block = self._thread.submit(partial(self._collect, weights))
         return conditions
 
-    def _set_progress(self, progress: Progress) -> dict[str, float]:
+    def _set_progress(self, progress: Progress) -> Conditions:
         call = partial(self._collector.map_fn, "env.set_progress", [progress] * len(self._processes))
-        conditions: dict[str, float] = self._wait(self._thread.submit(call), "set the curriculum")[0]
+        conditions: Conditions = self._wait(self._thread.submit(call), "set the curriculum")[0]
         return conditions
 
     def _collect(self, weights: TensorDictBase) -> TensorDictBase:

@@ -1,7 +1,6 @@
 """What training needs to know about an environment besides how to make one."""
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,10 @@ from torchrl.envs import TransformedEnv
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
-from tactile_cube.env import OUTCOMES, REWARD_TERMS
+from tactile_cube.env import OUTCOMES, REWARD_TERMS, Conditions
 from tactile_cube.env.rotation import OBJECT
 from tactile_cube.training.collection import MakeEnv
+from tactile_cube.training.loop import RewardWeights
 from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.transforms.finger_exploration import Teacher
 
@@ -27,7 +27,7 @@ class Environment:
         make: makes a batch of worlds, in whichever process.
         sizes: widths of observation, privileged state and action.
         reward_terms: number of reward terms.
-        reward_weights: weights of the terms (terms,) under the curriculum's values in force.
+        reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
         approximations: what its worlds compute less well than they could, in words.
     """
@@ -35,7 +35,7 @@ class Environment:
     make: MakeEnv
     sizes: Sizes
     reward_terms: int
-    reward_weights: Callable[[dict[str, float]], Tensor]
+    reward_weights: RewardWeights
     outcomes: tuple[str, ...] = ()
     approximations: tuple[str, ...] = ()
 
@@ -67,8 +67,8 @@ def _teacher(config: EnvConfig) -> Teacher | None:
     return actor.deterministic
 
 
-def _weights(config: EnvConfig, conditions: dict[str, Any]) -> Tensor:
-    return torch.from_numpy(config.reward.weights(conditions.get("penalty", 1.0)))
+def _weights(config: EnvConfig, conditions: Conditions) -> Tensor:
+    return torch.from_numpy(config.reward.weights(conditions.penalty_scale))
 
 
 def as_environment(made: Any) -> Environment:

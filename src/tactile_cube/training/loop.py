@@ -17,14 +17,15 @@ from tensordict import TensorDictBase
 from torch import Tensor
 
 from tactile_cube.agent.interface import Agent
+from tactile_cube.env import Conditions
 from tactile_cube.training.collection import Collection, CollectionError
 from tactile_cube.training.episodes import EpisodeStatistics
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.settings import TrainingSettings
 from tactile_cube.training.transitions import TransitionAssembler
 
-RewardWeights = Callable[[dict[str, float]], Tensor]
-"""Weights of the reward terms (terms,) under the curriculum's values in force."""
+RewardWeights = Callable[[Conditions], Tensor]
+"""Weights of the reward terms (terms,) under the conditions in force."""
 
 
 @dataclass
@@ -37,7 +38,8 @@ class Learner:
         collection: source of experience.
         episodes: statistics of the last episodes.
         settings: schedule of the run.
-        reward_weights: how reward terms are weighed under the curriculum's values.
+        reward_weights: how reward terms are weighed under the conditions in force.
+        conditions: those of the block begun last; None before the first.
         seed: of the run.
     """
 
@@ -51,7 +53,7 @@ class Learner:
     iteration: int = 0
     steps: int = 0
     updates: int = 0
-    conditions: dict[str, float] = field(default_factory=dict)
+    conditions: Conditions | None = None
     metrics: dict[str, Tensor] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -72,7 +74,7 @@ class Learner:
         random = self.steps < self.settings.random_steps
         self.conditions = self.collection.launch(self.agent.policy(), random, self._progress())
         if self.steps >= self.settings.learning_starts:
-            self._learn()
+            self._learn(self.reward_weights(self.conditions))
         block = self.collection.take()
         _require_finite(block)
         self._store(self.assembler.add(block))
@@ -80,8 +82,7 @@ class Learner:
         self.steps += block.numel()
         self.iteration += 1
 
-    def _learn(self) -> None:
-        weights = self.reward_weights(self.conditions)
+    def _learn(self, weights: Tensor) -> None:
         frozen = copy.deepcopy(self.agent.policy()) if self.updates < (self.settings.actor_frozen or 0) else None
         for _ in range(self.settings.updates_per_iteration):
             self.metrics = self.agent.update(self.replay.sample(self.agent.settings.batch_size, weights))

@@ -125,10 +125,12 @@ class Run:
 
     def _after_iteration(self) -> None:
         learner = self.learner
+        assert learner.conditions is not None, "iterate first"
+        conditions = learner.conditions.columns()
         now = time.perf_counter()
         self._iteration_ended, self._iteration_seconds = now, now - self._iteration_ended
         summary = learner.episodes.summary()
-        self.line.show(learner.steps, learner.updates, summary, learner.conditions)
+        self.line.show(learner.steps, learner.updates, summary, conditions)
         if learner.iteration % learner.settings.log_iterations == 0:
             losses = {key: float(value) for key, value in learner.metrics.items()}
             costs = self.ledger.costs()
@@ -136,7 +138,7 @@ class Run:
             # losses last: the columns of metrics.csv are those of the first row, so they must be there from the start
             blank = dict.fromkeys(("critic_loss", "actor_loss", "alpha", "entropy", "value"), float("nan"))
             counts = {"updates": learner.updates, "wall_hours": costs.wall / 3600}
-            self.loggers.log(learner.steps, summary | learner.conditions | counts | hours | blank | losses)
+            self.loggers.log(learner.steps, summary | conditions | counts | hours | blank | losses)
 
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
@@ -170,7 +172,7 @@ class Run:
         actor = learner.agent.policy()
         info = PolicyInfo.describe(
             actor,
-            time_constant=learner.conditions.get("T_s"),
+            time_constant=learner.conditions.filter_time if learner.conditions else None,  # none at the start
             seed=learner.seed,
             steps=learner.steps,
             commit=self.commit,

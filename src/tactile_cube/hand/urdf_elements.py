@@ -1,0 +1,201 @@
+"""Elements of a URDF as values: joints, the bodies that they carry, placements, numbers."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from tactile_cube.errors import InputError
+
+Array = npt.NDArray[np.float64]
+MOVABLE = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A joint that follows another one: position = ratio * position of `joint` + offset [rad or m]."""
+
+    joint: str
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A frame in another one: rotation (3, 3), translation (3,) [m]."""
+
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    translation: Array = field(default_factory=lambda: np.zeros(3))
+
+    def then(self, inner: Placement) -> Placement:
+        """The frame `inner` of this frame, seen from outside."""
+        return Placement(self.rotation @ inner.rotation, self.rotation @ inner.translation + self.translation)
+
+
+@dataclass(frozen=True)
+class Body:
+    """Mass [kg], centre of mass (3,) [m] and inertia (3, 3) about it [kg m^2], in one frame."""
+
+    mass: float = 0.0
+    com: Array = field(default_factory=lambda: np.zeros(3))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def seen_from(self, place: Placement) -> Body:
+        """The same body in the frame in which its own frame sits at `place`."""
+        R = place.rotation
+        return Body(self.mass, R @ self.com + place.translation, R @ self.inertia @ R.T)
+
+    def joined(self, other: Body) -> Body:
+        """Both bodies as one (parallel-axis theorem)."""
+        mass = self.mass + other.mass
+        if mass == 0.0:
+            return Body(0.0, self.com, self.inertia + other.inertia)
+        com = (self.mass * self.com + other.mass * other.com) / mass
+        inertia = sum((b.inertia + b.mass * _square(b.com - com) for b in (self, other)), np.zeros((3, 3)))
+        return Body(mass, com, inertia)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the URDF with the link it carries; `parent` and `link` are link names."""
+
+    name: str
+    kind: str
+    parent: str
+    link: str
+    placement: Placement
+    axis: Array
+    lower: float
+    upper: float
+    coupling: Coupling | None
+    body: Body
+
+    @property
+    def prismatic(self) -> bool:
+        """Whether it slides."""
+        return self.kind == "prismatic"
+
+
+def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
+    """A <joint> with the body of the link that it carries, of `bodies` by link."""
+    name = attribute(element, "name", "a joint")
+    kind = attribute(element, "type", f"joint '{name}'")
+    if kind not in (*MOVABLE, "fixed"):
+        raise InputError(f"URDF: joint '{name}' has type '{kind}'; use one of {', '.join(MOVABLE)} or fixed")
+    parent, child = (_linked(element, end, name, bodies) for end in ("parent", "child"))
+    limit = element.find("limit")
+    bounded = limit is not None and kind != "continuous"
+    return Joint(
+        name=name,
+        kind=kind,
+        parent=parent,
+        link=child,
+        placement=placement_of(element, f"joint '{name}'"),
+        axis=_axis(element, name),
+        lower=number(limit, "lower", f"joint '{name}'", 0.0) if bounded else -np.inf,
+        upper=number(limit, "upper", f"joint '{name}'", 0.0) if bounded else np.inf,
+        coupling=_mimic(element, name),
+        body=bodies[child],
+    )
+
+
+def _mimic(element: ElementTree.Element, name: str) -> Coupling | None:
+    mimic = element.find("mimic")
+    if mimic is None:
+        return None
+    where = f"the <mimic> of joint '{name}'"
+    ratio, offset = number(mimic, "multiplier", where, 1.0), number(mimic, "offset", where, 0.0)
+    return Coupling(attribute(mimic, "joint", where), ratio, offset)
+
+
+def body_of(link: ElementTree.Element) -> Body:
+    """The <inertial> of a <link>; without one it has no mass."""
+    inertial, where = link.find("inertial"), f"link '{link.get('name')}'"
+    if inertial is None:
+        return Body()
+    mass = number(inertial.find("mass"), "value", f"the mass of {where}", 0.0)
+    element = inertial.find("inertia")
+    xx, yy, zz, xy, xz, yz = (
+        number(element, key, f"the inertia of {where}", 0.0) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    )
+    body = Body(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    return body.seen_from(placement_of(inertial, where))
+
+
+def placement_of(element: ElementTree.Element, where: str) -> Placement:
+    """The <origin> of an element."""
+    origin = element.find("origin")
+    if origin is None:
+        return Placement()
+    roll, pitch, yaw = triple(origin, "rpy", where)
+    return Placement(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), triple(origin, "xyz", where))
+
+
+def _about(axis: int, angle: float) -> Array:
+    """Rotation matrix about a coordinate axis; quarter turns are exact to rounding."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[i, i] = R[j, j] = np.cos(angle)
+    R[j, i] = np.sin(angle)
+    R[i, j] = -R[j, i]
+    return R
+
+
+def _axis(element: ElementTree.Element, name: str) -> Array:
+    axis = element.find("axis")
+    if axis is None:
+        return np.array([1.0, 0.0, 0.0])  # URDF's default
+    vector = triple(axis, "xyz", f"the axis of joint '{name}'")
+    length = float(np.linalg.norm(vector))
+    if length == 0.0:
+        raise InputError(f"URDF: the axis of joint '{name}' is zero; give it a direction")
+    return vector / length
+
+
+def triple(element: ElementTree.Element, key: str, where: str) -> Array:
+    """Three numbers of an attribute (3,)."""
+    text = element.get(key, "0 0 0")
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (3,) or not np.all(np.isfinite(values)):
+        raise InputError(f'URDF: {where} has {key}="{text}"; it takes three numbers')
+    return values
+
+
+def number(element: ElementTree.Element | None, key: str, where: str, default: float) -> float:
+    """One number of an attribute."""
+    text = element.get(key) if element is not None else None
+    try:
+        value = default if text is None else float(text)
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise InputError(f'URDF: {where} has {key}="{text}"; it takes a number')
+    return value
+
+
+def attribute(element: ElementTree.Element, key: str, where: str) -> str:
+    """An attribute that must be there."""
+    value = element.get(key)
+    if not value:
+        raise InputError(f"URDF: {where} lacks the attribute '{key}'; add it")
+    return value
+
+
+def _linked(element: ElementTree.Element, end: str, name: str, bodies: Mapping[str, Body]) -> str:
+    found = element.find(end)
+    link = found.get("link", "") if found is not None else ""
+    if link not in bodies:
+        raise InputError(f"URDF: the {end} link '{link}' of joint '{name}' is not defined; add <link name=.../>")
+    return link
+
+
+def _square(r: Array) -> Array:
+    """|r|^2 1 - r r^T, the inertia of a unit point mass."""
+    return np.asarray(r @ r * np.eye(3) - np.outer(r, r))
