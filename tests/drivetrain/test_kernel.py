@@ -124,7 +124,7 @@ def test_processes_that_start_at_once_share_one_cache(tmp_path) -> None:
         "from tests.drivetrain.rigs import wheel; p = Plant([wheel()], dt=0.002); "
         "m = p.memory(DrivetrainConstants()); p.kernel.step(np.ones(1), m); print(p.view(m, 'v')[0])"
     )
-    environment = {"XDG_CACHE_HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT)}
+    environment = {"XDG_CACHE_HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "PYTHONPATH": f"{ROOT}:{ROOT / 'src'}"}
     jobs = [
         subprocess.Popen([sys.executable, "-c", program], env=environment, cwd=ROOT, stdout=subprocess.PIPE)
         for _ in range(2)
