@@ -7,7 +7,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 import numpy.typing as npt
-from numba import carray, types
+from numba import types
 from numba.extending import intrinsic, overload
 
 Array = npt.NDArray[np.float64]
@@ -58,7 +58,7 @@ def _borrowed(array: Any) -> Any:
     def machine_code(array: Any) -> Any:
         if array.strides[0] != array.itemsize:
             raise ValueError("an array with gaps: pass a contiguous one")
-        return carray(_as_pointer(array.ctypes.data), array.shape)  # type: ignore[call-arg]
+        return numba.carray(_as_pointer(array.ctypes.data), array.shape)  # type: ignore
 
     return machine_code
 
@@ -66,6 +66,6 @@ def _borrowed(array: Any) -> Any:
 @overload(shaped_view)
 def _shaped_view(array: Any, start: Any, shape: Any) -> Any:
     def machine_code(array: Any, start: Any, shape: Any) -> Any:
-        return carray(_as_pointer(array.ctypes.data + start * array.itemsize), shape)  # type: ignore[call-arg]
+        return numba.carray(_as_pointer(array.ctypes.data + start * array.itemsize), shape)  # type: ignore
 
     return machine_code

@@ -5,10 +5,12 @@ into each kernel's folder, the other steps are loaded from where they are.
 """
 
 from ctypes import CFUNCTYPE, POINTER, c_double, c_int64, c_void_p, cast
+from typing import Any
 
+import numba
 import numpy as np
 import numpy.typing as npt
-from numba import carray, cfunc, config, types
+from numba import cfunc, types
 
 from tactile_cube.compiled import borrowed, compiled_once
 
@@ -18,6 +20,7 @@ from .plant import C, N
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
+Pointer = Any  # to float64
 
 
 @compiled_once
@@ -91,17 +94,23 @@ def segments_batch(
         )
 
 
-def callback(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
+def callback(i: int, q: Pointer, v: Pointer, torque: Pointer, memory: Pointer) -> None:
     """The control step for C, whose arrays do not know their size."""
-    size = int(carray(memory, (1,))[0])
-    control(i, carray(q, (C * N,)), carray(v, (C * N,)), carray(torque, (C * N,)), carray(memory, (size,)))
+    size = int(numba.carray(memory, (1,))[0])
+    control(
+        i,
+        numba.carray(q, (C * N,)),
+        numba.carray(v, (C * N,)),
+        numba.carray(torque, (C * N,)),
+        numba.carray(memory, (size,)),
+    )
 
 
 def control_callback() -> tuple[object, int]:
     """A C function void(int64 i, double *q, double *v, double *torque, double *memory), to be kept; its address."""
-    if config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         interpreted = CFUNCTYPE(None, c_int64, *[POINTER(c_double)] * 4)(callback)
         return interpreted, cast(interpreted, c_void_p).value or 0
-    pointer = types.CPointer(types.float64)
-    compiled = cfunc(types.void(types.int64, *[pointer] * 4), error_model="numpy", cache=True)(callback)
+    pointer = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+    compiled: Any = cfunc(types.void(types.int64, *[pointer] * 4), error_model="numpy", cache=True)(callback)
     return compiled, compiled.address
