@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import cfunc, types
 
-from tactile_cube.compiled import borrowed, compiled_once
+from tactile_cube.compiled import borrowed, compiled, compiled_once
 
 from .engine_step import control
 from .free_step import free_step, roll, roll_segments
@@ -94,16 +94,16 @@ def segments_batch(
         )
 
 
+@compiled
+def from_c(pointer: Pointer, size: int) -> Array:
+    """The numbers (size,) at a C pointer."""
+    return numba.carray(pointer, (size,))  # type: ignore
+
+
 def callback(i: int, q: Pointer, v: Pointer, torque: Pointer, memory: Pointer) -> None:
-    """The control step for C, whose arrays do not know their size."""
-    size = int(numba.carray(memory, (1,))[0])
-    control(
-        i,
-        numba.carray(q, (C * N,)),
-        numba.carray(v, (C * N,)),
-        numba.carray(torque, (C * N,)),
-        numba.carray(memory, (size,)),
-    )
+    """The control step for C, whose arrays do not know their size: that of memory is its first number."""
+    size = int(from_c(memory, 1)[0])
+    control(i, from_c(q, C * N), from_c(v, C * N), from_c(torque, C * N), from_c(memory, size))
 
 
 def control_callback() -> tuple[object, int]:
@@ -112,5 +112,5 @@ def control_callback() -> tuple[object, int]:
         interpreted = CFUNCTYPE(None, c_int64, *[POINTER(c_double)] * 4)(callback)
         return interpreted, cast(interpreted, c_void_p).value or 0
     pointer = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-    compiled: Any = cfunc(types.void(types.int64, *[pointer] * 4), error_model="numpy", cache=True)(callback)
-    return compiled, compiled.address
+    machine_code: Any = cfunc(types.void(types.int64, *[pointer] * 4), error_model="numpy", cache=True)(callback)
+    return machine_code, machine_code.address
