@@ -42,6 +42,7 @@ class PolicyInfo(BaseModel):
         steps: environment steps it was trained for.
         commit: of the code that trained it; "unknown" outside a checkout.
         performance: mean final angle [rad] of the last training episodes when it was saved; None if unknown.
+        averaged: after how many steps the policies were kept whose mean weights these are; empty: it is no mean.
         config: the training configuration, resolved.
     """
 
@@ -57,6 +58,7 @@ class PolicyInfo(BaseModel):
     steps: int = 0
     commit: str = "unknown"
     performance: float | None = None
+    averaged: tuple[int, ...] = ()
     config: dict[str, Any] = Field(default_factory=dict)
 
     @classmethod

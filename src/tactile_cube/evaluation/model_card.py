@@ -29,6 +29,7 @@ def model_card(name: str, info: PolicyInfo, runs: Sequence[Ancestor], results: S
     made = {
         "task": f"{task.get('name', '?')}, T_s {filter_time} s, gravity {gravity}",
         "environment steps": ", then ".join(f"{run.steps or 0:,} ({run.name})".replace(",", " ") for run in trained),
+        **({"weights": f"mean of those after {', '.join(map(str, info.averaged))} steps"} if info.averaged else {}),
         "seed": info.seed,
         "commit": info.commit,
         "teacher": "; ".join(f"{run.teacher} ({run.name})" for run in trained if run.teacher != NONE) or NONE,
