@@ -1,4 +1,4 @@
-"""The mean of the weights that a run had at several times: one policy that is surer than each of them.
+"""The mean of the weights that a run had at several times: one policy out of several.
 
 A policy that learns all the time sways about what is best; the mean over its way stands nearer to it. Source: Izmailov
 et al., *Averaging Weights Leads to Wider Optima and Better Generalization*, UAI 2018.
