@@ -49,12 +49,9 @@ def check_coupling(description: Description, rig: Rig) -> list[str]:
     warnings = []
     for name, leader in mimics.items():
         said = description.coupled.get(name)
-        if name in description.joints or (said is not None and said.joint == leader):
+        if said is None or said.joint == leader or name in description.joints:  # the URDF's word holds
             continue
-        warnings.append(
-            f"key 'coupled': the URDF lets '{name}' mimic '{leader}', recording.yaml says "
-            f"{said.joint if said else 'nothing of it'}"
-        )
+        warnings.append(f"key 'coupled': the URDF lets '{name}' mimic '{leader}', recording.yaml says {said.joint}")
     free = [name for name in rig.joints if name not in {*description.joints, *description.coupled, *mimics}]
     if free:
         warnings.append(
