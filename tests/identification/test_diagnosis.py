@@ -29,7 +29,7 @@ class Judges:
 
 def simulations(monkeypatch: pytest.MonkeyPatch, source: str = "repeats", off: float = 0.0) -> Simulations:
     monkeypatch.setattr(diagnosis, "Problem", lambda *_: None)
-    search = SimpleNamespace(shooting=None, all_windows=None, criteria=STANDARD, judges=Judges(off))
+    search = SimpleNamespace(shooting=None, all_windows=None, criteria=STANDARD, validation=Judges(off))
     floor = SimpleNamespace(source=source, overall=2e-3)
     return Simulations(search, explanation("backlash", 9.0), floor, "fast", 0.002)  # type: ignore[arg-type]
 

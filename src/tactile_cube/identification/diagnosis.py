@@ -192,10 +192,10 @@ class Simulations(Questions):
 
     def alike(self, one: Explanation, other: Explanation) -> bool:
         """See `Questions`."""
-        judges = self.search.judges
-        first, second = judges.predictions([one.judgement.model, other.judgement.model])
-        difference = judges.limited(first - second) * judges.weight
-        return bool(np.mean(difference[judges.weight > 0.0] ** 2) < self.search.criteria.alike**2)
+        validation = self.search.validation
+        first, second = validation.predictions([one.judgement.model, other.judgement.model])
+        difference = validation.limited(first - second) * validation.weight
+        return bool(np.mean(difference[validation.weight > 0.0] ** 2) < self.search.criteria.alike**2)
 
     def final(self, one: Explanation) -> Fitted:
         """An explanation refitted on all fitted trials, with intervals."""
@@ -238,7 +238,7 @@ def with_offsets(model: Model, judged: Model) -> Model:
 
 def _unexplained(search: Search, joints: Sequence[str], beside: Mapping[str, Judgement]) -> list[Unexplained]:
     missing = {
-        name: missing_torques(search.judges, search.held_out, judged.model, judged.residual)
+        name: missing_torques(search.validation, search.held_out, judged.model, judged.residual)
         for name, judged in beside.items()
     }
     found = []

@@ -99,8 +99,8 @@ def identify(
 def _judged(search: Search, held_out: Recording, model: Model) -> Model:
     """The model with the joint offsets of the held-out initialisations."""
     full = search.with_known_offsets(model)
-    search.judges.linearise_starts(full)
-    return judge(search.judges, held_out, full).model
+    search.validation.linearise_starts(full)
+    return judge(search.validation, held_out, full).model
 
 
 def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str) -> Fit:

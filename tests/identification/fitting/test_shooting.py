@@ -11,7 +11,7 @@ from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.drivetrain.effects.backlash import Backlash
 from tactile_cube.drivetrain.effects.command_delay import CommandDelay
 from tactile_cube.identification.fitting.base import nominal_model
-from tactile_cube.identification.fitting.beginnings import with_beginnings
+from tactile_cube.identification.fitting.initial_states import with_initial_states
 from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
@@ -67,29 +67,29 @@ def hidden_start(recording: Recording, place: float) -> tuple[Shooting, Model, W
     """Windows whose measurement began with the link of b at `place` [rad] from the middle of its gap, at rest."""
     model, windows = with_gap(recording), cut(recording, NOISE)
     shooting = Shooting(recording, EFFECTS)
-    beginning = np.zeros_like(windows.beginning)
-    beginning[:, 1], beginning[:, 3] = place, -windows.speed[:, 0, 1]
-    seen = shooting.positions_from(model, [beginning], windows)[0]
+    initial_state = np.zeros_like(windows.initial_state)
+    initial_state[:, 1], initial_state[:, 3] = place, -windows.speed[:, 0, 1]
+    seen = shooting.positions_from(model, [initial_state], windows)[0]
     return shooting, model, replace(windows, measured=seen)
 
 
 @pytest.mark.parametrize("place", [-0.4 * GAP, 0.3 * GAP])
 def test_the_place_of_a_hidden_link_at_the_start_is_found(recording: Recording, place: float) -> None:
     shooting, model, windows = hidden_start(recording, place)
-    found = with_beginnings(shooting, model, windows)
+    found = with_initial_states(shooting, model, windows)
 
     def error(of: Windows) -> float:
         residual = (shooting.positions([model], of)[0] - of.measured)[:, : of.segment]
         return float(np.sqrt(np.mean(residual**2)))
 
     assert error(found) < 0.2 * error(windows)
-    assert np.all(found.beginning[:, [0, 2]] == 0.0), "the joint without a gap is where its sensor says"
-    assert found.beginning[0, 1] == pytest.approx(place, abs=0.1 * GAP)
+    assert np.all(found.initial_state[:, [0, 2]] == 0.0), "the joint without a gap is where its sensor says"
+    assert found.initial_state[0, 1] == pytest.approx(place, abs=0.1 * GAP)
 
 
 def test_without_a_gap_every_trial_begins_where_its_sensors_say(recording: Recording) -> None:
     windows = cut(recording, NOISE)
-    assert with_beginnings(Shooting(recording, EFFECTS), nominal_model(recording), windows) is windows
+    assert with_initial_states(Shooting(recording, EFFECTS), nominal_model(recording), windows) is windows
 
 
 @pytest.mark.parametrize("models", [1, 2, 3])

@@ -28,7 +28,7 @@ class Fit:
         model: with the fitted values.
         unknowns: what was fitted.
         cost: marginal squared error, in units of the sensor's variance.
-        surprise: squared distance of the unknowns from what was expected, in standard deviations.
+        prior_penalty: squared distance of the unknowns from what was expected, in standard deviations.
         residual: (G, R) weighted.
         columns: (G, R, P) derivatives per scale at (or near) the fitted values.
         information: (P, P) of the data, in units of the scales.
@@ -37,7 +37,7 @@ class Fit:
     model: Model
     unknowns: tuple[Unknown, ...]
     cost: float
-    surprise: float
+    prior_penalty: float
     residual: Array = field(repr=False)
     columns: Array = field(repr=False)
     information: Array = field(repr=False)
@@ -65,10 +65,10 @@ def fit(
     best = _linearised(problem, model, unknowns, everything, frozen)
     damping = DAMPING
     for _ in range(iterations):
-        weight = temper(problem, best.cost)
+        weight = noise_inflation(problem, best.cost)
         for _ in range(SHORTER):
             tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
-            if tried.cost + weight * tried.surprise < best.cost + weight * best.surprise:
+            if tried.cost + weight * tried.prior_penalty < best.cost + weight * best.prior_penalty:
                 break
             damping *= 10.0
         else:
@@ -96,17 +96,19 @@ def _linearised(
     residual = problem.residual(prediction)
     columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
     cost = float(problem.cost(residual).sum())
-    return Fit(model, everything, cost, surprise(model, everything), residual, columns, _information(problem, columns))
+    return Fit(
+        model, everything, cost, prior_penalty(model, everything), residual, columns, _information(problem, columns)
+    )
 
 
 def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
     """A model with the derivatives of one close to it: one simulation."""
     residual = problem.residual(problem.predictions([model])[0])
     cost = float(problem.cost(residual).sum())
-    return replace(near, model=model, cost=cost, surprise=surprise(model, near.unknowns), residual=residual)
+    return replace(near, model=model, cost=cost, prior_penalty=prior_penalty(model, near.unknowns), residual=residual)
 
 
-def temper(problem: Problem, cost: float) -> float:
+def noise_inflation(problem: Problem, cost: float) -> float:
     """Weight of what is expected beforehand.
 
     While the model is wrong its error is far above the noise and remembers itself; taking it for white noise would let
@@ -120,10 +122,10 @@ def renewed(problem: Problem, fitted: Fit, prediction: Array, columns: Array) ->
     """A fit with residual, columns and information of a problem whose starts were linearised anew."""
     residual, information = problem.residual(prediction), _information(problem, columns)
     cost = float(problem.cost(residual).sum())
-    return Fit(fitted.model, fitted.unknowns, cost, fitted.surprise, residual, columns, information)
+    return Fit(fitted.model, fitted.unknowns, cost, fitted.prior_penalty, residual, columns, information)
 
 
-def surprise(model: Model, unknowns: Sequence[Unknown]) -> float:
+def prior_penalty(model: Model, unknowns: Sequence[Unknown]) -> float:
     """Squared distance from what is expected beforehand, in standard deviations."""
     return float(sum(((u.of(model) - u.centre) / u.spread) ** 2 for u in unknowns))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.beginnings import with_beginnings
+from tactile_cube.identification.fitting.initial_states import with_initial_states
 from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.windows import Windows
@@ -38,8 +38,8 @@ class Problem:
         self._inverse: Array = np.zeros((len(self.weight), 0, 0))
 
     def linearise_starts(self, model: Model) -> None:
-        """Take the beginnings of trials and the sensitivity to segment starts from this model from now on."""
-        self.windows = with_beginnings(self.shooting, model, self.windows)
+        """Take the initial states of trials and the sensitivity to segment starts from this model from now on."""
+        self.windows = with_initial_states(self.shooting, model, self.windows)
         raw = self.shooting.start_sensitivity(model, self.windows)
         columns = np.stack([self.windows.by_segment(column) for column in raw], axis=-1)
         acceleration = np.abs(self.windows.acceleration).reshape(len(self.weight), -1)
@@ -51,7 +51,7 @@ class Problem:
         self._inverse = np.asarray(np.linalg.inv(gram + np.eye(gram.shape[-1])), dtype=np.float64)
 
     def chosen_numbers(self, model: Model) -> NDArray[np.int64]:
-        """How many numbers (G,) of each segment's start were chosen by the segment itself: see `beginnings`."""
+        """How many numbers (G,) of each segment's start were chosen by the segment itself: see `initial_states`."""
         first = np.zeros((len(self.windows), self.windows.segments), dtype=np.int64)
         first[self.windows.time == 0.0, 0] = 2 * np.count_nonzero(self.shooting.gaps(model))
         return np.asarray(first.ravel())

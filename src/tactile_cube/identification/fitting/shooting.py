@@ -24,7 +24,7 @@ from tactile_cube.measurement.replay.read_out import free_way
 from tactile_cube.measurement.replay.rig_replay import CLAMPED
 
 Array = NDArray[np.float64]
-POSITION_NUDGE, SPEED_NUDGE = 5e-4, 0.02  # [rad], [rad/s] of a finger: finite differences of a segment's start
+POSITION_STEP, SPEED_STEP = 5e-4, 0.02  # [rad], [rad/s] of a finger: finite differences of a segment's start
 
 
 class Shooting:
@@ -64,9 +64,9 @@ class Shooting:
         """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
         return self._simulate(models, [windows] * len(models))
 
-    def positions_from(self, model: Model, beginnings: Sequence[Array], windows: Windows) -> Array:
-        """The same for one model from several `beginning`s, (beginnings, S, K segment, n) [rad]."""
-        begun = [replace(windows, beginning=one) for one in beginnings]
+    def positions_from(self, model: Model, initial_states: Sequence[Array], windows: Windows) -> Array:
+        """The same for one model from several `initial_state`s, (initial states, S, K segment, n) [rad]."""
+        begun = [replace(windows, initial_state=one) for one in initial_states]
         return self._simulate([model] * len(begun), begun)
 
     def gaps(self, model: Model) -> Array:
@@ -76,28 +76,28 @@ class Shooting:
     def start_sensitivity(self, model: Model, windows: Windows) -> Array:
         """D position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
         joints = len(self.recording.joints)
-        nudge = np.diag([*(POSITION_NUDGE * self.per_joint("rad")), *(SPEED_NUDGE * self.per_joint("rad/s"))])
+        correction = np.diag([*(POSITION_STEP * self.per_joint("rad")), *(SPEED_STEP * self.per_joint("rad/s"))])
         count = 2 * joints + 1
-        moved = self._simulate([model] * count, [windows] * count, np.vstack([nudge, np.zeros(2 * joints)]))
+        moved = self._simulate([model] * count, [windows] * count, np.vstack([correction, np.zeros(2 * joints)]))
         # a simulation that ran away has no slope; it would swamp those of all others
         most = self.per_joint("rad")
         change = np.clip(np.nan_to_num(moved[:-1] - moved[-1], nan=0.0), -most, most)
-        return np.asarray(change / nudge.max(axis=1)[:, None, None, None])
+        return np.asarray(change / correction.max(axis=1)[:, None, None, None])
 
-    def _simulate(self, models: Sequence[Model], windows: Sequence[Windows], nudges: Array | None = None) -> Array:
-        """Each model through its windows, the start of each segment moved by the model's nudge."""
+    def _simulate(self, models: Sequence[Model], windows: Sequence[Windows], corrections: Array | None = None) -> Array:
+        """Each model through its windows, the start of each segment moved by the model's correction."""
         out = np.zeros((len(models), *windows[0].measured.shape))
-        if nudges is None:
-            nudges = np.zeros((len(models), 2 * len(self.recording.joints)))
+        if corrections is None:
+            corrections = np.zeros((len(models), 2 * len(self.recording.joints)))
         whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
         with ThreadPoolExecutor(self.workers) as pool:
-            list(pool.map(self._one, models[:whole], windows[:whole], nudges, out))
+            list(pool.map(self._one, models[:whole], windows[:whole], corrections, out))
             for k in range(whole, len(models)):
-                self._one(models[k], windows[k], nudges[k], out[k], pool)
+                self._one(models[k], windows[k], corrections[k], out[k], pool)
         return out
 
     def _one(
-        self, model: Model, windows: Windows, nudge: Array, out: Array, pool: ThreadPoolExecutor | None = None
+        self, model: Model, windows: Windows, correction: Array, out: Array, pool: ThreadPoolExecutor | None = None
     ) -> None:
         memory = self._memory(model, windows)
         count, fine = len(windows), windows.substeps
@@ -116,8 +116,8 @@ class Shooting:
                 windows.segment * fine,
                 windows.position,
                 windows.speed,
-                windows.beginning,
-                np.tile(nudge, (count, 1)),
+                windows.initial_state,
+                np.tile(correction, (count, 1)),
                 memory,
                 rows,
                 first,

@@ -37,7 +37,7 @@ ROWS = (
     "initialisation",
     "time",
     "clamped",
-    "beginning",
+    "initial_state",
 )
 """Arrays with one row a window."""
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
@@ -61,8 +61,8 @@ class Windows:
         initialisation: (S,) robot initialisation.
         time: (S,) of the first row in its trial [s].
         clamped: (S,) the links were held still.
-        beginning: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and how
-            much faster they are [rad/s]; see `beginnings`.
+        initial_state: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and
+            how much faster they are [rad/s]; see `initial_states`.
         forces: known forces on a link, or None.
         history: H.
         segment: rows of a segment.
@@ -82,7 +82,7 @@ class Windows:
     initialisation: NDArray[np.int64]
     time: Array
     clamped: NDArray[np.bool_]
-    beginning: Array
+    initial_state: Array
     forces: tuple[KnownForce | None, ...]
     history: int
     segment: int
@@ -196,7 +196,7 @@ def _pieces(
             "initialisation": trial.initialisation,
             "time": first * trial.step,
             "clamped": trial.clamped,
-            "beginning": np.zeros(2 * position.shape[1]),
+            "initial_state": np.zeros(2 * position.shape[1]),
             "force": trial.force,
         }
 

@@ -31,7 +31,7 @@ class Division:
         held_out: the trials to judge by.
         start: the model to begin with, of the trials to fit; `start_held_out` of the others.
         all_windows: of the trials to fit; `problem` takes as many of them as a search needs.
-        judges: the problem of the trials to judge by.
+        validation: the problem of the trials to judge by.
         offsets: joint offsets of all initialisations that are known by now [rad].
     """
 
@@ -59,7 +59,7 @@ class Division:
         self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
         self.all_windows = self.windows(fitted)
         self.problem = Problem(shooting, some(self.all_windows, SEGMENTS))
-        self.judges = Problem(shooting, some(self.windows(held_out), SEGMENTS))
+        self.validation = Problem(shooting, some(self.windows(held_out), SEGMENTS))
         self.offsets = dict(self.start_held_out.offsets)
 
     def windows(self, recording: Recording) -> Windows:
@@ -114,8 +114,8 @@ class Division:
     def judged(self, model: Model) -> Judgement:
         """How a model does on the held-out trials."""
         found = self.with_known_offsets(model)
-        self.judges.linearise_starts(found)
-        return judge(self.judges, self.held_out, found)
+        self.validation.linearise_starts(found)
+        return judge(self.validation, self.held_out, found)
 
     def settled(self, model: Model) -> tuple[Fit, Judgement]:
         """A model with everything refitted, and how it does on the held-out trials."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.gauss_newton import Fit, precision, temper
+from tactile_cube.identification.fitting.gauss_newton import Fit, noise_inflation, precision
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import Candidate
@@ -42,7 +42,7 @@ class Screen:
         self.prediction = problem.predictions([base.model])[0]
         self.residual = problem.free(problem.residual(self.prediction))
         self.free_columns = problem.free(base.columns)
-        expected = temper(problem, base.cost) * precision(base.unknowns)
+        expected = noise_inflation(problem, base.cost) * precision(base.unknowns)
         self.information = base.information + np.diag(expected)
         offset = [(u.of(base.model) - u.centre) / u.scale for u in base.unknowns]
         self.gradient = np.einsum("grp,gr->p", base.columns, self.residual, optimize=True) - expected * np.array(offset)

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.gauss_newton import Fit, temper
+from tactile_cube.identification.fitting.gauss_newton import Fit, noise_inflation
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.screening import Score, Screen
@@ -82,7 +82,7 @@ def candidate_columns(problem: Problem, base: Fit, wanted: Sequence[Candidate]) 
         wanted: candidates at their starts.
     """
     view = Screen(problem, base)
-    expected = temper(problem, base.cost) / USUAL**2
+    expected = noise_inflation(problem, base.cost) / USUAL**2
     best: dict[tuple[str, tuple[str, ...], tuple[str, ...]], tuple[Score, Array]] = {}
     for first in range(0, len(wanted), BATCH):
         part = wanted[first : first + BATCH]

@@ -15,7 +15,7 @@ from tactile_cube.measurement.replay.rig_replay import Engine, Simulated, replay
 
 Array = NDArray[np.float64]
 SPREAD = 0.03  # [rad] standard deviation of a joint offset. Source: Sievers et al., ICRA 2022: up to 3 deg
-NUDGE = 0.005  # [rad] finite difference
+DIFFERENCE = 0.005  # [rad] finite difference
 ITERATIONS = 4
 LARGEST_OFFSET = 0.15  # [rad] no initialisation is further off; a servo that is mounted a few degrees off is within
 LARGEST_STEP = 0.02  # [rad] the simulation is far from linear where joints stick
@@ -50,9 +50,9 @@ def fitted_offsets(recording: Recording, parameters: Parameters, step: float) ->
         left = _errors(recording, parameters, offsets, step)
         columns = []
         for joint in range(len(recording.joints)):
-            nudged = {key: value + NUDGE * _unit(joint, len(value)) for key, value in offsets.items()}
-            changed = _errors(recording, parameters, nudged, step)
-            columns.append([(a - b) / NUDGE for a, b in zip(left, changed, strict=True)])
+            moved = {key: value + DIFFERENCE * _unit(joint, len(value)) for key, value in offsets.items()}
+            changed = _errors(recording, parameters, moved, step)
+            columns.append([(a - b) / DIFFERENCE for a, b in zip(left, changed, strict=True)])
         tried = {key: _step(recording, key, value, left, columns) for key, value in offsets.items()}
         changed = _errors(recording, parameters, tried, step)
         better = {key: _size(recording, key, changed) < _size(recording, key, left) for key in offsets}

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 PLACES = 17  # within the gap: the time of landing depends on them
 
 
-def with_beginnings(shooting: Shooting, model: Model, windows: Windows) -> Windows:
-    """The windows with the beginning of each trial that follows its first segment best, one joint after the other.
+def with_initial_states(shooting: Shooting, model: Model, windows: Windows) -> Windows:
+    """The windows with the initial state of each trial that follows its first segment best, one joint after the other.
 
     A link may stand anywhere within the gap, at rest or as fast as the motor. Without a gap nothing changes.
     """
@@ -25,21 +25,21 @@ def with_beginnings(shooting: Shooting, model: Model, windows: Windows) -> Windo
         return windows
     at_start = np.flatnonzero(windows.time == 0.0)
     first = windows.take(at_start).first_segments()
-    first = replace(first, beginning=np.zeros_like(first.beginning))
+    first = replace(first, initial_state=np.zeros_like(first.initial_state))
     for joint in np.flatnonzero(gap):
-        first = replace(first, beginning=_best(shooting, model, first, int(joint), float(gap[joint])))
-    beginning = windows.beginning.copy()
-    beginning[at_start] = first.beginning
-    return replace(windows, beginning=beginning)
+        first = replace(first, initial_state=_best(shooting, model, first, int(joint), float(gap[joint])))
+    initial_state = windows.initial_state.copy()
+    initial_state[at_start] = first.initial_state
+    return replace(windows, initial_state=initial_state)
 
 
 def _best(shooting: Shooting, model: Model, first: Windows, joint: int, gap: float) -> Array:
-    """The beginnings (S, 2 n) with that of one joint chosen from all places in its gap."""
+    """The initial states (S, 2 n) with that of one joint chosen from all places in its gap."""
     count, joints = len(first), first.position.shape[2]
     trials = []
     for still in (False, True):
         for place in np.linspace(-0.5 * gap, 0.5 * gap, PLACES):
-            trial = first.beginning.copy()
+            trial = first.initial_state.copy()
             trial[:, joint] = place
             trial[:, joints + joint] = -first.speed[:, 0, joint] if still else 0.0
             trials.append(trial)
