@@ -54,12 +54,18 @@ def idle(observation: torch.Tensor) -> torch.Tensor:
 
 @pytest.mark.parametrize(("group", "option"), OPTIONS, ids=lambda name: name)
 def test_option_makes_an_environment_that_runs(group: str, option: str) -> None:
-    config = pickle.loads(pickle.dumps(configured(**{group: option})))
+    task = {"task": "full"} if option == "grasps" else {}  # they hold the cube in the air
+    config = pickle.loads(pickle.dumps(configured(**task, **{group: option})))
     env = make_env(config, worlds=1, seed=0, teacher=idle if option == "teacher" else None)
     data = env.rollout(2)
     assert not data["next", "faulty"].any()
     assert set(env.set_progress(3_000_000, 2.5).columns()) == {"T_s", "gravity", "penalty"}
     env.close()
+
+
+def test_grasps_are_refused_where_the_object_lies_on_a_table() -> None:
+    with pytest.raises(InputError, match="start=grasps holds the object in the air, the task has a table"):
+        make_env(configured(start="grasps"), worlds=1, seed=0).rollout(1)
 
 
 def test_published_options_equal_the_published_defaults_of_the_code() -> None:
