@@ -45,15 +45,15 @@ def test_what_cannot_be_found_is_named(name: str, complaint: str) -> None:
 
 
 def test_nothing_is_imported_for_a_name_until_the_user_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "stranger.py").write_text("from tests.drivetrain.effects.laws import CableDrag\nopen('ran', 'w')\n")
+    (tmp_path / "drag_of_mine.py").write_text("from tests.drivetrain.effects.laws import CableDrag\nopen('ran', 'w')\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(InputError, match=r"own_effects=\[stranger\.CableDrag\]"):
-        resolve(["stranger.CableDrag@q2"], ("q1", "q2"))
+    with pytest.raises(InputError, match=r"own_effects=\[drag_of_mine\.CableDrag\]"):
+        resolve(["drag_of_mine.CableDrag@q2"], ("q1", "q2"))
     assert not (tmp_path / "ran").exists()
-    import_own_effects(["backlash", "stranger.CableDrag@q2: tension=0.1"])
+    import_own_effects(["backlash", "drag_of_mine.CableDrag@q2: tension=0.1"])
     assert (tmp_path / "ran").exists()
-    assert resolve(["stranger.CableDrag@q2"], ("q1", "q2")) == [(CableDrag, "q2")]
+    assert resolve(["drag_of_mine.CableDrag@q2"], ("q1", "q2")) == [(CableDrag, "q2")]
 
 
 def test_a_module_that_is_not_there_is_named() -> None:
