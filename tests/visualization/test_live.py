@@ -12,18 +12,10 @@ from tactile_cube.agent.policy_file import PolicyInfo, load_policy
 from tactile_cube.errors import InputError
 from tactile_cube.visualization.live import LiveView
 from tactile_cube.visualization.live_episodes import FILE, serve
+from tests.api.test_learning import SHORT
 from tests.visualization.test_episode_recording import listed, rows
 
-SHORT = [
-    "+experiment=smoke",
-    "collector=single",
-    "collector.worlds=4",
-    "training.learning_starts=100",
-    "training.random_steps=100",
-    "training.steps=200",
-    "task.episode_steps=10",
-    "logger=csv",
-]
+RUN = [*SHORT, "training.steps=200", "task.episode_steps=10", "logger=csv"]
 LIVE = ["visualization=live", "visualization.live.viewer=file", "visualization.live.every=4"]
 
 
@@ -37,8 +29,8 @@ def test_a_run_that_is_watched_learns_the_same_bit_for_bit_and_shows_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tactile_cube.visualization.live.PATIENCE", 200.0)  # the machine may be busy
-    watched = tactile_cube.train(*SHORT, *LIVE, folder=tmp_path / "watched" / "run")
-    alone = tactile_cube.train(*SHORT, folder=tmp_path / "alone" / "run")
+    watched = tactile_cube.train(*RUN, *LIVE, folder=tmp_path / "watched" / "run")
+    alone = tactile_cube.train(*RUN, folder=tmp_path / "alone" / "run")
     for mine, theirs in zip(*(read_policy(result.policy) for result in (watched, alone)), strict=True):
         assert mine == theirs
     curves = [result.curve() for result in (watched, alone)]

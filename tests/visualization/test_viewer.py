@@ -1,4 +1,4 @@
-"""Which viewer is opened, and that it listens to this machine alone."""
+"""Which viewer is opened, and that it is bound to the loopback interface."""
 
 from pathlib import Path
 from typing import Any

@@ -52,14 +52,14 @@ def require_viewer(wanted: str, known: tuple[str, ...] = VIEWERS, key: str = "vi
 
 
 def start_viewer(page: bool, *files: Path) -> Viewer:
-    """Start a viewer that listens to this machine alone; it outlives the program, and Ctrl-C does not reach it.
+    """Start a viewer bound to the loopback interface; it outlives the program, and Ctrl-C does not reach it.
 
     Args:
         page: serve the web viewer instead of opening a window.
         files: recordings to open.
     """
     port = free_port()
-    # Without --bind it would listen to the whole network.
+    # Without --bind it would be open to the whole network.
     words = [sys.executable, "-m", "rerun", "--bind", LOOPBACK, "--port", str(port)]
     url, address = f"rerun+http://{LOOPBACK}:{port}/proxy", None
     if page:
@@ -74,7 +74,7 @@ def start_viewer(page: bool, *files: Path) -> Viewer:
 
 
 def free_port() -> int:
-    """A port of this machine that nobody listens to."""
+    """A free port of this machine."""
     with socket.socket() as tried:
         tried.bind((LOOPBACK, 0))
         return int(tried.getsockname()[1])
