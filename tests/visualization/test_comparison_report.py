@@ -17,11 +17,13 @@ from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.units import of_joint
 from tactile_cube.visualization.comparison_episode import COLORS, trial_starts, write_comparison
+from tactile_cube.visualization.comparison_figures import band, overlay
 from tactile_cube.visualization.comparison_report import comparison_report
 from tactile_cube.visualization.comparison_summary import markdown, summary
 from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
 from tactile_cube.visualization.diagnosis_sections import staircase_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report
+from tactile_cube.visualization.svg import MEASURED
 from tests.measurement.small_rig import URDF, write
 
 VOID = {"meta", "br", "line", "rect", "circle", "path", "input", "link"}
@@ -67,6 +69,24 @@ def page(report: Report, path: Path) -> str:
     reader.feed(text)
     assert reader.open == []
     return re.sub(r"\s+", " ", reader.text)
+
+
+def test_what_was_interpolated_over_dropped_samples_is_not_drawn_as_measured(comparison: Comparison) -> None:
+    trial = comparison.recording.trials[0]
+    valid = np.ones(len(trial.time), dtype=bool)
+    valid[20:40] = False
+    trials = (replace(trial, valid=valid), *comparison.recording.trials[1:])
+    dropped = replace(comparison, recording=replace(comparison.recording, trials=trials))
+    for figure in (overlay, band):
+        whole, broken = (_curve(figure(one, 0, 0), MEASURED) for one in (comparison, dropped))
+        assert (whole.count("M"), broken.count("M")) == (1, 2)
+
+
+def _curve(svg: str, color: str) -> str:
+    """What is drawn in a colour."""
+    found = re.search(rf'<path d="([^"]+)" fill="none" stroke="{color}"', svg)
+    assert found is not None
+    return found[1]
 
 
 def test_the_comparison_page_says_what_how_well_where_and_what_next(comparison: Comparison, tmp_path: Path) -> None:

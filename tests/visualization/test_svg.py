@@ -37,12 +37,22 @@ def test_thinning_keeps_every_peak() -> None:
     assert (thin.max(), thin.min()) == (5.0, -3.0)
 
 
-def test_missing_samples_interrupt_the_line() -> None:
-    y = np.array([0.0, 1.0, np.nan, 1.0, 0.0])
-    svg = line_chart(Axes("x", "y"), [Line("l", np.arange(5.0), y)])
+@pytest.mark.parametrize("samples", [50, 100_000])
+@pytest.mark.parametrize("gap", [(0.4, 0.4), (0.3, 0.6), (0.3, 0.302)])
+def test_missing_samples_interrupt_the_line_of_a_long_recording_too(samples: int, gap: tuple[float, float]) -> None:
+    x = np.linspace(0.0, 1.0, samples)
+    first, last = (int(share * samples) for share in gap)
+    y = np.sin(40.0 * x)
+    y[first : last + 1] = np.nan
+    axes = Axes("x", "y")
+    svg = line_chart(axes, [Line("l", x, y)])
     path = re.search(r'<path d="([^"]+)" fill="none"', svg)
     assert path is not None
-    assert path[1].count("M") == 2
+    ends = [piece.split("L") for piece in path[1].split("M")[1:]]
+    assert len(ends) == 2
+    left, _, right, _ = axes.inner
+    drawn = [(float(point.split()[0]) - left) / (right - left) for point in (ends[0][-1], ends[1][0])]
+    assert drawn == pytest.approx([x[first - 1], x[last + 1]], abs=2 / MOST_POINTS + 1e-4)
     assert "nan" not in svg
 
 

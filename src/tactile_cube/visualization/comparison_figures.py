@@ -20,7 +20,7 @@ def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison |
     """
     one = comparison.recording.trials[trial]
     offset = _offset(comparison, trial, joint)
-    lines = [Line("measured", one.time, one.position[:, joint], MEASURED, 1.8)]
+    lines = [Line("measured", one.time, _measured(comparison, trial, joint), MEASURED, 1.8)]
     if before is not None:
         was = before.simulated[trial].position[:, joint] + _offset(before, trial, joint)
         lines.append(Line("simulated before", one.time, was, BEFORE, 1.2, "6 3"))
@@ -65,7 +65,7 @@ def band(comparison: Comparison, trial: int, joint: int) -> str:
         return ""
     nominal = comparison.simulated[trial].position[:, joint]
     low, high = (1e3 * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
-    line = Line("measured", one.time, 1e3 * (one.position[:, joint] - nominal), MEASURED, 1.2)
+    line = Line("measured", one.time, 1e3 * (_measured(comparison, trial, joint) - nominal), MEASURED, 1.2)
     axes = Axes("time [s]", f"{comparison.recording.joints[joint]} [{small(comparison, joint)}]", height=200)
     return line_chart(axes, [line], [Band("95 % of the simulations", one.time, low, high)])
 
@@ -100,6 +100,12 @@ def worst_trial(comparison: Comparison, joint: int) -> int:
     """The trial in which a joint's error is largest."""
     name = comparison.recording.joints[joint]
     return int(np.argmax([errors.joints[name] for errors in comparison.trials]))
+
+
+def _measured(comparison: Comparison, trial: int, joint: int) -> Array:
+    """The angles of a joint (n,), nan where a dropped sample was interpolated: nothing was measured there."""
+    one = comparison.recording.trials[trial]
+    return np.where(one.valid, one.position[:, joint], np.nan)
 
 
 def _offset(comparison: Comparison, trial: int, joint: int) -> float:

@@ -96,16 +96,24 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
 
 
 def thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """At most `MOST_POINTS` points that keep every peak: smallest and largest of each interval."""
+    """Points that keep every peak, smallest and largest of each interval, and every gap: a missing sample within it.
+
+    At most `MOST_POINTS` of them, and one more for each interval that holds a gap.
+    """
     if len(x) <= MOST_POINTS:
         return x, y
     edges = np.linspace(0, len(x), MOST_POINTS // 2 + 1).astype(int)
-    chosen: list[int] = []
-    for a, b in pairwise(edges):
-        piece = y[a:b]
-        if np.isfinite(piece).any():
-            chosen += sorted({a + int(np.nanargmin(piece)), a + int(np.nanargmax(piece))})
+    chosen = sorted(a + one for a, b in pairwise(edges) for one in _telling(y[a:b]))
     return x[chosen], y[chosen]
+
+
+def _telling(piece: Array) -> set[int]:
+    """Indices of the smallest and the largest of some samples, and of the first that is missing."""
+    there = np.isfinite(piece)
+    telling = set() if there.all() else {int(np.argmin(there))}
+    if there.any():
+        telling |= {int(np.nanargmin(piece)), int(np.nanargmax(piece))}
+    return telling
 
 
 def _range(arrays: list[Array], slack: float) -> tuple[float, float]:
