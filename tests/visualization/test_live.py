@@ -9,9 +9,11 @@ import pytest
 
 import tactile_cube
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy
+from tactile_cube.env import Conditions
 from tactile_cube.errors import InputError
-from tactile_cube.visualization.live import LiveView
-from tactile_cube.visualization.live_episodes import FILE, serve
+from tactile_cube.evaluation.policy_source import find_policy
+from tactile_cube.visualization.live import LiveView, request_line
+from tactile_cube.visualization.live_episodes import FILE, serve, under
 from tests.api.test_learning import SHORT
 from tests.visualization.test_episode_recording import listed, rows
 
@@ -67,19 +69,24 @@ def test_a_run_outlives_the_process_that_shows_it(tmp_path: Path, capsys: pytest
     live.process.send_signal(signal.SIGKILL)
     live.process.wait()
     for episodes in (1, 2, 3):
-        live.log(episodes, {"episodes": float(episodes)})
+        live.log(episodes, {"episodes": float(episodes), **Conditions(0.5, 1.0, 1.0).columns()})
     live.close()
     assert capsys.readouterr().err.count("the run goes on without") == 1
 
 
 def test_of_requests_that_wait_only_the_newest_is_drawn() -> None:
-    drawn: list[tuple[int, dict[str, float]]] = []
+    drawn: list[tuple[int, Conditions]] = []
 
     class Episodes:
-        def show(self, steps: int, conditions: dict[str, float]) -> None:
+        def show(self, steps: int, conditions: Conditions) -> None:
             drawn.append((steps, conditions))
 
-    lines = "".join(f'{{"steps": {steps}, "T_s": 0.5}}\n' for steps in range(100))
+    lines = "".join(request_line(steps, Conditions(0.3, 0.01 * steps, 0.5)) for steps in range(100))
     serve(io.StringIO(lines), Episodes())  # type: ignore[arg-type]
-    assert drawn[-1] == (99, {"T_s": 0.5})
+    assert drawn[-1] == (99, Conditions(0.3, 0.99, 0.5))
     assert len(drawn) < 100
+
+
+def test_an_episode_is_shown_where_the_curriculum_stands() -> None:
+    task = under(Conditions(0.17, 0.4, 1.0), find_policy("default")).task
+    assert (task.filter_time, task.gravity_scale) == (0.17, 0.4)

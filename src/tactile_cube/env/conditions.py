@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,15 @@ class Conditions:
     def columns(self) -> dict[str, float]:
         """By the names that they have in logs: "T_s" [s], "gravity" and "penalty" (scales)."""
         return {"T_s": self.filter_time, "gravity": self.gravity_scale, "penalty": self.penalty_scale}
+
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, float]) -> Self:
+        """What `columns` gave; further columns, as a row of metrics has, are passed over.
+
+        Raises:
+            KeyError: a column is missing.
+        """
+        return cls(columns["T_s"], columns["gravity"], columns["penalty"])
 
 
 class Curriculum(Protocol):

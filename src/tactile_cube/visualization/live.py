@@ -11,8 +11,10 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
+from tactile_cube.env import Conditions
 from tactile_cube.errors import InputError
 from tactile_cube.training.run import POLICY
 from tactile_cube.visualization.viewer import has_display
@@ -49,13 +51,13 @@ class LiveView:
 
     def log(self, steps: int, metrics: Mapping[str, float]) -> None:
         """Ask for an episode under the conditions in force if it is time; never waits."""
-        episodes = int(metrics.get("episodes", 0))
+        episodes = int(metrics["episodes"])
         if self.process is None or episodes < self._shown + self._every or not self._policy.is_file():
             return
         self._shown = episodes
-        conditions = {name: metrics[name] for name in ("T_s", "gravity") if name in metrics}
+        request = request_line(steps, Conditions.from_columns(metrics))
         try:
-            self.process.stdin.write(json.dumps({"steps": steps, **conditions}).encode() + b"\n")  # type: ignore[union-attr]
+            self.process.stdin.write(request.encode())  # type: ignore[union-attr]
         except BlockingIOError:
             pass  # it still draws earlier ones
         except OSError:
@@ -74,6 +76,17 @@ class LiveView:
             except subprocess.TimeoutExpired:
                 end()
         self.process = None
+
+
+def request_line(steps: int, conditions: Conditions) -> str:
+    """A request for an episode, at so many environment steps, as a line for the process that draws."""
+    return json.dumps({"steps": steps, "conditions": asdict(conditions)}) + "\n"
+
+
+def read_request(line: str) -> tuple[int, Conditions]:
+    """Environment steps and conditions of a line of `request_line`."""
+    request = json.loads(line)
+    return request["steps"], Conditions(**request["conditions"])
 
 
 def _start(folder: Path, viewer: str) -> subprocess.Popen[bytes] | None:

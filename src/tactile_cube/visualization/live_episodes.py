@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import json
 import os
 import queue
 import signal
 import sys
 import threading
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 import rerun as rr
 import torch
 
 from tactile_cube.composition import composed
+from tactile_cube.env import Conditions
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import environment
 from tactile_cube.evaluation.policy_source import PolicySource, find_policy
@@ -32,6 +32,7 @@ from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.visualization.blueprint import live_blueprint
 from tactile_cube.visualization.branch import Branch
 from tactile_cube.visualization.episode_recording import log_episode
+from tactile_cube.visualization.live import read_request
 from tactile_cube.visualization.recording_file import APPLICATION
 from tactile_cube.visualization.run_view import log_curves
 from tactile_cube.visualization.showcase import description
@@ -60,12 +61,12 @@ class LiveEpisodes:
         self._folder, self._target, self._start = folder, target, 0.0
         self._stream: rr.RecordingStream | None = None
 
-    def show(self, steps: int, conditions: dict[str, float]) -> None:
+    def show(self, steps: int, conditions: Conditions) -> None:
         """Run an episode of the newest policy under the conditions in force, and stream it.
 
         Args:
             steps: environment steps of the run.
-            conditions: T_s [s] and share of gravity.
+            conditions: where the curriculum stands.
         """
         source = find_policy(str(self._folder / POLICY))
         config = under(conditions, source)
@@ -102,14 +103,10 @@ class LiveEpisodes:
         return self._stream
 
 
-def under(conditions: dict[str, float], source: PolicySource) -> EnvConfig:
+def under(conditions: Conditions, source: PolicySource) -> EnvConfig:
     """The environment of a policy where its curriculum stands now, every physics step recorded."""
     config = environment(composed("evaluate", []), source, {})
-    task = dataclasses.replace(
-        config.task,
-        filter_time=conditions.get("T_s", config.task.filter_time),
-        gravity_scale=conditions.get("gravity", config.task.gravity_scale),
-    )
+    task = dataclasses.replace(config.task, filter_time=conditions.filter_time, gravity_scale=conditions.gravity_scale)
     return dataclasses.replace(config, task=task, simulation=dataclasses.replace(config.simulation, trace=True))
 
 
@@ -131,8 +128,7 @@ def serve(requests: TextIO, episodes: LiveEpisodes) -> None:
             last, newest = following is None, following or newest
         if newest is None:
             return
-        asked: dict[str, Any] = json.loads(newest)
-        episodes.show(asked.pop("steps"), asked)
+        episodes.show(*read_request(newest))
 
 
 def open_target(folder: Path, viewer: str) -> tuple[str | Path, Viewer | None]:
