@@ -27,7 +27,8 @@ def main() -> None:
 def usage(known: dict[str, str]) -> str:
     """The commands, a line each."""
     lines = ["tactile-cube COMMAND [group=option] [key=value] ...", "", "Commands:"]
-    lines += [f"  {name:<10} {summary}" for name, summary in known.items()]
+    width = max(map(len, known))
+    lines += [f"  {name:<{width}} {summary}" for name, summary in known.items()]
     return "\n".join([*lines, "", "tactile-cube COMMAND --help lists its groups and keys."])
 
 

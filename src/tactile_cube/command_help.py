@@ -19,7 +19,8 @@ RECIPE = {"train": "curriculum"}
 def help_text(name: str) -> str:
     """What `--help` prints: the commands, and the groups and keys of this one."""
     lines = [f"python -m tactile_cube.{name}: {commands().get(name, '')}", "", "Commands:"]
-    lines += [f"  python -m tactile_cube.{other:<10} {summary}" for other, summary in commands().items()]
+    width = max(map(len, commands()))
+    lines += [f"  python -m tactile_cube.{other:<{width}} {summary}" for other, summary in commands().items()]
     path = CONFIG / f"{name}.yaml"
     if path.is_file():
         lines += ["", "Groups (choose with group=option):", *_group_lines(path)]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tactile_cube.deployment.played_targets import PlayedTargets
     from tactile_cube.deployment.robot import Robot
     from tactile_cube.deployment.run_loop import LoopRun
+    from tactile_cube.deployment.training_setting import TrainingSetting
     from tactile_cube.hand import Hand
 
 
@@ -26,7 +27,7 @@ class DeploymentResult:
 
     Attributes:
         runs: how each run ended, its log and its tick times.
-        turned: how far the simulated hand turned the cube in each run [rad]; empty on another hand.
+        turned: how far the simulated hand turned the object the wanted way in each run [rad]; empty on another hand.
         limits: of the commands.
         job: the call.
         hand: the one that the policy was trained on.
@@ -83,37 +84,54 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
 
     from tactile_cube.deployment.run_loop import run_loop
     from tactile_cube.deployment.simulated_hand import SimulatedHand
-    from tactile_cube.deployment.trained_hand import trained_hand
 
     config, network = job.config, load_policy(job.config.policy)
-    limits = contract_limits(network, float(config.rate_limit))
-    hand = trained_hand(network.info)
-    own = {"hand": hand} if str(config.robot._target_).startswith("tactile_cube.") else {}
+    setting = setting_of(job, network)
+    limits = limits_of(setting, float(config.rate_limit))
+    target = str(config.robot._target_)
+    simulated = target.endswith(".SimulatedHand")
+    own = {"setting": setting} if simulated else {"hand": setting.hand} if target.startswith("tactile_cube.") else {}
     runs, turned = [], []
     for number in range(config.runs):
-        seed = {"seed": config.seed + number} if "simulated" in str(config.robot._target_) else {}
+        seed = {"seed": config.seed + number} if simulated else {}
         # partial: hydra would make a dictionary of a hand that it is given
         robot: Robot = instantiate(config.robot, _partial_=True, **seed)(**own)
         try:
-            runs.append(run_loop(control_loop(job, network, limits), robot, say))
+            runs.append(run_loop(control_loop(job, network, setting.hand, limits), robot, say))
             if isinstance(robot, SimulatedHand) and robot.has_cube:
                 turned.append(robot.turned)
         finally:
             robot.close()
-    return DeploymentResult(runs, turned, limits, job, hand)
+    return DeploymentResult(runs, turned, limits, job, setting.hand)
 
 
-def control_loop(job: Job, network: Network, limits: Limits) -> ControlLoop:
+def setting_of(job: Job, network: Network) -> TrainingSetting:
+    """What the policy was trained with; with an excitation in place of a policy, the hand that was asked for.
+
+    Raises:
+        InputError: a policy on another hand than its own.
+    """
+    from hydra.utils import instantiate
+
+    from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
+
+    config = job.config
+    if config.get("hand") is None:
+        return training_setting(network.info)
+    hand: Hand = instantiate(config.hand, _convert_="all")
+    return training_setting(network.info, hand) if config.motion == "policy" else TrainingSetting.of(hand)
+
+
+def control_loop(job: Job, network: Network, hand: Hand, limits: Limits) -> ControlLoop:
     """A new loop as a job describes it."""
     from hydra.utils import instantiate
 
     from tactile_cube.deployment.control_loop import ControlLoop
     from tactile_cube.deployment.controller import Controller
     from tactile_cube.deployment.played_targets import excited_targets
-    from tactile_cube.deployment.trained_hand import trained_hand
     from tactile_cube.errors import InputError
 
-    config, hand = job.config, trained_hand(network.info)
+    config = job.config
     trained: Any = network.info.get("time_constant")
     time_constant = trained if config.filter_time is None else config.filter_time
     if time_constant is None:
@@ -126,19 +144,17 @@ def control_loop(job: Job, network: Network, limits: Limits) -> ControlLoop:
     return ControlLoop(decides, float(time_constant), limits, rules, homing, float(config.seconds), hand)
 
 
-def contract_limits(network: Network, rate: float) -> Limits:
+def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     """The limits of the interface contract: the hand's range, the gains and the torque of the training.
 
     Args:
-        network: the policy.
+        setting: of the training.
         rate: largest change of a desired angle [rad/s].
     """
     import numpy as np
 
-    from tactile_cube.deployment.interface_contract import trained_constants
     from tactile_cube.deployment.limits import Limits
-    from tactile_cube.deployment.trained_hand import trained_hand
 
-    trained, hand = trained_constants(network.info), trained_hand(network.info)
-    gains = (np.full(hand.joints, trained["kp"]), np.full(hand.joints, trained["kd"]))
-    return Limits(hand.lower, hand.upper, rate, trained["torque_limit"], *gains)
+    hand, constants = setting.hand, setting.constants
+    gains = (np.asarray(constants.kp), np.asarray(constants.kd))
+    return Limits(hand.lower, hand.upper, rate, constants.torque_limit, *gains)

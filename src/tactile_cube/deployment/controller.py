@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.network import Network
-from tactile_cube.deployment.trained_hand import trained_hand
+from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.drivetrain.target_filter import low_pass
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
@@ -41,7 +41,7 @@ class Controller:
     """
 
     def __init__(self, network: Network, hand: Hand | None = None) -> None:
-        hand = hand or trained_hand(network.info)
+        hand = hand or training_setting(network.info).hand
         self._reading = reading_size(hand)
         if network.observation_size % self._reading or network.action_size != hand.joints:
             raise InputError(

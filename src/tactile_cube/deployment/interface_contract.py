@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -13,9 +12,8 @@ from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.controller import POLICY_RATE, reading_size
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.stop_rules import StopRules
-from tactile_cube.deployment.trained_hand import trained_hand
-from tactile_cube.hand import Hand
-from tactile_cube.hand.dlr_hand2 import DLR_HAND2, KD, KP, TORQUE_LIMIT
+from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
+from tactile_cube.hand import DLR_HAND2, Hand
 
 FORMAT = "tactile_cube contract 2"
 FINGER = {
@@ -26,11 +24,11 @@ FINGER = {
 TOLERANCE = 1e-5  # between float32 products in different orders
 
 
-def interface_contract(network: Network, hand: Hand | None = None) -> dict[str, Any]:
-    """Return the contract of a policy on a hand, by default the one it was trained on, ready for JSON."""
-    hand = hand or trained_hand(network.info)
+def interface_contract(network: Network) -> dict[str, Any]:
+    """Return the contract of a policy on the hand that it was trained on, ready for JSON."""
+    setting = training_setting(network.info)
+    hand, constants = setting.hand, setting.constants
     names = list(hand.joint_names)
-    constants = trained_constants(network.info)
     return {
         "format": FORMAT,
         "joints": names,
@@ -39,6 +37,7 @@ def interface_contract(network: Network, hand: Hand | None = None) -> dict[str, 
             for name, meaning in zip(names, _meanings(hand), strict=True)
         },
         "joint_range": {"lower": _plain(hand.lower), "upper": _plain(hand.upper), "unit": "rad"},
+        "task": _task(setting),
         "start_angles": {"angles": _plain(hand.start_angles), "unit": "rad", "homing": asdict(Homing())},
         "observation": {
             "name": "observation",
@@ -67,13 +66,13 @@ def interface_contract(network: Network, hand: Hand | None = None) -> dict[str, 
         "limits": {
             "order": "clip q_f to joint_range, then the rate, then the torque",
             "rate": {"value": StopRules().speed, "unit": "rad/s"},
-            "torque": {"value": constants["torque_limit"], "unit": "N m"},
+            "torque": {"value": constants.torque_limit, "unit": "N m"},
             "torque_law": "q_d in [q_m + (K_D dq - limit) / K_P, q_m + (K_D dq + limit) / K_P]",
         },
         "impedance": {
             "law": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after rate and torque limits",
-            "kp": {"value": constants["kp"], "unit": "N m/rad"},
-            "kd": {"value": constants["kd"], "unit": "N m s/rad"},
+            "kp": {"value": _alike(constants.kp), "unit": "N m/rad"},
+            "kd": {"value": _alike(constants.kd), "unit": "N m s/rad"},
         },
         "stop": {
             "rules": asdict(StopRules()),
@@ -93,12 +92,20 @@ def _meanings(hand: Hand) -> list[str]:
     return ["as in the URDF of the hand"] * hand.joints
 
 
-def trained_constants(info: Mapping[str, Any]) -> dict[str, Any]:
-    """Return K_P, K_D and the torque limit that the policy was trained with, around which its gains were varied."""
-    given = ((info.get("config") or {}).get("env") or {}).get("constants") or {}
-    published = {"kp": KP, "kd": KD, "torque_limit": TORQUE_LIMIT} | dict(trained_hand(info).drive)
-    values = {key: given.get(key, published[key]) for key in ("kp", "kd", "torque_limit")}
-    return {key: _plain(value) if np.ndim(value) else float(value) for key, value in values.items()}
+def _task(setting: TrainingSetting) -> dict[str, Any]:
+    """What is to be turned, and how."""
+    constants, task = setting.constants, setting.task
+    return {
+        "object": {
+            "shape": constants.object_shape,
+            "size": {"value": _plain(constants.cube_size), "unit": "m, edges of its bounding box"},
+            "mass": {"value": constants.cube_mass, "unit": "kg"},
+        },
+        "axis": _plain(task.axis_vector()),
+        "direction": task.direction,
+        "frame": "world: origin in the object's middle at the start, z up; +1 is the right-handed sense about axis",
+        "on_a_table": task.table,
+    }
 
 
 def weights_hash(network: Network) -> str:
@@ -122,3 +129,9 @@ def _test_vector(network: Network, hand: Hand) -> dict[str, Any]:
 
 def _plain(values: Any) -> list[float]:
     return [float(value) for value in values]
+
+
+def _alike(values: Any) -> float | list[float]:
+    """One number where all joints have the same, else one each."""
+    numbers = _plain(values)
+    return numbers[0] if len(set(numbers)) == 1 else numbers

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, constants_of
+from tactile_cube.deployment.training_setting import TrainingSetting
+from tactile_cube.env import cube_pose
+from tactile_cube.env.cube_pose import frame_along, seen_along
+from tactile_cube.hand import DLR_HAND2
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 
 Array = NDArray[np.float64]
 AWAY = (0.0, 0.0, -0.3)  # [m] where the cube waits
@@ -41,8 +43,7 @@ class SimulatedHand:
         opened: how far the fingers are from the start angles at first [rad].
         link: what gets lost on the way.
         seed: of noise and link.
-        constants: of the world; None: those of the hand.
-        hand: which one.
+        setting: hand, object, table and task; None: the DLR-Hand II around the nominal cube.
     """
 
     def __init__(
@@ -54,20 +55,21 @@ class SimulatedHand:
         opened: float = 0.1,
         link: Disturbed | None = None,
         seed: int = 0,
-        constants: EpisodeConstants | None = None,
-        hand: Hand = DLR_HAND2,
+        setting: TrainingSetting | None = None,
     ) -> None:
+        self._setting = setting or TrainingSetting.of(DLR_HAND2)
+        hand = self._setting.hand
         self._world = World(hand, options=SimulationOptions(dt=1.0 / rate, substeps=1))
         self._rate, self._noise, self._resolution = rate, noise, resolution
         self._cube, self._link = cube, link or Disturbed()
         self._rng = np.random.default_rng(seed)
-        self._given = constants or constants_of(hand)
+        self._given = self._setting.constants
         self._ticks, self._late = 0, 0
         home = np.asarray(hand.start_angles)
         away = home - opened * np.tile([0.0, *[1.0] * (hand.joints_per_finger - 1)], len(hand.fingers))
-        self._world.reset(self._constants(weight=0.0), Start(np.maximum(away, hand.lower), AWAY))
+        self._world.reset(self._without_object(), Start(np.maximum(away, hand.lower), AWAY))
         self._q_d = np.array(self._world.q_m)
-        self._yaw, self._last_yaw = 0.0, 0.0
+        self._frame, self._theta = frame_along(self._setting.task.axis_vector()), 0.0
 
     @property
     def world(self) -> World:
@@ -81,8 +83,8 @@ class SimulatedHand:
 
     @property
     def turned(self) -> float:
-        """How far the cube has been turned about the vertical since it was handed over, unwrapped [rad]."""
-        return abs(self._yaw)
+        """How far the object has been turned the wanted way since it was handed over, unwrapped [rad]."""
+        return self._setting.task.direction * self._theta
 
     def wait(self) -> float:
         """Let the world go on by a period, by more where the tick is late."""
@@ -90,7 +92,7 @@ class SimulatedHand:
         for _ in range(1 + (int(self._rng.integers(1, 6)) if late else 0)):
             self._world.step(self._q_d)
             self._ticks += 1
-            self._follow_cube()
+            self._follow_object()
         return self._ticks / self._rate
 
     def read(self) -> Reading | None:
@@ -107,21 +109,20 @@ class SimulatedHand:
         self._q_d = np.array(q_d)
 
     def hand_over(self) -> None:
-        """Put the cube between the fingers, held by somebody for the first 0.4 s."""
+        """Put the object between the fingers, held by somebody for the first 0.4 s where no table bears it."""
         if self._cube:
             world, held = self._world, self._given.gravity_onset
             start = Start(np.array(world.q), target=np.array(self._q_d), velocities=np.array(world.dq))
-            world.reset(self._constants(self._given.gravity_scale, round(0.1 * held * self._rate)), start)
+            onset = round(0.1 * held * self._rate)
+            world.reset(replace(self._given, filter_time=NO_FILTER, gravity_onset=onset), start)
 
     def close(self) -> None:
         """End the physics server."""
         self._world.close()
 
-    def _follow_cube(self) -> None:
-        x, y, z, w = self._world.cube_quaternion
-        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        self._yaw += math.remainder(yaw - self._last_yaw, 2.0 * math.pi)
-        self._last_yaw = yaw
+    def _follow_object(self) -> None:
+        seen = seen_along(self._frame, self._world.cube_quaternion.tolist())
+        self._theta = cube_pose(self._world.cube_position.tolist(), seen, self._theta).theta
 
-    def _constants(self, weight: float, onset: int = 0) -> EpisodeConstants:
-        return replace(self._given, filter_time=NO_FILTER, gravity_scale=weight, gravity_onset=onset)
+    def _without_object(self) -> EpisodeConstants:
+        return replace(self._given, filter_time=NO_FILTER, gravity_scale=0.0, gravity_onset=0, table_height=None)

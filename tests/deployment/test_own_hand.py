@@ -1,0 +1,83 @@
+"""A policy of a hand with other numbers of fingers and joints, from its file to the log of the loop."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+import tactile_cube
+from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.policy_file import PolicyInfo, save_policy
+from tactile_cube.deployment.training_setting import training_setting
+from tactile_cube.errors import InputError
+from tests.own_hands import description
+
+HAND = {"_target_": "tactile_cube.hand.hand_from_urdf", **description(("left", "right"), name="two_fingers")}
+OBJECT = {"shape": "cylinder", "size": [0.07, 0.07, 0.06], "mass": 0.08}
+ENV: dict[str, Any] = {
+    "hand": HAND,
+    "constants": {"_target_": "tactile_cube.simulation.constants_of", "hand": HAND, "object": OBJECT, "kd": 0.3},
+    "task": {"_target_": "tactile_cube.env.Task", "name": "table", "table": True, "direction": -1, "axis": "z"},
+}
+JOINTS = 8  # two fingers with four joints each
+
+
+@pytest.fixture
+def policy(tmp_path: Path) -> Path:
+    """An untrained policy, as training would write it."""
+    torch.manual_seed(0)
+    actor = Actor(Sizes(5 * 2 * JOINTS, 0, JOINTS), (16, 16))
+    info = PolicyInfo.describe(actor, time_constant=0.2, config={"env": ENV})
+    save_policy(tmp_path / "policy.safetensors", actor, info)
+    return tmp_path / "policy.safetensors"
+
+
+def test_its_contract_has_its_joints_gains_object_and_the_start_around_it(policy: Path, tmp_path: Path) -> None:
+    contract = json.loads(tactile_cube.export(policy, tmp_path / "two.npz").read_text())
+    assert len(contract["joints"]) == len(contract["start_angles"]["angles"]) == JOINTS
+    assert contract["observation"]["shape"] == ["batch", 80]
+    assert (contract["impedance"]["kp"]["value"], contract["impedance"]["kd"]["value"]) == (3.0, 0.3)
+    assert contract["task"]["object"]["shape"] == "cylinder"
+    assert (contract["task"]["on_a_table"], contract["task"]["direction"]) == (True, -1)
+    setting = training_setting({"config": {"env": ENV}})
+    tips = np.stack(
+        [setting.hand.finger_tips(k, setting.hand.start_angles[None][:, 4 * k : 4 * k + 4]) for k in (0, 1)]
+    )
+    off = np.linalg.norm(tips[:, 0, :2], axis=1) - 0.5 * 0.07 - setting.hand.tip_radius
+    np.testing.assert_allclose(off, 0.001, atol=2e-4)
+
+
+@pytest.mark.timeout(300)
+def test_a_dry_run_has_its_object_and_table_and_its_log_is_one_that_compare_reads(policy: Path, tmp_path: Path) -> None:
+    lines: list[str] = []
+    done = tactile_cube.deploy(policy, "seconds=0.5", "homing.settle=0.1", say=lines.append)
+    assert done.runs[0].reason == "time is over"
+    assert np.isfinite(done.turned).all()
+    moved = ["motion=multisine", "seconds=1.5", "homing.settle=0.1", "robot.cube=false", "runs=2"]
+    recording = tactile_cube.deploy(policy, *moved, say=lines.append).write(tmp_path / "log")
+    assert recording is not None
+    compared = tactile_cube.compare(recording, "band.simulations=0", "step=0.001", say=lines.append)
+    assert len(compared.comparison.recording.joints) == JOINTS
+    assert compared.error < 1.5 * compared.noise_floor
+    spread = np.ptp(compared.comparison.recording.trials[0].position, axis=0)
+    assert spread.min() > 0.03
+
+
+def test_a_hand_moves_without_a_policy_but_not_with_that_of_another() -> None:
+    def quiet(line: str) -> None:
+        """Takes progress."""
+
+    done = tactile_cube.deploy(None, "hand=three_finger", "motion=holds", "filter_time=0.1", "seconds=0.2", say=quiet)
+    assert done.hand.name == "three_finger"
+    assert done.runs[0].homed
+    with pytest.raises(InputError, match="hand=three_finger: the policy was trained on dlr_hand2"):
+        tactile_cube.deploy(None, "hand=three_finger", say=quiet)
+
+
+def test_a_file_that_names_what_is_no_constant_is_refused() -> None:
+    with pytest.raises(InputError, match=r"env\.constants\.cube_colour, which this version does not know"):
+        training_setting({"config": {"env": {"constants": {"cube_colour": "red"}}}})
