@@ -187,6 +187,7 @@ COLUMNS = (
     "missing_effect, the truth",
     "missing_effect, another",
     "ambiguous",
+    "partly_explained",
     "unknown_effect",
     "no answer",
 )

@@ -3,9 +3,11 @@
 | hidden | right | acceptable | wrong |
 |---|---|---|---|
 | nothing | `adequate` | | everything else (a false alarm) |
-| one named effect | `missing_effect`, exactly that name and joint | `ambiguous` with the truth in the set | the rest |
-| two named effects | `missing_effect` with exactly both | `ambiguous`, both in the sets | the rest |
-| outside the catalogue | `unknown_effect` | `ambiguous` | the rest |
+| one named effect | `missing_effect`, that name and joint | `ambiguous`, truth in the set; see below | the rest |
+| two named effects | `missing_effect` with exactly both | `ambiguous`, both in the sets; see below | the rest |
+| outside the catalogue | `unknown_effect` | `ambiguous`, `partly_explained` | the rest |
+
+`partly_explained` counts as `ambiguous` does: it names what it found, and says that this is not all.
 
 Exceptions, each counted apart and never as right by name:
 - `absorbed`: the plain model has a constant for it (Coulomb and viscous friction, stiffness, reflected inertia, joint
@@ -81,7 +83,7 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
         if not found:
             return "wrong", "another effect"
         return "wrong", "only one of two" if len(found) < len(truths) else "an effect too many"
-    if verdict == "ambiguous":
+    if verdict in ("ambiguous", "partly_explained"):
         held = [t for t in truths if _in_set(t, diagnosis)]
         return ("acceptable", "in the set") if len(held) == len(truths) else ("wrong", "not in the set")
     if verdict == "adequate":
@@ -101,8 +103,8 @@ def score(truth: dict[str, Any], diagnosis: dict[str, Any], ratio: float | None)
         outcome, why = _named(effects, diagnosis, at_floor)
     elif verdict == "unknown_effect":
         outcome, why = "right", "unknown"
-    elif verdict == "ambiguous":
-        outcome, why = "acceptable", "not sure"
+    elif verdict in ("ambiguous", "partly_explained"):
+        outcome, why = "acceptable", "not sure" if verdict == "ambiguous" else "a part by another effect"
     elif verdict == "adequate" and at_floor:
         outcome, why = "acceptable", "invisible"
     else:

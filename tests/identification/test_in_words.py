@@ -19,6 +19,7 @@ def test_sets_of_effects_are_told_as_sets() -> None:
 def test_what_is_left_stands_in_the_headline() -> None:
     assert left_over(result("missing_effect")) == " (4.3 mrad are left, 14 noise floors)"
     assert left_over(result("missing_effect", 3.3e-4)) == ""
+    assert left_over(result("partly_explained")) == left_over(result("missing_effect"))
     assert left_over(result("unknown_effect")) == ""
 
 

@@ -126,17 +126,29 @@ def test_an_effect_that_explains_half_of_little_is_not_named() -> None:
     assert decide(findings(1.9, explanation("backlash", 1.1, 1.9))).kind == "missing_effect"
 
 
-@pytest.mark.parametrize(("left", "kind"), [(1.5, "missing_effect"), (2.0, "unknown_effect"), (2.9, "unknown_effect")])
-def test_an_effect_that_leaves_twice_the_noise_is_named_only_if_it_explains_nearly_all(left: float, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("left", "kind"), [(1.5, "missing_effect"), (2.0, "partly_explained"), (3.3, "unknown_effect")]
+)
+def test_an_effect_that_leaves_twice_the_noise_is_the_whole_only_if_it_explains_nearly_all(
+    left: float, kind: str
+) -> None:
     assert decide(findings(9.0, explanation("backlash", left, 9.0))).kind == kind
     assert decide(findings(90.0, explanation("backlash", left, 90.0))).kind == "missing_effect"
 
 
 def test_an_effect_that_leaves_no_more_than_repeats_differ_is_named_if_it_explains_nearly_all() -> None:
     tipping = findings(100.0, explanation("torque_saturation", 4.5, 100.0))
-    assert decide(tipping).kind == "unknown_effect"
+    assert decide(tipping).kind == "partly_explained"
     assert decide(tipping, Answers(repeats=True)).kind == "missing_effect"
     assert decide(findings(20.0, explanation("backlash", 9.0)), Answers(repeats=True)).kind == "unknown_effect"
+
+
+def test_most_of_what_is_missing_is_named_and_said_not_to_be_all() -> None:
+    lever, scale = explanation("payload", 5.0), explanation("torque_gain", 5.0)
+    verdict = decide(findings(20.0, explanation("backlash", 5.0), explanation("elasticity", 9.0)))
+    assert (verdict.kind, verdict.chosen.effects[0].effect.name, verdict.rivals) == ("partly_explained", "backlash", ())
+    assert [one.effects[0].effect.name for one in decide(findings(20.0, lever, scale)).rivals] == ["payload"]
+    assert decide(findings(20.0, explanation("backlash", 7.0))).kind == "unknown_effect"
 
 
 def test_what_a_black_box_still_explains_is_not_noise() -> None:
@@ -280,7 +292,7 @@ def test_an_effect_whose_number_ends_at_the_edge_of_the_plausible_stands_in_for_
 def test_what_is_left_and_follows_the_signals_is_decided_in_the_same_place() -> None:
     found = findings(20.0, explanation("backlash", 1.2))
     assert decide(found).kind == "missing_effect"
-    assert decide(found, Answers(follows=True)).kind == "unknown_effect"
+    assert decide(found, Answers(follows=True)).kind == "partly_explained"
 
 
 @pytest.mark.parametrize("best", ["presliding_friction", "coulomb_friction"])
@@ -296,5 +308,5 @@ def test_a_law_that_is_the_simpler_one_in_practice_is_no_rival_of_it(best: str) 
 
 def test_a_criterion_that_is_given_decides() -> None:
     found = findings(9.0, explanation("backlash", 1.9, 9.0))
-    assert decide(found).kind == "unknown_effect"
+    assert decide(found).kind == "partly_explained"
     assert decide(found, criteria=Criteria(tolerated=2.0)).kind == "missing_effect"

@@ -45,7 +45,7 @@ class DiagnosisResult:
 
     @property
     def verdict(self) -> str:
-        """`adequate`, `missing_effect`, `ambiguous` or `unknown_effect`."""
+        """`adequate`, `missing_effect`, `ambiguous`, `partly_explained` or `unknown_effect`."""
         return str(self.data["verdict"])
 
     @property

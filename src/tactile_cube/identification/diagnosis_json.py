@@ -17,6 +17,8 @@ from tactile_cube.identification.verdict import unexplained_joints
 
 RANKED = 20
 UNPROVEN = 3
+NOT_ALL = ("partly_explained", "unknown_effect")
+"""Verdicts that say that more is missing than is named."""
 
 
 def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> dict[str, Any]:
@@ -33,8 +35,8 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
     joints = list(diagnosis.stages["nominal"].joints)
     return {
         "verdict": verdict.kind,
-        "effects": effects if verdict.kind in ("missing_effect", "ambiguous") else [],
-        "sets": [list(dict.fromkeys(one)) for one in names] if verdict.kind == "ambiguous" else [],
+        "effects": effects if verdict.kind not in ("adequate", "unknown_effect") else [],
+        "sets": [list(dict.fromkeys(one)) for one in names] if diagnosis.rivals else [],
         "unexplained_joints": unexplained_joints(verdict.chosen, tuple(joints)),
         "ranking": ranking(diagnosis),
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
@@ -44,7 +46,7 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
         "error_over_noise": diagnosis.over_noise,
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
         "partial_effects": effects if verdict.kind == "unknown_effect" else [],
-        "unproven_effects": _unproven(diagnosis) if verdict.kind == "unknown_effect" else [],
+        "unproven_effects": _unproven(diagnosis) if verdict.kind in NOT_ALL else [],
         "known_effects": list(diagnosis.known),
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "next_experiment": str(experiment) if experiment else None,

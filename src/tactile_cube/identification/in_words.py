@@ -13,6 +13,7 @@ OPENING = {
     "adequate": "Nothing is missing at this noise: with its constants refitted the model explains the recording.",
     "missing_effect": "An effect is missing, and it is this one:",
     "ambiguous": "An effect is missing, but this recording cannot tell these apart:",
+    "partly_explained": "Most of what is missing was found, and more is missing besides. Found:",
     "unknown_effect": "Something is missing that no effect of the catalogue explains.",
 }
 UNRELATED = "The error is above the noise, but what is left goes with none of the logged signals."
@@ -28,7 +29,13 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     units = result.get("units", {})
     grasps = result.get("noise_floor_source") == "contact"
     unproven = result.get("unproven_effects")
-    opening = UNPROVEN if unproven else HELD if grasps and result["verdict"] == "adequate" else headline(result)
+    opening = (
+        UNPROVEN
+        if unproven and result["verdict"] == "unknown_effect"
+        else HELD
+        if grasps and result["verdict"] == "adequate"
+        else headline(result)
+    )
     lines = [f"{opening}{left_over(result)}"]
     lines += [_effect(entry, units) for entry in result["effects"]]
     lines += [f"  That is either {sets_in_words(result['sets'])}."] if result.get("sets") else []
@@ -71,7 +78,7 @@ def headline(result: Mapping[str, Any]) -> str:
 def left_over(result: Mapping[str, Any]) -> str:
     """What the effects that are named leave, where that is no noise."""
     error = result["error"]
-    if result["verdict"] not in ("missing_effect", "ambiguous") or not error.get("noise_floor"):
+    if result["verdict"] in ("adequate", "unknown_effect") or not error.get("noise_floor"):
         return ""
     floors = error["with_effects"] / error["noise_floor"]
     left = milli(error["with_effects"], common_unit(result.get("units", {}).values()))

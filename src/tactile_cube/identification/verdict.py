@@ -1,4 +1,4 @@
-"""From everything that was tried to an answer: adequate, missing_effect, ambiguous or unknown_effect."""
+"""From everything that was tried to an answer: one of five verdicts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings
 from tactile_cube.identification.search.simplicity import contains, named, simplest
 
-Kind = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
+Kind = Literal["adequate", "missing_effect", "ambiguous", "partly_explained", "unknown_effect"]
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,13 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
             return Verdict("unknown_effect", chosen)
         chosen = simplest(as_good, criteria)
     chosen = next((one for one in plausible if contains(chosen, one) and ask.alike(chosen, one)), chosen)
-    if not _explains(chosen, base, ask, criteria) or ask.follows_signals(chosen):
+    whole = _explains(chosen, base, ask, criteria) and not ask.follows_signals(chosen)
+    if not whole and chosen.explained(base) < criteria.most:
         return Verdict("unknown_effect", chosen)
     rivals = find_rivals(chosen, plausible, criteria)
     rivals = tuple(one for one in rivals if not (contains(one, chosen) and ask.alike(one, chosen)))
+    if not whole:
+        return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
 
 

@@ -39,6 +39,7 @@ VERDICTS: dict[str, tuple[Tone, str]] = {
     "adequate": ("good", "Nothing is missing: the model is as good as this recording can tell."),
     "missing_effect": ("good", "The missing effect was found"),
     "ambiguous": ("warn", "Several effects explain this recording equally well"),
+    "partly_explained": ("warn", "Most of what is missing was found, and more is missing besides"),
     "unknown_effect": ("warn", "Something is missing that no effect of the catalogue explains."),
 }
 
@@ -64,7 +65,7 @@ def diagnosis_report(
         experiment: what would tell the rivals apart.
     """
     tone, said = VERDICTS[diagnosis["verdict"]]
-    if diagnosis.get("unproven_effects"):
+    if diagnosis.get("unproven_effects") and diagnosis["verdict"] == "unknown_effect":
         said = UNPROVEN
     elif headline(diagnosis) in (PARTIAL, UNRELATED):
         said = headline(diagnosis)

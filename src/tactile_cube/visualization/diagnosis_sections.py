@@ -143,24 +143,27 @@ def next_section(
     if experiment is not None:
         return experiment_section(experiment, str(diagnosis["next_experiment"]), before.recording.units)
     folder, model = before.recording.folder, model_path or "MODEL.yaml"
+    found = [_typed(effect["name"], joint) for effect in diagnosis["effects"] for joint in effect["joints"]]
+    names = [*diagnosis.get("known_effects", []), *found]
+    unexplained = (diagnosis["unexplained_joints"] or ["JOINT"])[0]
     identify = f"python -m tactile_cube.identify recording={folder} effects"
     train = f"python -m tactile_cube.train +experiment=finetune model={model}"
     if diagnosis["verdict"] == "adequate":
         said, lines = "Train with the refitted constants:", [train]
     elif diagnosis["verdict"] == "missing_effect":
-        found = [_typed(effect["name"], joint) for effect in diagnosis["effects"] for joint in effect["joints"]]
-        names = [*diagnosis.get("known_effects", []), *found]
         said, lines = (
             "Fit exactly these effects, and train with the result:",
             [f"{identify}=[{','.join(names)}]", train],
         )
+    elif diagnosis["verdict"] == "partly_explained":
+        said = "The model holds what was found: train with it. For the rest, write a law of the shapes and fit both:"
+        lines = [train, f"{identify}=[{','.join([*names, f'my_rig.MyEffect@{unexplained}'])}]"]
     elif diagnosis.get("unproven_effects"):
         said = "Record more trials of each kind, or longer ones, into the same recording, and ask again:"
         lines = [f"python -m tactile_cube.diagnose recording={folder}"]
     else:
-        joint = (diagnosis["unexplained_joints"] or ["JOINT"])[0]
         said = "Look at the shapes above, write the law as an effect of your own, and fit it:"
-        lines = [f"{identify}=[my_rig.MyEffect@{joint}]"]
+        lines = [f"{identify}=[my_rig.MyEffect@{unexplained}]"]
     return Section("What to do next", [said], [Listing(lines, code=True)])
 
 
