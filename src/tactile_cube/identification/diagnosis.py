@@ -184,7 +184,8 @@ class Simulations(Questions):
 
     def as_repeats(self, one: Explanation) -> bool:
         """See `Questions`."""
-        return self.floor.source == "repeats" and self.free_error(one).overall <= self.floor.overall
+        most = self.search.criteria.adequate * self.floor.overall
+        return self.floor.source == "repeats" and self.free_error(one).overall <= most
 
     def follows_signals(self, one: Explanation) -> bool:
         """See `Questions`."""

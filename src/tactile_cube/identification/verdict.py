@@ -35,9 +35,10 @@ class Questions:
     """What a decision may ask of an explanation beside its fit; answered by simulations, so only where it matters."""
 
     def as_repeats(self, one: Explanation) -> bool:
-        """Whether its free run is no further from the held-out trials than the machine is from itself in repeats.
+        """Whether its free run is hardly further from the held-out trials than the machine is from itself in repeats.
 
-        Where a machine can tip over, a few segments are far off all the same.
+        Where a machine can tip over, a few segments are far off all the same; and one that does not repeat itself is
+        further from any model than its sensor's noise.
         """
         return False
 
@@ -64,7 +65,7 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
         chosen = simplest(as_good, criteria)
     chosen = next((one for one in plausible if contains(chosen, one) and ask.alike(chosen, one)), chosen)
     whole = _explains(chosen, base, ask, criteria) and not ask.follows_signals(chosen)
-    if not whole and chosen.explained(base) < criteria.most:
+    if not whole and chosen.explained(base) < criteria.most and not ask.as_repeats(chosen):
         return Verdict("unknown_effect", chosen)
     rivals = find_rivals(chosen, plausible, criteria)
     rivals = tuple(one for one in rivals if not (contains(one, chosen) and ask.alike(one, chosen)))
