@@ -48,3 +48,8 @@ def test_behind_a_delay_the_jump_comes_later_but_as_large(plant: Plant) -> None:
 
 def test_what_a_motor_follows_freely_within_a_gap_is_no_part_of_the_ratio(plant: Plant) -> None:
     assert position_ratio(plant, BACKLASH("q", play=0.0, gap=0.02)) == pytest.approx(PLAIN)
+
+
+@pytest.mark.filterwarnings("error")
+def test_within_a_gap_wider_than_the_probe_the_plain_drives_ratio_holds(plant: Plant) -> None:
+    assert position_ratio(plant, BACKLASH("q", play=0.0, gap=0.2)) == pytest.approx(PLAIN)

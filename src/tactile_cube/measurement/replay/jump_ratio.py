@@ -12,6 +12,7 @@ from tactile_cube.measurement.replay.read_out import free_way
 
 Array = NDArray[np.float64]
 PROBE, SAFE = 0.05, 0.25  # [rad] beyond every dead zone; part of the torque limit that it asks for at most
+NOTHING = 1e-9  # part of the probe below which it is rounding that passes
 
 
 def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Array]:
@@ -38,6 +39,7 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
     position, torque, acted, _ = np.array(seen[1]) - np.array(seen[0])
     passed = np.abs(acted) > 0.5 * probe
     free = free_way(seen[1][-1], acted, gaps(plant, memory))
+    passed &= np.abs(acted - free) > NOTHING * probe  # a gap wider than the probe lets nothing through
     position, acted = position - free, np.where(passed, acted - free, 1.0)
     plain = kp / (1.0 + kp * compliance)
     return np.where(passed, position / acted, plain * compliance), np.where(passed, torque / acted, plain)
