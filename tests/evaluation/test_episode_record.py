@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -5,7 +6,9 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import ARRAY_FIELDS, CONTACT_FIELDS, EpisodeRecord
+from tactile_cube.hand.object_mesh import ObjectMesh, read_mesh
 from tests.evaluation.synthetic import episode
+from tests.meshes import CUBE, write_obj
 
 
 def test_a_saved_record_comes_back_unchanged(tmp_path: Path) -> None:
@@ -20,6 +23,16 @@ def test_a_saved_record_comes_back_unchanged(tmp_path: Path) -> None:
     assert loaded.reward_terms.keys() == record.reward_terms.keys()
     assert loaded.trace.keys() == record.trace.keys()
     np.testing.assert_array_equal(loaded.policy["action"], record.policy["action"])
+
+
+def test_the_mesh_of_a_record_comes_back_without_its_file(tmp_path: Path) -> None:
+    mesh, _ = read_mesh(write_obj(tmp_path, 0.08 * CUBE))
+    replace(episode(steps=3), object_shape=mesh).save(tmp_path / "episode.npz")
+    (tmp_path / "object.obj").unlink()
+    loaded = EpisodeRecord.load(tmp_path / "episode.npz").object_shape
+    assert loaded == mesh
+    assert isinstance(loaded, ObjectMesh)
+    np.testing.assert_array_equal(loaded.faces, mesh.faces)
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip file", b"PK\x03\x04 cut off"])

@@ -21,13 +21,13 @@ def test_on_a_box_the_face_is_the_one_that_the_side_points_through() -> None:
 
 
 def test_a_capsule_as_high_as_wide_is_a_sphere() -> None:
-    np.testing.assert_allclose(unit_inertia("capsule", np.full(3, 0.08)), 0.4 * 0.04**2)
+    np.testing.assert_allclose(unit_inertia("capsule", np.full(3, 0.08)), 0.4 * 0.04**2 * np.eye(3))
 
 
 def test_a_long_capsule_is_nearly_a_thin_rod() -> None:
-    assert unit_inertia("capsule", np.array([0.001, 0.001, 1.0]))[0] == pytest.approx(1 / 12, rel=2e-3)
+    assert unit_inertia("capsule", np.array([0.001, 0.001, 1.0]))[0, 0] == pytest.approx(1 / 12, rel=2e-3)
 
 
 def test_inertia_of_cylinder_and_box() -> None:
-    np.testing.assert_allclose(unit_inertia("cylinder", np.array([0.08, 0.08, 0.1]))[2], 0.5 * 0.04**2)
-    np.testing.assert_allclose(unit_inertia("box", np.array([0.1, 0.2, 0.3])), np.array([0.13, 0.10, 0.05]) / 12)
+    np.testing.assert_allclose(unit_inertia("cylinder", np.array([0.08, 0.08, 0.1]))[2, 2], 0.5 * 0.04**2)
+    np.testing.assert_allclose(unit_inertia("box", np.array([0.1, 0.2, 0.3])), np.diag([0.13, 0.10, 0.05]) / 12)

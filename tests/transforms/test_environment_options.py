@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import torch
@@ -15,6 +16,7 @@ from tactile_cube.env import Reward
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import LogUniform, StartStates
 from tactile_cube.transforms import EnvConfig, make_env
+from tests.meshes import CUBE, write_obj
 
 GROUPS = {
     "task": "table",
@@ -60,6 +62,20 @@ def test_option_makes_an_environment_that_runs(group: str, option: str) -> None:
     data = env.rollout(2)
     assert not data["next", "faulty"].any()
     assert set(env.set_progress(3_000_000, 2.5).columns()) == {"T_s", "gravity", "penalty"}
+    env.close()
+
+
+@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
+def test_a_mesh_whose_size_is_drawn_makes_an_environment_that_runs(engine: str, tmp_path: Path) -> None:
+    file = write_obj(tmp_path, 80.0 * CUBE)
+    words = ["+object=mesh", f"object.file={file}", "object.scale=0.001", f"env.simulation.engine={engine}"]
+    env = make_env(pickle.loads(pickle.dumps(configured(*words))), worlds=1, seed=0)
+    sizes = []
+    for _ in range(2):
+        data = env.rollout(2)
+        assert not data["next", "faulty"].any()
+        sizes.append(env.base_env.tasks[0].constants.cube_size[0])
+    assert sizes[0] != sizes[1]
     env.close()
 
 

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tactile_cube.hand.object_mesh import read_mesh
 from tactile_cube.visualization.film import MAX_BYTES, write_film, write_stills
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 from tests.evaluation.synthetic import episode
+from tests.meshes import CUBE, write_obj
 
 
 def test_a_film_runs_in_real_time_and_stays_small(tmp_path: Path) -> None:
@@ -42,3 +44,18 @@ def test_a_quarter_turn_can_be_seen(camera: object) -> None:
         pictures.append(np.asarray(scene.picture(camera, 64, 64), dtype=float))  # type: ignore[arg-type]
     scene.close()
     assert np.mean(np.abs(pictures[0] - pictures[1]).max(axis=2) > 40) > 0.02
+
+
+@pytest.mark.parametrize("camera", [SIDE, BELOW])
+def test_a_mesh_is_drawn_where_a_box_of_its_size_is(camera: object, tmp_path: Path) -> None:
+    record = episode()
+    mesh, _ = read_mesh(write_obj(tmp_path, 0.08 * CUBE))
+    filled = []
+    for shape in ("box", mesh):
+        scene = Scene(np.full(3, 0.08), shape=shape)  # type: ignore[arg-type]
+        scene.pose(record.joint_position[0], np.array([0.0, 0.0, -0.1]), np.array([0.0, 0.0, 0.0, 1.0]))
+        picture = np.asarray(scene.picture(camera, 64, 64))  # type: ignore[arg-type]
+        filled.append(picture.min(axis=2) < 250)
+        scene.close()
+    assert filled[0].mean() > 0.1
+    assert np.mean(filled[0] != filled[1]) < 0.02

@@ -97,7 +97,7 @@ def _task(setting: TrainingSetting) -> dict[str, Any]:
     constants, task = setting.constants, setting.task
     return {
         "object": {
-            "shape": constants.object_shape,
+            "shape": str(constants.object_shape),
             "size": {"value": _plain(constants.cube_size), "unit": "m, edges of its bounding box"},
             "mass": {"value": constants.cube_mass, "unit": "kg"},
         },

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import ObjectShape
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ class EpisodeRecord:
         policy: what went in and out of the policy in each step, each `(n, joints)`: its newest "q_m" and "e_q" with the
             sensors' offset and noise [rad], and the "action" it asked for, in [-1, 1], before any is repeated.
         fingers: of the hand, in the order of joint vectors; all have equally many joints.
-        object_shape: "box", "cylinder" or "capsule".
+        object_shape: "box", "cylinder", "capsule" or a mesh.
         axis: of the rotation, in the world.
     """
 
@@ -109,8 +110,11 @@ class EpisodeRecord:
         arrays |= {f"reward.{name}": value for name, value in self.reward_terms.items()}
         arrays |= {f"trace.{name}": value for name, value in self.trace.items()}
         arrays |= {f"policy.{name}": value for name, value in self.policy.items()}
+        shape = self.object_shape
+        if isinstance(shape, ObjectMesh):
+            arrays |= {f"mesh.{name}": value for name, value in shape.arrays().items()}
         arrays["meta"] = np.array(
-            json.dumps([self.ending, self.direction, self.constants, self.fingers, self.object_shape, self.axis])
+            json.dumps([self.ending, self.direction, self.constants, self.fingers, str(shape), self.axis])
         )
         np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
 
@@ -126,6 +130,9 @@ class EpisodeRecord:
                 data = dict(archive)
             ending, direction, constants, *later = json.loads(str(data["meta"]))
             hand = {"fingers": tuple(later[0]), "object_shape": later[1], "axis": tuple(later[2])} if later else {}
+            mesh = _with_prefix(data, "mesh.")
+            if mesh:
+                hand["object_shape"] = ObjectMesh.from_arrays(mesh)
             contacts = ContactTable(**{name: data[f"contacts.{name}"] for name in CONTACT_FIELDS})
             return cls(
                 **{name: data[name] for name in ARRAY_FIELDS},

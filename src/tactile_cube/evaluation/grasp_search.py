@@ -106,7 +106,7 @@ def search_grasps(
     angles, targets, positions, quaternions = (np.stack(column) for column in zip(*rows, strict=True))
     size = tuple(np.asarray(constants.cube_size).tolist())
     origin: dict[str, str | int] = {"seed": seed, "tries": tries}
-    return Grasps(angles, targets, positions, quaternions, world.hand.name, constants.object_shape, size, origin)
+    return Grasps(angles, targets, positions, quaternions, world.hand.name, str(constants.object_shape), size, origin)
 
 
 def _attempt(

@@ -7,11 +7,14 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.hand.object_mesh import ObjectMesh
+
 Array = NDArray[np.float64]
-ObjectShape = Literal["box", "cylinder", "capsule"]
+NamedShape = Literal["box", "cylinder", "capsule"]
+ObjectShape = NamedShape | ObjectMesh
 """Within a bounding box (x, y, z): a box; an upright cylinder of diameter x; a bar with half spheres of diameter x at
-its ends, which is a sphere where z equals x."""
-SHAPES: tuple[ObjectShape, ...] = get_args(ObjectShape)
+its ends, which is a sphere where z equals x; or a convex mesh."""
+SHAPES: tuple[NamedShape, ...] = get_args(NamedShape)
 
 _SHARE = 0.7
 """How far from the middle of a side towards its edges a fingertip is put."""
@@ -25,7 +28,11 @@ def straight_half(half: Array) -> float:
 
 
 def unit_inertia(shape: ObjectShape, size: Array) -> Array:
-    """Moments of inertia (3,) [m^2] about the middle of a solid of 1 kg with a bounding box `size` (3,) [m]."""
+    """Inertia (3, 3) [m^2] about the centre of mass of a solid of 1 kg with a bounding box `size` (3,) [m]."""
+    return shape.inertia(size) if isinstance(shape, ObjectMesh) else np.diag(_moments(shape, size))
+
+
+def _moments(shape: NamedShape, size: Array) -> Array:
     if shape == "box":
         return np.asarray((np.sum(size**2) - size**2) / 12.0)
     radius = 0.5 * float(size[0])
@@ -53,11 +60,17 @@ def tip_centres(shape: ObjectShape, side: Array, half: Array, radius: float, gap
     if shape == "box":
         face, aim = _face_of(side, half)
         return np.asarray(face * (half + radius + gap) + _on_face(face, half, aim))
-    height = half[2] if shape == "cylinder" else straight_half(half)
+    height = straight_half(half) if shape == "capsule" else half[2]
     turns, ups = np.linspace(-_ARC, _ARC, 15), np.linspace(-_SHARE, _SHARE, 9) * height
     turn, up = (grid.ravel() for grid in np.meshgrid(turns, ups, indexing="ij"))
     order = np.argsort(np.hypot(half[0] * turn, up), kind="stable")
     angle = np.arctan2(side[1], side[0]) + turn[order]
+    if isinstance(shape, ObjectMesh):
+        centre = 2.0 * half * shape.com
+        from_axis = np.stack([np.full_like(angle, centre[0]), np.full_like(angle, centre[1]), up[order]], axis=1)
+        outwards = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+        points, normals = shape.surface(2.0 * half, from_axis, outwards)
+        return np.asarray(points + (radius + gap) * normals)
     reach = half[0] + radius + gap
     return np.stack([reach * np.cos(angle), reach * np.sin(angle), up[order]], axis=1)
 

@@ -38,7 +38,7 @@ class Grasps:
         positions: centre of the object `(grasps, 3)` [m].
         quaternions: its orientation, xyzw `(grasps, 4)`.
         hand: name of the hand.
-        shape: of the object, as in `EpisodeConstants`.
+        shape: of the object, as in `EpisodeConstants`; of a mesh a name that says which.
         size: of its bounding box (3,) [m].
         origin: how they were found: command, commit, seed, tries.
     """
@@ -121,7 +121,7 @@ class GraspStarts:
         known = EpisodeConstants() if constants is None else constants
         path = SHIPPED if self.file is None else Path(self.file)
         grasps = Grasps.load(path)
-        wanted = (hand.name, known.object_shape, tuple(np.asarray(known.cube_size).tolist()))
+        wanted = (hand.name, str(known.object_shape), tuple(np.asarray(known.cube_size).tolist()))
         if (grasps.hand, grasps.shape) != wanted[:2] or not np.allclose(grasps.size, wanted[2]):
             raise InputError(
                 f"start.file={path}: grasps of hand {grasps.hand} and a {grasps.shape} of {list(grasps.size)} m, "

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand, dlr_hand2
+from tactile_cube.hand.object_mesh import ObjectMesh, read_mesh
 from tactile_cube.hand.object_shape import SHAPES, ObjectShape
 
 Array = NDArray[np.float64]
@@ -41,8 +42,8 @@ class EpisodeConstants:
         friction_creep: How fast a joint held by dry friction gives way (12,) [rad/s per N m].
         reflected_inertia: Rotor inertia seen at the joint (12,) [kg m^2].
         joint_offset: What the position sensors read too much (12,) [rad]; targets are meant in what the sensors read.
-        object_shape: `box`, `cylinder` or `capsule` (upright bar with half spheres at its ends; a sphere where it is as
-            high as wide). What is called cube is the object, whatever its shape.
+        object_shape: `box`, `cylinder`, `capsule` (upright bar with half spheres at its ends; a sphere where it is as
+            high as wide) or an `ObjectMesh`. What is called cube is the object, whatever its shape.
         cube_size: Edge lengths of its bounding box (3,) [m]; a float means a cube.
         cube_mass: [kg].
         cube_com: Centre of mass from the cube's centre, in the cube's frame (3,) [m].
@@ -146,6 +147,8 @@ class EpisodeConstants:
                 _refuse_below_zero(field.name, getattr(self, field.name), field.name in self._POSITIVE)
 
     def _refuse_impossible_object(self) -> None:
+        if isinstance(self.object_shape, ObjectMesh):
+            return
         if self.object_shape not in SHAPES:
             raise InputError(f"object_shape is {self.object_shape!r}; choose one of {', '.join(SHAPES)}")
         x, y, z = np.asarray(self.cube_size).tolist()
@@ -217,13 +220,14 @@ def constants_of(hand: Hand | None = None, object: Mapping[str, Any] | None = No
 
     Args:
         hand: whose drives they are; None: the DLR-Hand II.
-        object: `shape`, `size` [m] and `mass` [kg] of the object; what is left out is as in EpisodeConstants.
+        object: `shape`, `size` [m] and `mass` [kg] of the object; what is left out is as in EpisodeConstants. With the
+            shape `mesh`: `file`, `scale` [m], `density` [kg/m^3] in place of a mass, `hull`; see `read_mesh`.
         values: further ones, which come before those of hand and object.
 
     Raises:
         InputError: a value without a physical meaning, a drive or an object that has what no constant names.
     """
-    given, hand = dict(object or {}), hand or DLR_HAND2
+    given, hand = _without_mesh(dict(object or {})), hand or DLR_HAND2
     for key in given.keys() - _OBJECT_KEYS.keys():
         raise InputError(f"object.{key}: no such setting; give {', '.join(_OBJECT_KEYS)}")
     known = {field.name for field in fields(EpisodeConstants)}
@@ -233,7 +237,25 @@ def constants_of(hand: Hand | None = None, object: Mapping[str, Any] | None = No
     return EpisodeConstants(**{**hand.drive, **named, **values, "joints": hand.joints})
 
 
-_OBJECT_KEYS = {"shape": "object_shape", "size": "cube_size", "mass": "cube_mass"}
+_OBJECT_KEYS = {"shape": "object_shape", "size": "cube_size", "mass": "cube_mass", "com": "cube_com"}
+_MESH_KEYS = ("shape", "file", "scale", "mass", "density", "hull")
+
+
+def _without_mesh(given: dict[str, Any]) -> dict[str, Any]:
+    """An object's settings with the mesh that they name read: its shape, size, mass and centre of mass."""
+    if given.get("shape") != "mesh":
+        return given
+    for key in given.keys() - set(_MESH_KEYS):
+        raise InputError(f"object.{key}: no such setting of a mesh; give {', '.join(_MESH_KEYS)}")
+    if given.get("file") is None:
+        raise InputError("object=mesh needs object.file=FILE, an OBJ or STL file")
+    mass, density = given.get("mass"), given.get("density")
+    if (mass is None) == (density is None):
+        raise InputError(f"object=mesh: mass is {mass}, density is {density}; give one, object.mass [kg] or "
+                         "object.density [kg/m^3], and null for the other")  # fmt: skip
+    mesh, size = read_mesh(given["file"], float(given.get("scale", 1.0)), bool(given.get("hull", False)))
+    heavy = float(density) * mesh.volume * float(np.prod(size)) if density is not None else mass
+    return {"shape": mesh, "size": size, "mass": heavy, "com": mesh.com * size}
 
 
 def _vector(name: str, value: object, length: int) -> Array:

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.hand.object_shape import ObjectShape, straight_half, unit_inertia
+from tactile_cube.hand.object_mesh import ObjectMesh
+from tactile_cube.hand.object_shape import NamedShape, straight_half, unit_inertia
 from tactile_cube.hand.shape import Shape
 from tactile_cube.simulation.constants import EpisodeConstants
 from tactile_cube.simulation.drive import HandDrive
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 TABLE_HALF_SIZE = (0.25, 0.25, 0.02)
 """[m]."""
 SOLVER_TOLERANCE = 1e-10
+UNSAID = [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+"""An inertia with products that MuJoCo is to take for none: the moments then hold."""
 RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]
 """Impedance of tendons and joint stops, as hard as MuJoCo has it."""
 
@@ -60,6 +63,7 @@ class HandSpec:
         self._cube = self._add_cube()
         self._table = self._add_box("table", self.spec.worldbody, TABLE_HALF_SIZE)
         self._pairs = self._add_pairs()
+        self._mesh: Any = None
 
     def compile(self, constants: EpisodeConstants) -> Any:
         """The model of an episode."""
@@ -174,16 +178,32 @@ class HandSpec:
         """Size and mass of the cube; without a table it lies too far away to be met."""
         body, shape = self._cube
         size, mass = np.asarray(constants.cube_size), constants.cube_mass
-        shape.type, shape.size = self._object_geometry(constants.object_shape, 0.5 * size)
-        body.mass, body.ipos = mass, np.asarray(constants.cube_com)
-        if constants.object_shape == "box":
-            body.inertia = mass / 12.0 * (np.sum(size**2) - size**2)
+        kind = constants.object_shape
+        if isinstance(kind, ObjectMesh):
+            self._set_mesh(kind, size)
         else:
-            body.inertia = mass * unit_inertia(constants.object_shape, size)
+            shape.meshname, body.fullinertia = "", UNSAID  # of a mesh before
+            shape.type, shape.size = self._object_geometry(kind, 0.5 * size)
+        body.mass, body.ipos = mass, np.asarray(constants.cube_com)
+        if kind == "box":
+            body.inertia = mass / 12.0 * (np.sum(size**2) - size**2)
+        elif isinstance(kind, ObjectMesh):
+            body.inertia, body.fullinertia = np.zeros(3), _six(mass * kind.inertia(size))
+        else:
+            body.inertia = mass * np.diag(unit_inertia(kind, size))
         height = -1e3 if constants.table_height is None else constants.table_height
         self._table.pos = [0.0, 0.0, height - TABLE_HALF_SIZE[2]]
 
-    def _object_geometry(self, kind: ObjectShape, half: Array) -> tuple[Any, Array]:
+    def _set_mesh(self, mesh: ObjectMesh, size: Array) -> None:
+        """Gives the object the shape of a mesh."""
+        if self._mesh is None:
+            self._mesh = self.spec.add_mesh(name="object")
+        self._mesh.uservert = (mesh.vertices * size).ravel().tolist()
+        self._mesh.userface = mesh.faces.ravel().tolist()
+        _, shape = self._cube
+        shape.type, shape.meshname = self._mujoco.mjtGeom.mjGEOM_MESH, "object"
+
+    def _object_geometry(self, kind: NamedShape, half: Array) -> tuple[Any, Array]:
         """MuJoCo's type and size of an object with half edges (3,) [m]."""
         kinds = self._mujoco.mjtGeom
         if kind == "box":

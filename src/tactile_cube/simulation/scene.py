@@ -16,8 +16,10 @@ import pybullet
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.hand.object_shape import ObjectShape, straight_half, unit_inertia
+from tactile_cube.hand.object_mesh import ObjectMesh
+from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half, unit_inertia
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact, read_contact
 from tactile_cube.simulation.options import SimulationOptions
@@ -26,6 +28,8 @@ from tactile_cube.simulation.surface import SKIN_RELAXATION
 Array = NDArray[np.float64]
 
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
+TILTED = 0.05
+"""Products of inertia that Bullet may neglect, as a share of the smallest moment: moments are then right to 1 %."""
 _ALL_GROUPS = 0xFFFF
 _FIRST_FINGER_GROUP = 0x10
 """Collision group of the first finger, one bit for each; Bullet gives bits below to bodies of its own accord."""
@@ -202,11 +206,11 @@ class Scene:
             **_NO_DAMPING,
             physicsClientId=self.client,
         )
-        if (
-            constants.object_shape == "capsule"
-        ):  # Bullet takes that of a box for it; without its mass it would lose that
-            moments = constants.cube_mass * unit_inertia("capsule", np.asarray(constants.cube_size))
-            heavy = {"mass": constants.cube_mass, "localInertiaDiagonal": moments.tolist()}
+        if constants.object_shape not in ("box", "cylinder"):  # Bullet takes that of a box for the others
+            # without its mass it would lose the inertia; without a margin a mesh ends where its corners are
+            inertia = constants.cube_mass * unit_inertia(constants.object_shape, np.asarray(constants.cube_size))
+            heavy = {"mass": constants.cube_mass, "localInertiaDiagonal": np.diag(inertia).tolist()}
+            heavy |= {"collisionMargin": 0.0} if isinstance(constants.object_shape, ObjectMesh) else {}
             pybullet.changeDynamics(self.cube, -1, **heavy, physicsClientId=self.client)
         if constants.tip_compliance > 0.0:
             skin = {
@@ -226,8 +230,13 @@ class Scene:
         kind, size, com = constants.object_shape, np.asarray(constants.cube_size), np.asarray(constants.cube_com)
         same = kind == self._cube_kind and np.array_equal(size, self._cube_size)
         if not (same and np.array_equal(com, self._cube_com)):
-            place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
-            shape = pybullet.createCollisionShape(**_geometry(kind, size), **place, physicsClientId=self.client)
+            if isinstance(kind, ObjectMesh):
+                _refuse_tilted_inertia(kind, size)
+                geometry = {"shapeType": pybullet.GEOM_MESH, "vertices": (kind.vertices * size - com).tolist()}
+            else:
+                place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
+                geometry = _geometry(kind, size) | place
+            shape = pybullet.createCollisionShape(**geometry, physicsClientId=self.client)
             self._cube_shape, self._cube_kind = int(shape), kind
             self._cube_size, self._cube_com = size.copy(), com.copy()
         return self._cube_shape
@@ -266,7 +275,18 @@ class Scene:
                     )
 
 
-def _geometry(kind: ObjectShape, size: Array) -> dict[str, Any]:
+def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
+    """Bullet knows an object's moments of inertia about its own axes alone."""
+    inertia = mesh.inertia(size)
+    tilted = float(np.abs(inertia - np.diag(np.diag(inertia))).max() / np.diag(inertia).min())
+    if tilted > TILTED:
+        raise InputError(
+            f"object.file={mesh.file}: its products of inertia are {tilted:.2f} of its smallest moment, engine=bullet "
+            f"takes up to {TILTED}; turn the mesh along its principal axes, or choose engine=mujoco"
+        )
+
+
+def _geometry(kind: NamedShape, size: Array) -> dict[str, Any]:
     """Bullet's words for an object of a kind with a bounding box (3,) [m]."""
     half = 0.5 * size
     if kind == "box":

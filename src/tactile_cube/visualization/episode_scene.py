@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
 from tactile_cube.evaluation.touch import TOUCH_FORCE
 from tactile_cube.hand import Hand
+from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.visualization.branch import Branch
 from tactile_cube.visualization.episode_signals import FINGER_COLOURS
 from tactile_cube.visualization.scene import FACE_COLOURS, FACE_NORMALS, STICKER, STICKER_HEIGHT
@@ -83,6 +84,9 @@ def _log_object(branch: Branch, record: EpisodeRecord) -> None:
     half = record.cube_size / 2
     stickers = np.where(np.abs(normals) == 1, STICKER_HEIGHT, STICKER * half)
     frame, colours = half, [tuple(round(255 * part) for part in colour) for colour in FACE_COLOURS.values()]
+    if isinstance(record.object_shape, ObjectMesh):
+        _log_mesh(branch, record.object_shape, record.cube_size)
+        return
     if record.object_shape != "box":
         _log_round_body(branch, record)
         stripes = np.abs(normals[:, :2]).sum(axis=1) == 1
@@ -95,6 +99,20 @@ def _log_object(branch: Branch, record: EpisodeRecord) -> None:
         fill_mode="solid",
     )
     branch.log("cube", boxes)
+
+
+def _log_mesh(branch: Branch, mesh: ObjectMesh, size: Array) -> None:
+    """Write a mesh's faces, coloured by where they look, so that one sees how it is turned."""
+    corners = (mesh.vertices * size)[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sides = np.argmax(normals @ np.array(list(FACE_NORMALS.values()), dtype=np.float64).T, axis=1)
+    palette = np.round(255 * np.array(list(FACE_COLOURS.values()))).astype(np.uint8)
+    body = rr.Mesh3D(
+        vertex_positions=corners.reshape(-1, 3),
+        triangle_indices=np.arange(corners.size // 3).reshape(-1, 3),
+        vertex_colors=np.repeat(palette[sides], 3, axis=0),
+    )
+    branch.log("cube/body", body)
 
 
 def _log_round_body(branch: Branch, record: EpisodeRecord) -> None:

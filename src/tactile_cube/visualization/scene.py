@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.hand.object_shape import ObjectShape, straight_half
+from tactile_cube.hand.object_mesh import ObjectMesh
+from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half
 
 FACE_COLOURS = {
     "+x": (0.85, 0.15, 0.15),
@@ -35,6 +36,7 @@ FACE_NORMALS = {
 STICKER = 0.84
 """Edge of the coloured sticker as a share of the cube's edge: a dark frame remains, so edges stay visible."""
 STICKER_HEIGHT = 0.0006
+MESH_FILE = "object.obj"
 WEIGHT = '<inertial><mass value="0.01"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial>'
 """Nothing moves here by itself; without it PyBullet warns about every link."""
 LINK_COLOUR = (0.62, 0.66, 0.72, 1.0)
@@ -65,10 +67,30 @@ def object_urdf(size: Array, shape: ObjectShape = "box") -> str:
         size: edge lengths of its bounding box `(3,)` [m].
         shape: what it is.
     """
+    if isinstance(shape, ObjectMesh):
+        return _mesh_urdf(size)
     return cube_urdf(size) if shape == "box" else _round_urdf(size, shape)
 
 
-def _round_urdf(size: Array, shape: ObjectShape) -> str:
+def _mesh_urdf(size: Array) -> str:
+    """A mesh whose file stands beside the URDF, stretched, with a small bar that shows how it is turned from below."""
+    scale = " ".join(f"{edge:.6f}" for edge in size)
+    body = _part(f'<mesh filename="{MESH_FILE}" scale="{scale}"/>', (0.0, 0.0, 0.0), "body", (0.55, 0.55, 0.58))
+    return _urdf([body, _box(size * [0.40, 0.10, 0.03], size * [0.20, 0.0, -0.5], "bar", (0.85, 0.15, 0.15))])
+
+
+def obj_text(mesh: ObjectMesh) -> str:
+    """A mesh as the text of an OBJ file, each face with corners and a normal of its own; without one none is drawn."""
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in corners.reshape(-1, 3)]
+    lines += [f"vn {x:.6f} {y:.6f} {z:.6f}" for x, y, z in normals]
+    lines += [f"f {3 * k + 1}//{k + 1} {3 * k + 2}//{k + 1} {3 * k + 3}//{k + 1}" for k in range(len(normals))]
+    return "\n".join([*lines, ""])
+
+
+def _round_urdf(size: Array, shape: NamedShape) -> str:
     radius, length = 0.5 * float(size[0]), 2.0 * straight_half(0.5 * size) if shape == "capsule" else float(size[2])
     ends = [0.5 * length, -0.5 * length] if shape == "capsule" else []
     grey = (0.30, 0.30, 0.32)
@@ -130,7 +152,7 @@ class Scene:
     def __init__(self, cube_size: Array, hand: Hand = DLR_HAND2, shape: ObjectShape = "box") -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._hand = self._load(hand.urdf())
-        self._cube = self._load(object_urdf(cube_size, shape))
+        self._cube = self._load(object_urdf(cube_size, shape), shape)
         orientation = Rotation.from_matrix(hand.rotation).as_quat()
         pybullet.resetBasePositionAndOrientation(self._hand, hand.position, orientation, physicsClientId=self._client)
         self._columns = self._joint_columns(hand)
@@ -171,8 +193,10 @@ class Scene:
         array: NDArray[np.uint8] = np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))
         return Image.fromarray(array[:, :, :3].copy())
 
-    def _load(self, urdf: str) -> int:
+    def _load(self, urdf: str, shape: ObjectShape = "box") -> int:
         with tempfile.TemporaryDirectory() as folder:
+            if isinstance(shape, ObjectMesh):
+                (Path(folder) / MESH_FILE).write_text(obj_text(shape), encoding="utf-8")
             path = Path(folder) / "body.urdf"
             path.write_text(urdf.replace('<link name="palm">', f'<link name="palm">{WEIGHT}'), encoding="utf-8")
             return int(pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self._client))

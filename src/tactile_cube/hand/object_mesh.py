@@ -1,0 +1,203 @@
+"""An object from a mesh: a convex solid with mass and inertia, in plain numbers that every engine can build."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from tactile_cube.errors import InputError
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+Array = NDArray[np.float64]
+ENDINGS = (".obj", ".stl")
+SMALLEST, LARGEST = 0.01, 0.5
+"""Longest edge of the bounding box that an object for fingers may have [m]: a fingertip's diameter is about 0.025 m."""
+UNITS = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches"}
+CONVEX = 0.95
+"""Share of its convex hull that a mesh must fill: contacts are then where they would be but for 5 % of the volume."""
+CORNERS = 200
+"""Of the hull at most: the engines look at every one in every contact. On a sphere of 80 mm these are 0.3 mm off."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectMesh:
+    """A convex solid of constant density whose bounding box has edges of 1 and its middle at the origin.
+
+    The bounding box of an episode's object stretches it.
+
+    Attributes:
+        vertices: its corners (n, 3).
+        faces: triangles of corners, counterclockwise from outside (m, 3).
+        volume: of the solid.
+        com: its centre of mass (3,).
+        moments: second moments of a mass of 1 about the centre of mass (3, 3).
+        file: that it comes from.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    volume: float
+    com: Array
+    moments: Array
+    file: str = ""
+
+    def __str__(self) -> str:
+        """What it is called: equal for equal meshes."""
+        return f"mesh {hashlib.sha256(self.vertices.tobytes()).hexdigest()[:12]}"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is a mesh with the same corners."""
+        return isinstance(other, ObjectMesh) and (self is other or np.array_equal(self.vertices, other.vertices))
+
+    def __hash__(self) -> int:
+        """Of the corners."""
+        return hash(self.vertices.tobytes())
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything as arrays, for a file."""
+        return {name: np.asarray(value) for name, value in vars(self).items()}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> ObjectMesh:
+        """What `arrays` gave."""
+        vertices, faces, com, moments = (arrays[name] for name in ("vertices", "faces", "com", "moments"))
+        return cls(vertices, faces, float(arrays["volume"]), com, moments, str(arrays["file"]))
+
+    def inertia(self, size: Array) -> Array:
+        """Inertia (3, 3) [m^2] about the centre of mass of 1 kg with a bounding box `size` (3,) [m]."""
+        moments = np.diag(size) @ self.moments @ np.diag(size)
+        return np.asarray(np.trace(moments) * np.eye(3) - moments)
+
+    def surface(self, size: Array, origins: Array, directions: Array) -> tuple[Array, Array]:
+        """Where rays from inside leave the solid.
+
+        Args:
+            size: edges of the bounding box (3,) [m].
+            origins: (n, 3) [m].
+            directions: unit vectors (n, 3).
+
+        Returns:
+            Points (k, 3) [m] and outward normals (k, 3), k <= n: of the rays that begin inside.
+        """
+        planes = ConvexHull(self.vertices * size).equations  # normal @ x + offset <= 0 inside
+        room = -(origins @ planes[:, :3].T + planes[:, 3])
+        inside = np.all(room > 0.0, axis=1)
+        speed = directions[inside] @ planes[:, :3].T
+        with np.errstate(divide="ignore"):
+            ways = np.where(speed > 1e-12, room[inside] / speed, np.inf)
+        first = np.argmin(ways, axis=1)
+        way = np.take_along_axis(ways, first[:, None], axis=1)
+        return origins[inside] + way * directions[inside], planes[first, :3]
+
+
+def read_mesh(file: str | Path, scale: float = 1.0, hull: bool = False) -> tuple[ObjectMesh, Array]:
+    """Read an OBJ or STL file, whose axes are the object's.
+
+    Args:
+        file: of the mesh.
+        scale: metres per unit of the file.
+        hull: whether a hollow or open mesh may be taken as its convex hull.
+
+    Returns:
+        The mesh and the edges of its bounding box (3,) [m].
+
+    Raises:
+        InputError: there is no such file, no mesh in it, its size is none for fingers, or it is not convex.
+    """
+    where = f"object.file={file}"
+    if not scale > 0.0:
+        raise InputError(f"object.scale is {scale}; give metres per unit of {file}, above 0")
+    solid = _loaded(Path(file), where)
+    _refuse_odd_size(solid.extents * scale, scale, where)
+    convex = solid.convex_hull
+    if not hull:
+        _refuse_hollow(solid, convex, where)
+    massive = solid if solid.is_volume else convex
+    low, high = convex.bounds
+    middle, size = 0.5 * (low + high), high - low
+    corners, faces = _outline((convex.vertices - middle) / size)
+    covariance = _second_moments(massive.moment_inertia / massive.volume) / np.outer(size, size)
+    com = np.round((massive.center_mass - middle) / size, 9)  # 0 where it is meant to be
+    volume = float(massive.volume / np.prod(size))
+    return ObjectMesh(corners, faces, volume, com, covariance, str(file)), np.asarray(scale * size)
+
+
+def _loaded(path: Path, where: str) -> Trimesh:
+    import trimesh  # imports slowly
+
+    if path.suffix.lower() not in ENDINGS:
+        raise InputError(f"{where}: ending {path.suffix!r} is unknown; give a mesh as {' or '.join(ENDINGS)}")
+    if not path.is_file():
+        raise InputError(f"{where}: no such file; a relative name is looked for in {Path.cwd()}")
+    try:
+        solid: Any = trimesh.load_mesh(path)
+        if isinstance(solid, trimesh.Scene):
+            solid = solid.to_mesh()
+        volume = float(solid.convex_hull.volume)
+    except Exception as error:  # trimesh and qhull raise their own kinds for each damage
+        raise InputError(f"{where}: no mesh could be read from it: {str(error).splitlines()[0]}") from error
+    if not (np.isfinite(solid.vertices).all() and volume > 0.0):
+        raise InputError(f"{where}: its {len(solid.vertices)} points enclose no volume; give a solid")
+    found: Trimesh = solid
+    return found
+
+
+def _refuse_odd_size(size: Array, scale: float, where: str) -> None:
+    longest = float(size.max())
+    if SMALLEST <= longest <= LARGEST:
+        return
+    likely = [unit for unit in UNITS if 0.03 <= longest * unit / scale <= 0.3]
+    hint = f"; in {UNITS[likely[0]]} it needs object.scale={likely[0]:g}" if likely else ""
+    raise InputError(
+        f"{where}: is {' x '.join(f'{edge:.4g}' for edge in size)} m with object.scale={scale:g} (metres per unit of "
+        f"the file); fingers turn objects of {SMALLEST} to {LARGEST} m{hint}"
+    )
+
+
+def _refuse_hollow(solid: Trimesh, convex: Trimesh, where: str) -> None:
+    remedy = "object.hull=true takes its convex hull"
+    if not solid.is_volume:
+        raise InputError(f"{where}: its surface is not closed, or not all faces look outwards; mend it, or {remedy}")
+    share = float(solid.volume / convex.volume)
+    if share < CONVEX:
+        raise InputError(
+            f"{where}: fills {100 * share:.0f} % of its convex hull; the engines need convex ones: {remedy}"
+        )
+
+
+def _outline(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Corners and triangles of a hull; of more than `CORNERS` those that lie outermost in so many directions."""
+    chosen = vertices[ConvexHull(vertices).vertices]
+    if len(chosen) > CORNERS:
+        kept = np.unique(np.argmax(_directions(CORNERS - 6) @ chosen.T, axis=1))
+        extremes = np.concatenate([chosen.argmin(axis=0), chosen.argmax(axis=0)])
+        chosen = chosen[np.union1d(kept, extremes)]
+    hull = ConvexHull(chosen)
+    corners = chosen[hull.simplices]
+    outwards = np.einsum("ij,ij->i", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
+                         hull.equations[:, :3]) > 0.0  # fmt: skip
+    faces = np.where(outwards[:, None], hull.simplices, hull.simplices[:, ::-1])
+    return np.asarray(chosen, dtype=np.float64), faces.astype(np.int64)
+
+
+def _directions(count: int) -> Array:
+    """Unit vectors (count, 3), evenly spread: a Fibonacci lattice."""
+    rank = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * rank / count, np.pi * (1.0 + 5.0**0.5) * rank
+    across = np.sqrt(1.0 - height**2)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+
+
+def _second_moments(inertia: Sequence[Sequence[float]] | Array) -> Array:
+    """Second moments (3, 3) that an inertia (3, 3) stands for."""
+    tensor = np.asarray(inertia, dtype=np.float64)
+    return np.asarray(0.5 * np.trace(tensor) * np.eye(3) - tensor)
