@@ -5,6 +5,7 @@ import pytest
 from PIL import Image
 
 from tactile_cube.hand.object_mesh import read_mesh
+from tactile_cube.hand.object_shape import ObjectShape
 from tactile_cube.visualization.film import MAX_BYTES, write_film, write_stills
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 from tests.evaluation.synthetic import episode
@@ -50,9 +51,9 @@ def test_a_quarter_turn_can_be_seen(camera: object) -> None:
 def test_a_mesh_is_drawn_where_a_box_of_its_size_is(camera: object, tmp_path: Path) -> None:
     record = episode()
     mesh, _ = read_mesh(write_obj(tmp_path, 0.08 * CUBE))
-    filled = []
-    for shape in ("box", mesh):
-        scene = Scene(np.full(3, 0.08), shape=shape)  # type: ignore[arg-type]
+    filled, shapes = [], list[ObjectShape](["box", mesh])
+    for shape in shapes:
+        scene = Scene(np.full(3, 0.08), shape=shape)
         scene.pose(record.joint_position[0], np.array([0.0, 0.0, -0.1]), np.array([0.0, 0.0, 0.0, 1.0]))
         picture = np.asarray(scene.picture(camera, 64, 64))  # type: ignore[arg-type]
         filled.append(picture.min(axis=2) < 250)
