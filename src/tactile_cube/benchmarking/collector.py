@@ -15,8 +15,9 @@ from tactile_cube.benchmarking.report import Growth, Section, rates
 from tactile_cube.benchmarking.the_task import table_config, table_environment
 from tactile_cube.benchmarking.timing import in_turns
 from tactile_cube.gymnasium_env import GymnasiumRotation
-from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
+from tactile_cube.training.collection import Collection, SingleCollection
 from tactile_cube.training.environment import Environment
+from tactile_cube.training.multi_sync_collection import MultiSyncCollection
 from tactile_cube.transforms.make_env import rotation_env
 
 YARDSTICK = "the bare task, one world"

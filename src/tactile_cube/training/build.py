@@ -14,7 +14,7 @@ from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
-from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
+from tactile_cube.training.collection import Collection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
 from tactile_cube.training.expected_time import expected_seconds
@@ -23,6 +23,8 @@ from tactile_cube.training.heap import keep_freed_memory
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import Loggers, MetricLogger
 from tactile_cube.training.loop import Learner
+from tactile_cube.training.multi_sync_collection import MultiSyncCollection
+from tactile_cube.training.ray_collection import RayCollection
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
@@ -118,9 +120,20 @@ def build_learner(
 def build_collection(
     environment: Environment, actor: Actor, collector: CollectorSettings, training: TrainingSettings
 ) -> Collection:
-    """Worker processes, or this one."""
+    """Worker processes, workers of a Ray cluster, or this process."""
     if collector.kind == "single":
         return SingleCollection(environment.make, actor, collector.worlds, training.steps_per_iteration)
+    if collector.kind == "ray":
+        return RayCollection(
+            environment.make,
+            actor,
+            collector.worlds,
+            training.steps_per_iteration,
+            collector.workers,
+            collector.timeout,
+            collector.start_timeout,
+            collector.address,
+        )
     return MultiSyncCollection(
         environment.make,
         actor,

@@ -29,6 +29,7 @@ FREE_KEYS = {
     "collector.timeout",
     "collector.start_timeout",
     "collector.start_method",
+    "collector.address",
 }
 """Settings that may change between the sessions of a run: they do not touch what is learned from an iteration."""
 

@@ -24,22 +24,25 @@ class CollectorSettings(BaseModel):
     """How many worlds are stepped where.
 
     Attributes:
-        kind: "multi_sync" (worker processes beside the learner) or "single" (this process, in turns with the learner).
+        kind: "multi_sync" (worker processes beside the learner), "ray" (workers of a Ray cluster) or "single" (this
+            process, in turns with the learner).
         worlds: worlds in all. Source: the paper's 12 workers.
         processes: worker processes; None takes one for each core beside the learner's, as far as it divides `worlds`.
         timeout: longest wait for the workers [s].
         start_timeout: the same until their first block, before which they may compile.
         start_method: how worker processes start; fork takes under a second, spawn about 3 s a worker.
+        address: host:port of a Ray cluster that this machine is a node of; None: one of its own on this machine.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    kind: Literal["multi_sync", "single"] = "multi_sync"
+    kind: Literal["multi_sync", "ray", "single"] = "multi_sync"
     worlds: PositiveInt = 12
     processes: PositiveInt | None = None
     timeout: PositiveFloat = 120.0
     start_timeout: PositiveFloat = 600.0
     start_method: Literal["fork", "spawn", "forkserver"] = "fork"
+    address: str | None = None
 
     @model_validator(mode="after")
     def _divides(self) -> Self:

@@ -1,0 +1,131 @@
+"""Collect experience in worker processes of this machine, by TorchRL's MultiSyncCollector."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from torchrl.collectors import MultiSyncCollector
+
+from tactile_cube.agent.networks import Actor
+from tactile_cube.training.collection import MakeEnv
+from tactile_cube.training.worker_collection import WorkerCollection
+
+
+class MultiSyncCollection(WorkerCollection):
+    """Worker processes that host several worlds each and step them while the learner updates.
+
+    Args:
+        make_env: see `MakeEnv`.
+        actor: any actor of the right sizes.
+        worlds: number of worlds in all.
+        steps: environment steps a world and block.
+        processes: worker processes; divides `worlds`.
+        timeout: longest wait for a block [s]; then the workers count as stuck.
+        start_timeout: the same up to the end of the first block: workers that start may have to compile first.
+        start_method: "fork" (Linux, fast) or "spawn".
+    """
+
+    def __init__(
+        self,
+        make_env: MakeEnv,
+        actor: Actor,
+        worlds: int,
+        steps: int,
+        processes: int,
+        timeout: float,
+        start_timeout: float,
+        start_method: str,
+    ):
+        super().__init__(actor, processes, timeout, start_timeout)
+        self._final_cpu: float | None = None
+        self._processes: list[Any] = []
+        self._others = set(multiprocessing.active_children())
+        build = partial(self._build, make_env, worlds // processes, processes, worlds * steps, start_method)
+        self._collector, self._blocks = self._call(build, "start")
+        self._processes = self._collector.procs
+
+    def _build(
+        self, make_env: MakeEnv, worlds: int, processes: int, frames: int, start_method: str
+    ) -> tuple[MultiSyncCollector, Any]:
+        torch.multiprocessing.set_start_method(start_method, force=True)
+        threads = torch.get_num_threads()
+        collector = MultiSyncCollector(
+            [make_env] * processes,
+            self._behaviour,
+            create_env_kwargs=[{"worlds": worlds, "seed": index} for index in range(processes)],
+            frames_per_batch=frames,
+            total_frames=-1,
+            cat_results="stack",
+            num_threads=threads,
+            num_sub_threads=1,
+            trust_policy=True,
+            auto_register_policy_transforms=False,
+            init_fn=partial(_prepare_worker, None if start_method == "forkserver" else os.getpid()),
+        )
+        torch.set_num_threads(threads)
+        return collector, iter(collector)
+
+    def _restart(self, seed: int) -> None:
+        self._collector.set_seed(seed)
+
+    def _collect(self, weights: TensorDictBase) -> TensorDictBase:
+        self._check_alive()
+        self._collector.update_policy_weights_(weights)
+        block: TensorDictBase = next(self._blocks).flatten(0, 1).clone()
+        return block
+
+    def cpu_seconds(self) -> float:
+        """CPU time of all workers since they started [s]; 0 where the system does not tell."""
+        if self._final_cpu is not None:
+            return self._final_cpu
+        return sum(map(_process_cpu_seconds, self._processes))
+
+    def close(self) -> None:
+        """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
+        self._final_cpu = self.cpu_seconds()
+        self._kill()
+        closing = self._thread.submit(partial(self._collector.shutdown, timeout=1.0, raise_on_error=False))
+        with contextlib.suppress(Exception):  # the thread is daemonic: it may stay where it is
+            closing.result(timeout=3.0)
+        self._thread.close()
+
+    def _check_alive(self) -> None:
+        # torchrl would hang sending weights to a dead worker
+        for index, process in enumerate(self._processes):
+            if not process.is_alive():
+                raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
+
+    def _kill(self) -> None:
+        # also those of a start that did not come to its end: they would be waited for when the program ends
+        for process in set(multiprocessing.active_children()) - self._others:
+            process.kill()
+            process.join(1.0)
+
+
+def _prepare_worker(parent: int | None) -> None:
+    """Leave Ctrl-C to the main process `parent`, and end with it even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    torch.set_num_threads(1)
+    if os.uname().sysname == "Linux":
+        import ctypes
+
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)  # SIGTERM would not reach a stopped process
+        if parent is not None and os.getppid() != parent:  # it ended before
+            os._exit(1)
+
+
+def _process_cpu_seconds(process: Any) -> float:
+    """User and system time of a running process [s], from /proc; 0 for one that is closed already."""
+    try:
+        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    except (OSError, ValueError):
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -1,0 +1,124 @@
+"""A connection to Ray: a cluster of its own on this machine, or one that runs already."""
+
+import logging
+import os
+import secrets
+import shutil
+import socket
+import tempfile
+from concurrent.futures import TimeoutError
+from typing import Any
+
+from tactile_cube.errors import InputError
+from tactile_cube.training.background import Background
+from tactile_cube.training.collection import CollectionError
+
+STORE = 256 * 2**20
+"""Bytes of shared memory for what is sent: blocks and weights are a few megabytes."""
+CONNECT = 5.0
+"""Longest wait [s] for a cluster's address to accept a connection."""
+ANSWER = 60.0
+"""Longest wait [s] for a cluster to answer as one: on two busy cores it took 3."""
+QUIET: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
+
+
+class RayCluster:
+    """Ray, connected until it is closed. One at a time in a process.
+
+    Args:
+        address: host:port of a cluster that this machine is a node of; None: one of its own, on the loopback interface,
+            with a password of its own, no dashboard and no usage statistics. It ends with this process, however that
+            ends.
+        workers: how many there will be, each with a core.
+
+    Raises:
+        InputError: Ray is not installed; the address is none, or nothing or something else answers there.
+        CollectionError: a cluster of its own did not start.
+    """
+
+    def __init__(self, address: str | None, workers: int):
+        self._folder: str | None = None
+        ray = _ray()
+        if address is not None:
+            join(ray, address)
+            return
+        self._folder = tempfile.mkdtemp(prefix="ray-")  # a short path: it holds sockets
+        _stay_on_loopback()
+        try:
+            ray.init(
+                address="local",  # None would take RAY_ADDRESS
+                num_cpus=workers,
+                num_gpus=0,
+                include_dashboard=False,
+                object_store_memory=STORE,
+                _temp_dir=self._folder,
+                **QUIET,
+            )
+        except Exception as error:
+            self.close()
+            raise CollectionError(f"Ray did not start on this machine: {_line(error)}") from error
+
+    def cores(self) -> int:
+        """All cores that the cluster has now."""
+        return int(_ray().cluster_resources().get("CPU", 0))
+
+    def put(self, value: object) -> Any:
+        """Store a value, for calls that take it; it goes to each machine once."""
+        return _ray().put(value)
+
+    def close(self) -> None:
+        """Leave the cluster, which ends what ran there for this process; one of its own ends."""
+        _ray().shutdown()
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def join(ray: Any, address: str) -> None:
+    """Connect the module `ray` to the cluster at an address.
+
+    Raises:
+        InputError: it is none, or nothing or something else answers there.
+    """
+    host, _, port = address.rpartition(":")
+    if not host or "/" in host or not port.isdigit():
+        raise InputError(f"collector.address={address}: give host:port of a Ray cluster's head, e.g. 192.168.1.2:6379")
+    try:
+        socket.create_connection((host, int(port)), timeout=CONNECT).close()
+    except (OSError, OverflowError) as error:
+        raise InputError(
+            f"collector.address={address}: nothing answers there ({error}); is the cluster up (ray status)?"
+        ) from None
+    thread = Background()  # Ray tries for minutes
+    try:
+        thread.submit(lambda: ray.init(address=address, **QUIET)).result(timeout=ANSWER)
+    except TimeoutError:
+        raise InputError(f"collector.address={address}: no Ray cluster answered within {ANSWER:g} s") from None
+    except Exception as error:
+        raise InputError(
+            f"collector.address={address}: {_line(error)}; this machine must be a node of it "
+            f"(ray start --address={address})"
+        ) from None
+    finally:
+        thread.close()
+
+
+def _ray() -> Any:
+    try:
+        import ray
+    except ImportError:
+        raise InputError("collector=ray: Ray is not installed; pip install 'tactile-cube[ray]'") from None
+    return ray
+
+
+def _stay_on_loopback() -> None:
+    """Let nobody else in: neither other machines nor other users of this one."""
+    from ray._private import ray_constants
+
+    os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # Ray's switch for addresses within one machine
+    ray_constants.ENABLE_RAY_CLUSTER = False  # the same: torchrl has imported Ray, which has read the switch
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))  # else Ray leaves one in the user's home
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:300]

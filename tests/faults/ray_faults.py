@@ -1,0 +1,203 @@
+"""`+experiment=smoke` in workers of Ray: has it the bits of multi_sync, also when a worker, a node or main is lost?
+
+    python -m tests.faults.ray_faults --out docs/results/reliability
+
+The run is a fifth of smoke's. Each fault strikes once it is an iteration past its second barrier. After it the same
+command is given until it ends by itself. Needs pip install '.[ray]'.
+"""
+
+import argparse
+import hashlib
+import os
+import secrets
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+import torch
+
+from tactile_cube.agent.policy_file import current_commit
+from tests.faults.campaign import SHORT, results
+
+SMOKE = ["+experiment=smoke", "collector.processes=2", "collector.timeout=60", *SHORT, "training.steps=600"]
+STRIKE_AT = 5
+"""Rows of metrics.csv, one an iteration, at which a fault strikes; a barrier comes every two, the end after 15."""
+LIMIT = 900.0
+"""Seconds after which a run counts as hung."""
+MARK = "TACTILE_CUBE_TRIAL"
+"""Environment variable by which processes of a run are known, whoever their parent is."""
+
+Fault = Callable[["Trial"], None]
+
+
+@dataclass
+class Trial:
+    """A run of smoke as a user types it.
+
+    Attributes:
+        folder: run folder.
+        words: settings beside those of `SMOKE`.
+    """
+
+    folder: Path
+    words: list[str]
+    mark: str = field(default_factory=lambda: secrets.token_hex(8))
+    process: "subprocess.Popen[bytes]" = field(init=False)
+
+    def start(self) -> None:
+        """Start it."""
+        command = [sys.executable, "-m", "tactile_cube.train", *SMOKE, *self.words, f"hydra.run.dir={self.folder}"]
+        with self.folder.with_suffix(".txt").open("ab") as console:
+            self.process = subprocess.Popen(
+                command, stdout=console, stderr=console, env=os.environ | {MARK: self.mark}, start_new_session=True
+            )
+
+    def ran(self) -> int:
+        """Iterations done, as far as they are logged."""
+        metrics = self.folder / "metrics.csv"
+        return metrics.read_text().count("\n") - 1 if metrics.exists() else 0
+
+    def wait_for(self, rows: int) -> None:
+        """Wait until so many iterations are done."""
+        until = time.monotonic() + LIMIT
+        while self.ran() < rows and self.process.poll() is None and time.monotonic() < until:
+            time.sleep(0.02)
+        if self.process.poll() is not None:
+            raise RuntimeError(f"ended before the fault: {self.console()}")
+
+    def console(self) -> str:
+        """What it printed."""
+        return self.folder.with_suffix(".txt").read_text()
+
+    def processes(self) -> list[psutil.Process]:
+        """All that runs of it."""
+        found = []
+        for process in psutil.process_iter():
+            try:
+                if process.environ().get(MARK) == self.mark and process.status() != psutil.STATUS_ZOMBIE:
+                    found.append(process)
+            except psutil.Error:
+                continue
+        return found
+
+    def worker(self) -> psutil.Process:
+        """One of its workers on this node."""
+        return next(process for process in self.processes() if "RemoteCollector" in process.name())
+
+    def orphans(self, seconds: float = 20.0) -> int:
+        """Processes still there so long after the end; they are killed."""
+        until = time.monotonic() + seconds
+        while (left := self.processes()) and time.monotonic() < until:
+            time.sleep(0.2)
+        for process in left:
+            process.kill()
+        return len(left)
+
+
+def digest(tree: Any) -> str:
+    """Of a tree of tensors and plain values."""
+    sha = hashlib.sha256()
+
+    def add(part: Any) -> None:
+        if isinstance(part, torch.Tensor):
+            sha.update(str(part.dtype).encode() + part.contiguous().view(-1).view(torch.uint8).numpy().tobytes())
+        elif isinstance(part, dict):
+            for key in sorted(part, key=str):
+                sha.update(str(key).encode())
+                add(part[key])
+        elif isinstance(part, list | tuple):
+            for one in part:
+                add(one)
+        else:
+            sha.update(repr(part).encode())
+
+    add(tree)
+    return sha.hexdigest()[:16]
+
+
+def run(name: str, folder: Path, words: list[str], fault: Fault | None = None) -> list[str]:
+    """One row of the table."""
+    trial = Trial(folder, words)
+    trial.start()
+    if fault is not None:
+        trial.wait_for(STRIKE_AT)
+        fault(trial)
+    began = time.monotonic()
+    again, orphans, status = 0, 0, -1
+    while status != 0 and again < 3:
+        try:
+            status = trial.process.wait(LIMIT)
+        except subprocess.TimeoutExpired:
+            trial.process.kill()
+            return [name, "hung", "", str(orphans + trial.orphans()), ""]
+        orphans += trial.orphans()
+        if status != 0:
+            again += 1
+            trial.start()
+    replaced = trial.console().count("going back to the last barrier")
+    row = [name, f"{time.monotonic() - began:.0f}", str(replaced), str(again), str(orphans), digest(results(folder))]
+    print(row, flush=True)
+    return row
+
+
+def two_nodes(place: Path) -> list[list[str]]:
+    """A cluster of two nodes on this machine, one of which is taken away during a run."""
+    from ray.cluster_utils import Cluster
+
+    small = {"object_store_memory": 128 * 2**20, "include_dashboard": False}
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 2, **small})
+    try:
+        second = cluster.add_node(num_cpus=2, object_store_memory=128 * 2**20)
+        words = ["collector=ray", f"collector.address={cluster.address}"]
+        whole = run("ray, two nodes", place / "nodes", words)
+
+        def remove(trial: Trial) -> None:
+            cluster.remove_node(second, allow_graceful=False)
+
+        return [whole, run("ray, two nodes, one removed", place / "removed", words, remove)]
+    finally:
+        cluster.shutdown()
+
+
+def main() -> None:
+    """The command."""
+    words = argparse.ArgumentParser(description=__doc__)
+    words.add_argument("--out", type=Path)
+    given = words.parse_args()
+    if "RAY_AUTH_TOKEN" not in os.environ:  # for the cluster of two nodes; Ray, which torchrl imports, reads it at once
+        private = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
+        environment = os.environ | private | {"RAY_AUTH_TOKEN": secrets.token_hex(32)}
+        os.execve(sys.executable, [sys.executable, "-m", "tests.faults.ray_faults", *sys.argv[1:]], environment)
+    place = Path(tempfile.mkdtemp())
+    local = ["collector=ray"]
+    rows = [
+        run("multi_sync", place / "multi_sync", ["collector=multi_sync"]),
+        run("ray", place / "ray", local),
+        run("ray, a worker killed", place / "killed", local, lambda trial: trial.worker().kill()),
+        run("ray, a worker stopped", place / "stopped", local, lambda trial: trial.worker().suspend()),
+        run("ray, main process killed", place / "main", local, lambda trial: trial.process.kill()),
+        *two_nodes(place),
+    ]
+    head = ["collector, fault", "seconds from the fault (or start) to the end", "workers replaced", "given again"]
+    head += ["orphans", "digest of networks, replay, metrics and policy"]
+    lines = [head, ["---"] * len(head), *rows]
+    table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    command = "`python -m tests.faults.ray_faults`"
+    text = f"{command}, commit {current_commit()}, load of two cores {os.getloadavg()[1]:.0f}\n\n{table}\n"
+    print(text)
+    if given.out is not None:
+        (given.out / "ray.md").write_text(text)
+    same = {row[-1] for row in rows} == {rows[0][-1]}
+    shutil.rmtree(place)
+    raise SystemExit(0 if same and all(row[-2] == "0" for row in rows) else 1)
+
+
+if __name__ == "__main__":
+    main()
