@@ -5,6 +5,7 @@ import os
 import secrets
 import shutil
 import socket
+import subprocess
 import tempfile
 from concurrent.futures import TimeoutError
 from typing import Any
@@ -38,12 +39,14 @@ class RayCluster:
 
     def __init__(self, address: str | None, workers: int):
         self._folder: str | None = None
+        self._reaper: subprocess.Popen[bytes] | None = None
         ray = _ray()
         if address is not None:
             join(ray, address)
             return
         self._folder = tempfile.mkdtemp(prefix="ray-")  # a short path: it holds sockets
         _stay_on_loopback()
+        before = _descendants()
         try:
             ray.init(
                 address="local",  # None would take RAY_ADDRESS
@@ -57,6 +60,7 @@ class RayCluster:
         except Exception as error:
             self.close()
             raise CollectionError(f"Ray did not start on this machine: {_line(error)}") from error
+        self._reaper = _end_with_this_process(_descendants() - before, self._folder)
 
     def cores(self) -> int:
         """All cores that the cluster has now."""
@@ -69,6 +73,10 @@ class RayCluster:
     def close(self) -> None:
         """Leave the cluster, which ends what ran there for this process; one of its own ends."""
         _ray().shutdown()
+        if self._reaper is not None:
+            self._reaper.kill()
+            self._reaper.communicate()
+            self._reaper = None
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
 
@@ -118,6 +126,19 @@ def _stay_on_loopback() -> None:
     ray_constants.ENABLE_RAY_CLUSTER = False  # the same: torchrl has imported Ray, which has read the switch
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))  # else Ray leaves one in the user's home
+
+
+def _descendants() -> set[int]:
+    import psutil  # Ray brings it
+
+    return {process.pid for process in psutil.Process().children(recursive=True)}
+
+
+def _end_with_this_process(pids: set[int], folder: str) -> "subprocess.Popen[bytes]":
+    """A process that clears up when this one is gone: two of Ray's would stay for a minute, and its folder for good."""
+    script = 'read _; folder="$1"; shift; kill -9 "$@"; rm -rf "$folder"'  # it reads until this end is closed
+    command = ["sh", "-c", script, "sh", folder, *map(str, pids)]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True)
 
 
 def _line(error: Exception) -> str:
