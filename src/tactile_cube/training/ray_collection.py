@@ -69,7 +69,7 @@ class RayCollection(WorkerCollection):
         address: str | None,
     ):
         super().__init__(actor, workers, timeout, start_timeout)
-        self._cpu = [0.0] * workers
+        self._cpu = 0.0
         self._cluster = RayCluster(address, workers)
         if (cores := self._cluster.cores()) < workers:
             print(f"the Ray cluster has {cores} of the {workers} cores that collector.processes asks for: waiting")
@@ -98,17 +98,22 @@ class RayCollection(WorkerCollection):
 
     def _collect(self, weights: TensorDictBase) -> TensorDictBase:
         sent = self._cluster.put(weights)  # once to each machine, not to each worker
-        blocks, self._cpu = zip(*self._collector.map_fn("collect", [(sent,)] * self._workers), strict=True)
-        return torch.cat(blocks)
+        collected = self._collector.map_fn("collect", [(sent,)] * self._workers)
+        self._cpu = sum(cpu for _, cpu in collected)
+        return torch.cat([block for block, _ in collected])
 
     def cpu_seconds(self) -> float:
         """CPU time of all workers since they started [s], as of their last block."""
-        return sum(self._cpu)
+        return self._cpu
 
     def close(self) -> None:
         """End the workers, then leave the cluster."""
         self._kill()
         self._thread.close()
+
+    def _reason(self, error: Exception) -> str:
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        return lines[-1 if "Traceback" in str(error) else 0].strip()  # of a worker's error, or of its loss
 
     def _kill(self) -> None:
         with contextlib.suppress(Exception):

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future, TimeoutError
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from tensordict import TensorDict, TensorDictBase
 
@@ -14,16 +14,6 @@ from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
 from tactile_cube.training.background import Background
 from tactile_cube.training.collection import CollectionError, Progress
-
-
-class Workers(Protocol):
-    """A collector of TorchRL whose worlds live in workers."""
-
-    def set_seed(self, seed: int) -> int:
-        """Seed the worlds of all workers one after another."""
-
-    def map_fn(self, method_name: str, list_of_args: list[Any]) -> list[Any]:
-        """Call a method of each worker's own collector."""
 
 
 class WorkerCollection(ABC):
@@ -36,7 +26,7 @@ class WorkerCollection(ABC):
         start_timeout: the same up to the end of the first block: workers that start may have to compile first.
     """
 
-    _collector: Workers
+    _collector: Any  # a collector of TorchRL whose worlds live in workers
 
     def __init__(self, actor: Actor, workers: int, timeout: float, start_timeout: float):
         self._workers, self._timeout, self._start_timeout = workers, timeout, start_timeout
@@ -105,4 +95,8 @@ class WorkerCollection(ABC):
             ) from None
         except Exception as error:
             self._kill()
-            raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
+            raise CollectionError(f"simulation worker failed to {doing}: {self._reason(error)}") from error
+
+    def _reason(self, error: Exception) -> str:
+        """What went wrong, in words."""
+        return str(error)
