@@ -1,9 +1,11 @@
 """A connection to Ray: a cluster of its own on this machine, or one that runs already."""
 
+import contextlib
 import logging
 import os
 import secrets
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -58,6 +60,9 @@ class RayCluster:
                 **QUIET,
             )
         except Exception as error:
+            for pid in _descendants() - before:  # Ray forgets what it started in vain
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
             self.close()
             raise CollectionError(f"Ray did not start on this machine: {_line(error)}") from error
         self._reaper = _end_with_this_process(_descendants() - before, self._folder)
