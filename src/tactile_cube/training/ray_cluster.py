@@ -120,6 +120,9 @@ def _ray() -> Any:
         import ray
     except ImportError:
         raise InputError("collector=ray: Ray is not installed; pip install 'tactile-cube[ray]'") from None
+    from ray._private import auto_init_hook
+
+    auto_init_hook.enable_auto_connect = False  # a call that comes late must not start a cluster or find another
     return ray
 
 
