@@ -120,7 +120,10 @@ class RayCollection(WorkerCollection):
         return lines[-1 if "Traceback" in str(error) else 0].strip()  # of a worker's error, or of its loss
 
     def _kill(self) -> None:
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(AttributeError):  # it did not come to a start
+            while self._collector.remote_collectors:
+                with contextlib.suppress(Exception):  # one that is dead already
+                    self._collector.stop_remote_collectors()
             self._collector.shutdown()
         with contextlib.suppress(Exception):  # calls to them end by that
             self._thread.submit(lambda: None).result(timeout=5.0)
