@@ -117,7 +117,7 @@ class RayCollection(WorkerCollection):
 
     def _reason(self, error: Exception) -> str:
         lines = str(error).strip().splitlines() or [type(error).__name__]
-        return lines[-1 if "Traceback" in str(error) else 0].strip()  # of a worker's error, or of its loss
+        return lines[-1 if "ray::" in lines[0] else 0].strip()  # of a worker's own error, or of its loss
 
     def _kill(self) -> None:
         with contextlib.suppress(AttributeError):  # it did not come to a start
