@@ -158,7 +158,7 @@ def main() -> None:
     finally:
         episodes.close()
         if started is not None and started.page:  # a window stays open; a server would go on for ever
-            started.process.terminate()
+            started.end()
 
 
 if __name__ == "__main__":

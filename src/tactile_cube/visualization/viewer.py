@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -21,10 +23,11 @@ SERVER_MEMORY = "500MB"
 
 @dataclass(frozen=True)
 class Viewer:
-    """A viewer that runs in a process of its own.
+    """A viewer that runs in processes of its own.
 
     Attributes:
-        process: of the viewer.
+        process: what started it, first of its group: Rerun's module hands over to a program, which a signal to the
+            module alone would leave behind.
         url: where a recording stream connects to it.
         page: address of the web viewer; None: it is a window.
     """
@@ -32,6 +35,12 @@ class Viewer:
     process: subprocess.Popen[bytes]
     url: str
     page: str | None
+
+    def end(self) -> None:
+        """End it, program and all; without effect once it has ended."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGTERM)
+        self.process.wait()
 
 
 def has_display() -> bool:
@@ -90,7 +99,7 @@ def show_files(files: Sequence[Path], wanted: str) -> str:
     require_viewer(wanted)
     if wanted == "web":
         viewer = start_viewer(True, *files)
-        return f"look at {viewer.page} ; the server goes on until: kill {viewer.process.pid}"
+        return f"look at {viewer.page} ; the server goes on until: kill -- -{viewer.process.pid}"
     if wanted == "window" or (wanted == "auto" and has_display()):
         start_viewer(False, *files)
         return "opening the Rerun viewer"
