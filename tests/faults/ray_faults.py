@@ -136,34 +136,42 @@ def run(name: str, folder: Path, words: list[str], fault: Fault | None = None) -
             status = trial.process.wait(LIMIT)
         except subprocess.TimeoutExpired:
             trial.process.kill()
-            return [name, "hung", "", str(orphans + trial.orphans()), ""]
+            return [name, load(), "hung", "", "", str(orphans + trial.orphans()), ""]
         orphans += trial.orphans()
         if status != 0:
             again += 1
             trial.start()
     replaced = trial.console().count("going back to the last barrier")
-    row = [name, f"{time.monotonic() - began:.0f}", str(replaced), str(again), str(orphans), digest(results(folder))]
-    print(row, flush=True)
-    return row
+    seconds = f"{time.monotonic() - began:.0f}"
+    return [name, load(), seconds, str(replaced), str(again), str(orphans), digest(results(folder))]
 
 
-def two_nodes(place: Path) -> list[list[str]]:
-    """A cluster of two nodes on this machine, one of which is taken away during a run."""
+def load() -> str:
+    """Of the machine, in the last five minutes."""
+    return f"{os.getloadavg()[1]:.0f}"
+
+
+def without_a_node(place: Path) -> list[str]:
+    """A run in a cluster of two nodes on this machine, one of which is taken away meanwhile."""
     from ray.cluster_utils import Cluster
 
-    small = {"object_store_memory": 128 * 2**20, "include_dashboard": False}
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 2, **small})
+    small = {"num_cpus": 2, "object_store_memory": 128 * 2**20}
+    cluster = Cluster(initialize_head=True, head_node_args=small | {"include_dashboard": False})
     try:
-        second = cluster.add_node(num_cpus=2, object_store_memory=128 * 2**20)
+        second = cluster.add_node(**small)
         words = ["collector=ray", f"collector.address={cluster.address}"]
-        whole = run("ray, two nodes", place / "nodes", words)
-
-        def remove(trial: Trial) -> None:
-            cluster.remove_node(second, allow_graceful=False)
-
-        return [whole, run("ray, two nodes, one removed", place / "removed", words, remove)]
+        remove: Fault = lambda trial: cluster.remove_node(second, allow_graceful=False)  # noqa: E731
+        return run("ray, two nodes, one removed", place / "removed", words, remove)
     finally:
         cluster.shutdown()
+
+
+def table(rows: list[list[str]]) -> str:
+    """What the page shows."""
+    head = ["collector, fault", "load of two cores", "seconds from the fault (or start) to the end", "times replaced"]
+    head += ["given again", "orphans", "digest of networks, optimisers, replay, metrics and policy"]
+    lines = "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---"] * len(head), *rows])
+    return f"`python -m tests.faults.ray_faults`, commit {current_commit()}\n\n{lines}\n"
 
 
 def main() -> None:
@@ -177,23 +185,20 @@ def main() -> None:
         os.execve(sys.executable, [sys.executable, "-m", "tests.faults.ray_faults", *sys.argv[1:]], environment)
     place = Path(tempfile.mkdtemp())
     local = ["collector=ray"]
-    rows = [
-        run("multi_sync", place / "multi_sync", ["collector=multi_sync"]),
-        run("ray", place / "ray", local),
-        run("ray, a worker killed", place / "killed", local, lambda trial: trial.worker().kill()),
-        run("ray, a worker stopped", place / "stopped", local, lambda trial: trial.worker().suspend()),
-        run("ray, main process killed", place / "main", local, lambda trial: trial.process.kill()),
-        *two_nodes(place),
+    trials: list[Callable[[], list[str]]] = [
+        lambda: run("multi_sync", place / "multi_sync", ["collector=multi_sync"]),
+        lambda: run("ray", place / "ray", local),
+        lambda: run("ray, a worker killed", place / "killed", local, lambda trial: trial.worker().kill()),
+        lambda: without_a_node(place),
+        lambda: run("ray, main process killed", place / "main", local, lambda trial: trial.process.kill()),
+        lambda: run("ray, a worker stopped", place / "stopped", local, lambda trial: trial.worker().suspend()),
     ]
-    head = ["collector, fault", "seconds from the fault (or start) to the end", "workers replaced", "given again"]
-    head += ["orphans", "digest of networks, replay, metrics and policy"]
-    lines = [head, ["---"] * len(head), *rows]
-    table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    command = "`python -m tests.faults.ray_faults`"
-    text = f"{command}, commit {current_commit()}, load of two cores {os.getloadavg()[1]:.0f}\n\n{table}\n"
-    print(text)
-    if given.out is not None:
-        (given.out / "ray.md").write_text(text)
+    rows: list[list[str]] = []
+    for trial in trials:
+        rows.append(trial())
+        print(rows[-1], flush=True)
+        if given.out is not None:
+            (given.out / "ray.md").write_text(table(rows))
     same = {row[-1] for row in rows} == {rows[0][-1]}
     shutil.rmtree(place)
     raise SystemExit(0 if same and all(row[-2] == "0" for row in rows) else 1)

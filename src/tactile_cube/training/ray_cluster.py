@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import tempfile
+import time
 from concurrent.futures import TimeoutError
 from typing import Any
 
@@ -33,19 +34,25 @@ class RayCluster:
             with a password of its own, no dashboard and no usage statistics. It ends with this process, however that
             ends.
         workers: how many there will be, each with a core.
+        seconds: how long to try to start one of its own.
 
     Raises:
         InputError: Ray is not installed; the address is none, or nothing or something else answers there.
         CollectionError: a cluster of its own did not start.
     """
 
-    def __init__(self, address: str | None, workers: int):
+    def __init__(self, address: str | None, workers: int, seconds: float):
         self._folder: str | None = None
         self._reaper: subprocess.Popen[bytes] | None = None
         ray = _ray()
         if address is not None:
             join(ray, address)
             return
+        until = time.monotonic() + seconds
+        while self._reaper is None:
+            self._start(ray, workers, until)
+
+    def _start(self, ray: Any, workers: int, until: float) -> None:
         self._folder = tempfile.mkdtemp(prefix="ray-")  # a short path: it holds sockets
         _stay_on_loopback()
         before = _descendants()
@@ -64,8 +71,11 @@ class RayCluster:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
             self.close()
-            raise CollectionError(f"Ray did not start on this machine: {_line(error)}") from error
-        self._reaper = _end_with_this_process(_descendants() - before, self._folder)
+            # a node has 30 s, which on a machine with much else to do may be too few
+            if "timed out" not in str(error) or time.monotonic() > until:
+                raise CollectionError(f"Ray did not start on this machine: {_line(error)}") from error
+        else:
+            self._reaper = _end_with_this_process(_descendants() - before, self._folder)
 
     def cores(self) -> int:
         """All cores that the cluster has now."""

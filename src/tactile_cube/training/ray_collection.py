@@ -74,7 +74,7 @@ class RayCollection(WorkerCollection):
     ):
         super().__init__(actor, workers, timeout, start_timeout)
         self._cpu = 0.0
-        self._cluster = RayCluster(address, workers)
+        self._cluster = RayCluster(address, workers, start_timeout)
         if (cores := self._cluster.cores()) < workers:
             print(f"the Ray cluster has {cores} of the {workers} cores that collector.processes asks for: waiting")
         self._collector = self._call(partial(self._build, make_env, worlds // workers, worlds * steps), "start")
