@@ -93,6 +93,12 @@ def test_a_policy_that_taught_is_named() -> None:
     assert in_words(shown)["teacher"] == "the policy default in 30 % of the episodes, imitated with weight 0"
 
 
+def test_starts_in_grasps_are_named() -> None:
+    start = {"_target_": "tactile_cube.randomization.GraspStarts", "share": 0.5}
+    assert in_words({"start": start})["starts"] == "50 % in stable grasps"
+    assert in_words({"start": {**start, "share": 1.0}})["starts"] == "in stable grasps"
+
+
 def test_a_run_that_a_gait_taught_brings_the_hours_of_its_search(tmp_path: Path) -> None:
     taught = run(tmp_path / "taught", exploration={"demonstrations": 0.3, "gaits": {"search": SEARCH}})
     search, own = read_ancestry([taught])

@@ -122,9 +122,15 @@ def in_words(config: Mapping[str, Any]) -> dict[str, str]:
         "teacher": _teacher(config.get("exploration") or {}, agent),
         "reward": ", ".join(weights),
         "discount": f"{agent.get('gamma', '?')}, {agent.get('n_step', 1)}-step returns",
-        "starts": f"turned by up to {start.get('yaw_range', 0):g} rad",
+        "starts": _starts(start),
         "spinning friction": "the nominal of its commit" if friction is None else f"{1000 * friction:g} mm",
     }
+
+
+def _starts(start: Mapping[str, Any]) -> str:
+    if str(start.get("_target_", "")).endswith("GraspStarts"):
+        return "in stable grasps" if start.get("share", 1.0) == 1.0 else f"{100 * start['share']:g} % in stable grasps"
+    return f"turned by up to {start.get('yaw_range', 0):g} rad"
 
 
 def _teacher(exploration: Mapping[str, Any], agent: Mapping[str, Any]) -> str:
