@@ -129,3 +129,12 @@ def test_an_evaluation_judges_and_repeats_its_episodes() -> None:
     record = evaluation.record(nominal.variant, nominal.results[1])
     assert record.theta[-1] == nominal.results[1].final_angle
     assert record.steps == 10
+
+
+def test_the_nominal_spinning_friction_of_a_map_is_the_environments() -> None:
+    protocol = Protocol("x", nominal_values={"spinning friction [mm]": 100.0, "tip friction": 0.9})
+    found = Evaluation(CONFIG, HoldPolicy(), protocol, seed=1).nominal_values
+    assert found == {
+        "spinning friction [mm]": pytest.approx(1e3 * CONFIG.constants.tip_spinning_friction),
+        "tip friction": 0.9,
+    }

@@ -59,7 +59,7 @@ class EvaluationResult:
         if any(variant.variant.axis for variant in self.variants):
             from tactile_cube.visualization.curves import write_robustness_map
 
-            write_robustness_map(self.variants, self.run.protocol.nominal_values, folder / "robustness.png")
+            write_robustness_map(self.variants, self.evaluation.nominal_values, folder / "robustness.png")
             print(f"robustness map: {folder / 'robustness.png'}")
         if film:
             from tactile_cube.visualization.showcase import showcase

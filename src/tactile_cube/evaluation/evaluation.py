@@ -44,6 +44,10 @@ class VariantResult:
         }
 
 
+SPINNING_FRICTION = "spinning friction [mm]"
+"""The axis whose nominal value is the environment's."""
+
+
 class Evaluation:
     """One policy in one environment under one protocol.
 
@@ -62,6 +66,12 @@ class Evaluation:
     def hand(self) -> Hand:
         """The hand that acts."""
         return self._config.hand
+
+    @property
+    def nominal_values(self) -> dict[str, float]:
+        """Where the nominal condition lies on the axes of the variants: spinning friction as policies were trained."""
+        own = {SPINNING_FRICTION: 1e3 * self._config.constants.tip_spinning_friction}
+        return {axis: own.get(axis, value) for axis, value in self.protocol.nominal_values.items()}
 
     def run(self, report: Report) -> list[VariantResult]:
         """Run all episodes."""
