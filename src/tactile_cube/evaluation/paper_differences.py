@@ -8,8 +8,8 @@ DIFFERENCES = {
         "tactile_cube.search_gait` searches again), whose CPU hours belong to the cost of training. Those of the "
         "search behind the gait that taught the policies of this page were not recorded; the gait of today's recipe "
         "says [what its search cost](gait.yaml), and the cards of policies that it teaches count it. The paper's runs "
-        "find out by themselves; without the teacher no run here has regrasped in the air "
-        "([levers](levers/README.md))."
+        "find out by themselves; so do runs here [without the teacher](alone/README.md), by other rewards and starts "
+        "than the paper's."
     ),
     "Reward": (
         "`reward=air`: a fifth of the published weights for moving the cube, a tenth for tilting it, a sixth for "
