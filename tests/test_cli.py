@@ -10,7 +10,9 @@ from hydra.utils import instantiate
 from tactile_cube import cli
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.sac import Sac
+from tactile_cube.api.environment import env_config
 from tactile_cube.composition import composed
+from tactile_cube.curriculum import NoCurriculum
 from tactile_cube.errors import InputError
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
@@ -74,3 +76,16 @@ def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str
         cli.fail("no such thing")
     assert info.value.code == 2
     assert capsys.readouterr().err == "error: no such thing\n"
+
+
+def test_a_value_that_another_choice_of_a_group_had_is_named() -> None:
+    with pytest.raises(InputError) as info:
+        env_config("+experiment=alone", "curriculum=linear")
+    assert str(info.value).startswith("curriculum.low: LinearCurriculum has no low")
+    assert "~curriculum.low" in str(info.value)
+    assert env_config("+experiment=alone", "curriculum=linear", "~curriculum.low", "~curriculum.high").curriculum
+
+
+@pytest.mark.parametrize("experiment", ["alone", "curriculum"])
+def test_any_curriculum_can_be_left_out(experiment: str) -> None:
+    assert isinstance(env_config(f"+experiment={experiment}", "curriculum=none").curriculum, NoCurriculum)

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from omegaconf import DictConfig
 
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
+UNEXPECTED = re.compile(r"(\w+)\.__init__\(\) got an unexpected keyword argument '(\w+)'.*full_key: ([\w.]+)")
+"""How Hydra says that a class does not take a value."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NOT_AN_OPTION = Path("hydra", "_internal", "defaults_list.py")
 """Where Hydra fails at `task=1` (a ValueError) and `task=[1]` (a TypeError), with errors that are none of its own."""
@@ -175,8 +177,20 @@ def _one_line(error: BaseException) -> str:
     if isinstance(error, ValidationError):
         return "; ".join(_describe(error.title, dict(entry)) for entry in error.errors())
     # Hydra appends where it searched, which nobody asked for
-    text = str(error).partition("Config search path:")[0]
-    return " ".join(text.split()) or type(error).__name__
+    text = " ".join(str(error).partition("Config search path:")[0].split())
+    return _superfluous(text) or text or type(error).__name__
+
+
+def _superfluous(text: str) -> str | None:
+    """What to do about a value that the chosen entry of a group does not take, as an experiment sets it for another."""
+    found = UNEXPECTED.search(text)
+    if found is None:
+        return None
+    kind, key, place = found.groups()
+    group = place.removeprefix("env.")
+    place = group if (CONFIG / group).is_dir() else place
+    name = f"{place}.{key}"
+    return f"{name}: {kind} has no {key}, which was set for another choice of {place}; take it out with ~{name}"
 
 
 def _describe(title: str, entry: dict[str, Any]) -> str:

@@ -44,9 +44,11 @@ def _between(start: float | None, end: float, progress: float) -> float:
     return end if start is None else start + progress * (end - start)
 
 
-@dataclass(frozen=True)
 class NoCurriculum:
     """The task's own conditions from the first step."""
+
+    def __init__(self, **unused: object) -> None:
+        """Takes no account of what an experiment sets for a curriculum, so that `curriculum=none` ends any of them."""
 
     def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
         """`final`, whatever has been learned."""
