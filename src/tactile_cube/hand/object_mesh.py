@@ -32,7 +32,7 @@ CORNERS = 200
 class ObjectMesh:
     """A convex solid of constant density whose bounding box has edges of 1 and its middle at the origin.
 
-    The bounding box of an episode's object stretches it.
+    The bounding box of an episode's object scales it.
 
     Attributes:
         vertices: its corners (n, 3).
@@ -89,11 +89,11 @@ class ObjectMesh:
             Points (k, 3) [m] and outward normals (k, 3), k <= n: of the rays that begin inside.
         """
         planes = ConvexHull(self.vertices * size).equations  # normal @ x + offset <= 0 inside
-        room = -(origins @ planes[:, :3].T + planes[:, 3])
-        inside = np.all(room > 0.0, axis=1)
+        depth = -(origins @ planes[:, :3].T + planes[:, 3])
+        inside = np.all(depth > 0.0, axis=1)
         speed = directions[inside] @ planes[:, :3].T
         with np.errstate(divide="ignore"):
-            ways = np.where(speed > 1e-12, room[inside] / speed, np.inf)
+            ways = np.where(speed > 1e-12, depth[inside] / speed, np.inf)
         first = np.argmin(ways, axis=1)
         way = np.take_along_axis(ways, first[:, None], axis=1)
         return origins[inside] + way * directions[inside], planes[first, :3]

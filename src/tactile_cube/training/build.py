@@ -123,18 +123,7 @@ def build_collection(
     """Worker processes, workers of a Ray cluster, or this process."""
     if collector.kind == "single":
         return SingleCollection(environment.make, actor, collector.worlds, training.steps_per_iteration)
-    if collector.kind == "ray":
-        return RayCollection(
-            environment.make,
-            actor,
-            collector.worlds,
-            training.steps_per_iteration,
-            collector.workers,
-            collector.timeout,
-            collector.start_timeout,
-            collector.address,
-        )
-    return MultiSyncCollection(
+    workers = (
         environment.make,
         actor,
         collector.worlds,
@@ -142,8 +131,10 @@ def build_collection(
         collector.workers,
         collector.timeout,
         collector.start_timeout,
-        collector.start_method,
     )
+    if collector.kind == "ray":
+        return RayCollection(*workers, collector.address)
+    return MultiSyncCollection(*workers, collector.start_method)
 
 
 def protected(training: TrainingSettings) -> TrainingSettings:
