@@ -234,11 +234,16 @@ def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Compariso
 def test_what_the_trials_do_not_prove_is_named_and_more_is_asked_for(comparison: Comparison, tmp_path: Path) -> None:
     maybe = {"effects": ["backlash@a"], "heldout_gain": 0.72, "p_value": 0.023, "segments": 8}
     unsure = DIAGNOSIS | {"verdict": "unknown_effect", "effects": [], "unproven_effects": [maybe]}
-    text = page(diagnosis_report(unsure, comparison, None, "cmd"), tmp_path / "d.html")
+    time = np.arange(3) * 0.1
+    predictions = {"none of them": np.zeros((3, 2)), "backlash@a": np.ones((3, 2))}
+    experiment = Experiment("slow triangles", ("a", "b"), time, np.ones((3, 2)), 1e-3, "a", predictions)
+    asked = unsure | {"next_experiment": "next_experiment.csv"}
+    text = page(diagnosis_report(asked, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
     assert "these trials do not suffice to prove what" in text
     assert "backlash@a would take 72 % of the held-out squared error away (p 0.023)" in text
     assert "8 held-out segments do not tell that from chance" in text
-    assert "python -m tactile_cube.diagnose recording=" in text
+    assert "none of them" in text, "what the rig would do if none of them is missing"
+    assert "next_experiment.csv" in text
 
 
 def test_the_identification_page_shows_the_staircase(comparison: Comparison, tmp_path: Path) -> None:

@@ -31,6 +31,9 @@ from tactile_cube.measurement.replay.rig_replay import Engine
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part
 
 SHOWN_SHAPES = 6
+UNPROVEN = 3
+NOT_ALL = ("partly_explained", "unknown_effect")
+"""Verdicts that say that more is missing than is named."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class Diagnosis:
         over_noise: refitted, with_effects: errors of segments there, in units of the sensor noise.
         floor: noise floor of the recording.
         unexplained: what is left, joint by joint; empty unless something is.
-        experiment: what would tell the rivals apart; None without rivals.
+        experiment: what would tell rivals, or what is unproven and chance, apart; None without either.
         held_out: names of the trials that the search chose by.
         tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
         known: effects of the model that it began with, NAME@JOINT.
@@ -81,6 +84,11 @@ class Diagnosis:
     tested: list[str]
     known: tuple[str, ...] = ()
     common: tuple[CommonOffset, ...] = ()
+
+    @property
+    def unproven(self) -> tuple[Explanation, ...]:
+        """What would explain much beside the chosen effects, were the held-out segments enough to show it."""
+        return self.findings.unproven[:UNPROVEN] if self.verdict.kind in NOT_ALL else ()
 
     def errors(self) -> ModelErrors:
         """The staircase as the model file and diagnosis.json state it [rad]."""
@@ -126,11 +134,7 @@ def diagnose(
     )
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
     rivals = tuple((one, simulations.final(one)) for one in verdict.rivals)
-    experiment = None
-    if rivals:
-        models = {verdict.chosen.label: fitted.model} | {one.label: fit.model for one, fit in rivals}
-        experiment = next_experiment(search.shooting, recording, models, noise, seed)
-    return Diagnosis(
+    diagnosis = Diagnosis(
         verdict=verdict,
         findings=findings,
         fitted=fitted,
@@ -139,12 +143,24 @@ def diagnose(
         over_noise=over_noise,
         floor=floor,
         unexplained=simulations.unexplained(verdict.chosen, beside_base=verdict.kind == "unknown_effect"),
-        experiment=experiment,
+        experiment=None,
         held_out=[trial.name for trial in held_out.trials],
         tested=[trial.name for trial in tested.trials] if tested else [],
         known=tuple(term.label for term in search.start.terms),
         common=common_offsets(findings.base, search.shooting.sizes) if verdict.kind == "adequate" else (),
     )
+    models = open_models(diagnosis)
+    experiment = next_experiment(search.shooting, recording, models, noise, seed) if len(models) > 1 else None
+    return replace(diagnosis, experiment=experiment)
+
+
+def open_models(diagnosis: Diagnosis) -> dict[str, Model]:
+    """The chosen model and those that may be true as well: its rivals, or else what these trials do not prove."""
+    chosen = diagnosis.verdict.chosen
+    models = {chosen.label if chosen.effects else "none of them": diagnosis.fitted.model}
+    if diagnosis.rivals:
+        return models | {one.label: fit.model for one, fit in diagnosis.rivals}
+    return models | {one.label: one.fit.model for one in diagnosis.unproven}
 
 
 def test_errors(

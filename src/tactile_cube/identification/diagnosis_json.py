@@ -16,9 +16,6 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.verdict import unexplained_joints
 
 RANKED = 20
-UNPROVEN = 3
-NOT_ALL = ("partly_explained", "unknown_effect")
-"""Verdicts that say that more is missing than is named."""
 
 
 def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> dict[str, Any]:
@@ -46,7 +43,7 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
         "error_over_noise": diagnosis.over_noise,
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
         "partial_effects": effects if verdict.kind == "unknown_effect" else [],
-        "unproven_effects": _unproven(diagnosis) if verdict.kind in NOT_ALL else [],
+        "unproven_effects": _unproven(diagnosis),
         "known_effects": list(diagnosis.known),
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "next_experiment": str(experiment) if experiment else None,
@@ -77,7 +74,6 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _unproven(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """What would explain much beside the chosen effects, were the held-out segments enough to show it."""
     return [
         {
             "effects": _names(one),
@@ -85,7 +81,7 @@ def _unproven(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "p_value": one.p_value,
             "segments": int((one.judgement.samples > 0).sum()),
         }
-        for one in diagnosis.findings.unproven[:UNPROVEN]
+        for one in diagnosis.unproven
     ]
 
 

@@ -130,7 +130,7 @@ def unproven_effects(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     return [
         *lines,
-        f"{entries[0]['segments']} held-out segments do not tell that from chance: record more trials, or longer ones.",
+        f"{entries[0]['segments']} held-out segments do not tell that from chance: play the next experiment.",
     ]
 
 

@@ -158,9 +158,6 @@ def next_section(
     elif diagnosis["verdict"] == "partly_explained":
         said = "The model holds what was found: train with it. For the rest, write a law of the shapes and fit both:"
         lines = [train, f"{identify}=[{','.join([*names, f'my_rig.MyEffect@{unexplained}'])}]"]
-    elif diagnosis.get("unproven_effects"):
-        said = "Record more trials of each kind, or longer ones, into the same recording, and ask again:"
-        lines = [f"python -m tactile_cube.diagnose recording={folder}"]
     else:
         said = "Look at the shapes above, write the law as an effect of your own, and fit it:"
         lines = [f"{identify}=[my_rig.MyEffect@{unexplained}]"]
