@@ -23,7 +23,12 @@ def test_the_nearest_is_offered(message: str, expected: str) -> None:
     assert did_you_mean(message, CONFIG) == f"; did you mean {expected}?"
 
 
-@pytest.mark.parametrize("message", ["Could not override 'xyzzy'.", "seed=-1: too small", "rows.csv: no such file"])
+OF_ANOTHER_COMMAND = "Could not override 'rerun'."
+
+
+@pytest.mark.parametrize(
+    "message", ["Could not override 'xyzzy'.", "seed=-1: too small", "rows.csv: no such file", OF_ANOTHER_COMMAND]
+)
 def test_nothing_is_offered_where_nothing_is_near(message: str) -> None:
     assert did_you_mean(message, CONFIG) == ""
 

@@ -29,7 +29,11 @@ def did_you_mean(message: str, tree: Path) -> str:
         near = [f"{option['group']}={name}" for name in difflib.get_close_matches(option["option"], options, 1)]
     else:
         key = _KEY.search(message)
-        near = _nearest(key["key"] or key["setting"], sorted(_keys(tree))) if key else []
+        name = (key["key"] or key["setting"]) if key else ""
+        keys = _keys(tree)
+        near = (
+            _nearest(name, sorted(keys)) if key and name not in keys else []
+        )  # another command may have that very key
     return f"; did you mean {near[0]}?" if near else ""
 
 
