@@ -10,7 +10,6 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,11 +17,12 @@ from typing import Any
 import hidden
 import numpy as np
 import polars as pl
+import sizes
 import yaml
 from excitation import KINDS
 from numpy.typing import NDArray
-from physics import Plant, neutral, simulate
-from rig import RIGS, Rig
+from physics import simulate
+from worlds import Bench, World, command_of, copy, draw_usual, probe
 
 Array = NDArray[np.float64]
 CYCLE = ("none", "named", "named", "unnamed", "named", "named", "two", "named")
@@ -31,129 +31,8 @@ ATTEMPTS = 4
 """Worlds that a seed may draw until one runs through all its trials; some effects drive their joint."""
 VISIBLE = 1.5
 """A visible effect moves its joint by at least this multiple of the sensor noise, refitted constants removed."""
-CONSTANTS = {
-    "finger": {
-        "kp": (3.2, 4.5),
-        "kd": (0.2, 0.3),
-        "stiffness": (20, 32),
-        "friction": (0.015, 0.03),
-        "inertia": (0.0022, 0.004),
-    },
-    "pendulum": {
-        "kp": (5, 8),
-        "kd": (0.25, 0.4),
-        "stiffness": (40, 80),
-        "friction": (0.02, 0.04),
-        "inertia": (0.003, 0.006),
-    },
-    "two_link": {
-        "kp": (4, 7),
-        "kd": (0.25, 0.35),
-        "stiffness": (30, 60),
-        "friction": (0.02, 0.035),
-        "inertia": (0.003, 0.006),
-    },
-}
-MOTION = {
-    "finger": [(-0.35, 0.35), (-0.1, 1.1), (-0.05, 1.2)],
-    "pendulum": [(-1.5, 1.5)],
-    "two_link": [(-1.2, 1.2)] * 2,
-}
-
-
-@dataclass
-class Bench:
-    """How the rig was measured."""
-
-    rate: float
-    seconds: float
-    initialisations: int
-    kinds: tuple[str, ...]
-    noise: float
-    resolution: float
-    settle: float
-    dropped: float
-    start_error: float
-
-
-@dataclass
-class World:
-    """A rig with its true constants, and what its owner believes of them."""
-
-    kind: str
-    rig: Rig
-    plant: Plant
-    nominal: dict[str, Any]
-    low: Array
-    high: Array
-
-
-def draw_bench(rng: np.random.Generator, seconds: float | None) -> tuple[Bench, bool]:
-    """A bench and whether its excitation is poor (two kinds of trial only, or small motions)."""
-    poor = bool(rng.uniform() < 0.12)
-    kinds = tuple(KINDS) if not poor else tuple(rng.permutation(list(KINDS))[:2].tolist())
-    bench = Bench(
-        rate=float(rng.choice([500, 500, 500, 250, 1000])),
-        seconds=float(rng.choice([6.0, 8.0, 12.0])) if seconds is None else seconds,
-        initialisations=int(rng.choice([2, 3, 3, 4])),
-        kinds=kinds,
-        noise=float(rng.uniform(1e-4, 4e-4)),
-        resolution=float(rng.choice([1e-4, 1e-4, 3e-4])),
-        settle=float(rng.choice([0.0, 1.5])),
-        dropped=float(rng.choice([0.0, 0.0, 0.0, 0.0, 0.01])),
-        start_error=0.004,
-    )
-    return bench, poor
-
-
-def draw_world(rng: np.random.Generator, kind: str, amplitude: float) -> World:
-    """A rig, its stated values, and true constants that differ a little from them."""
-    rig = RIGS[kind](rng)
-    n = len(rig.actuated)
-    stated = {name: float(np.round(rng.uniform(*span), 5)) for name, span in CONSTANTS[kind].items()}
-    limit = 1.0 if kind == "finger" else 2.5
-    off = lambda share: 1.0 + rng.uniform(-share, share, n)  # noqa: E731
-    plant = neutral(n)._replace(
-        kp=np.full(n, stated["kp"]),
-        kd=stated["kd"] * off(0.1),
-        torque_limit=np.full(n, limit),
-        stiffness=np.full(n, stated["stiffness"]),
-        static_friction=stated["friction"] * off(0.25),
-        reflected_inertia=stated["inertia"] * off(0.15),
-    )
-    span = np.array(MOTION[kind])
-    middle, half = span.mean(axis=1), 0.5 * amplitude * (span[:, 1] - span[:, 0])
-    nominal = {
-        "controller": {"kp": stated["kp"], "kd": stated["kd"], "torque_limit": limit},
-        "nominal": {
-            "stiffness": stated["stiffness"],
-            "static_friction": stated["friction"],
-            "reflected_inertia": stated["inertia"],
-        },
-    }
-    if rng.uniform() < 0.3:
-        nominal["controller"]["kp"] = [stated["kp"]] * n
-    return World(kind, rig, plant, nominal, middle - half, middle + half)
-
-
-def copy(world: World) -> World:
-    """A world whose rig and plant can be changed without touching the original."""
-    rig = dataclasses.replace(world.rig, links=list(world.rig.links))
-    return replace(world, rig=rig, plant=Plant(*(x.copy() for x in world.plant)))
-
-
-def probe(world: World, seed: int, step: float = 5e-4) -> tuple[Array, Array, Array]:
-    """Positions, torques and commands of one short motion of every kind, without noise, at 400 Hz."""
-    rng = np.random.default_rng(seed)
-    positions, torques, commands = [], [], []
-    for make in KINDS.values():
-        command = make(rng, world.low, world.high, 1200, 400.0)
-        start = command[0] - world.plant.offset
-        position, torque, _ = simulate(world.rig, world.plant, command, 400.0, start, 0.3, step)
-        positions.append(position)
-        torques.append(torque)
-        commands.append(command)
-    return np.concatenate(positions), np.concatenate(torques), np.concatenate(commands)
+WORLDS = {"usual": draw_usual, "sizes": sizes.draw_machine}
+"""What may be measured: the three usual rigs, or a machine of any size."""
 
 
 def visibility(plain: World, changed: World, joint: int, noise: float, seed: int) -> dict[str, float]:
@@ -167,7 +46,7 @@ def visibility(plain: World, changed: World, joint: int, noise: float, seed: int
         getattr(near.plant, name)[joint] *= 1.0 + share
         columns.append(probe(near, seed)[0] - reference)
     near = copy(plain)
-    near.plant.offset[joint] += 0.01
+    near.plant.offset[joint] += 0.01 * near.plant.angle_unit[joint]
     columns.append(probe(near, seed)[0] - reference)
     moved = probe(changed, seed)[0] - reference
     if not np.isfinite(moved).all():
@@ -190,9 +69,18 @@ def hide(
         joint = n - 1
     _, torque, command = probe(world, seed)
     trials = command.reshape(len(KINDS), -1, n)
-    speed = np.abs(np.diff(trials, axis=1)).max(axis=(0, 1)) * 400.0
+    speed = np.abs(np.diff(trials, axis=1)).max(axis=(0, 1)) * 400.0 / world.time_unit
     scene = hidden.Scene(
-        changed.rig, changed.plant, world.low, world.high, np.abs(torque).max(axis=0), speed, rng, strength
+        changed.rig,
+        changed.plant,
+        world.low,
+        world.high,
+        np.abs(torque).max(axis=0),
+        speed,
+        rng,
+        strength,
+        world.torque_unit,
+        world.time_unit,
     )
     make = hidden.NAMED.get(name) or hidden.UNNAMED[name]
     joints = [joint]
@@ -228,7 +116,12 @@ def names_for(seed: int, rng: np.random.Generator) -> tuple[str, list[str]]:
 
 
 def draw(
-    seed: int, seconds: float | None = None, names: list[str] | None = None, kind: str | None = None, redrawn: int = 0
+    seed: int,
+    seconds: float | None = None,
+    names: list[str] | None = None,
+    kind: str | None = None,
+    redrawn: int = 0,
+    worlds: str = "usual",
 ) -> tuple[World, Bench, dict[str, Any]]:
     """The world, the bench and the truth of one seed; `names` and `kind` force what is hidden and where."""
     rng = np.random.default_rng([seed, 20231212, redrawn] if redrawn else [seed, 20231212])
@@ -238,15 +131,7 @@ def draw(
     strength = float(rng.uniform(0.15, 1.0))
     best: tuple[float, World, Bench, dict[str, Any]] | None = None
     for attempt in range(4):
-        bench, poor = draw_bench(rng, seconds)
-        many = any(n in hidden.NEEDS_NEIGHBOUR for n in chosen)
-        rigs = (
-            ["finger"] if "coupling_error" in chosen else ["finger", "finger", "two_link"] + ["pendulum"] * (not many)
-        )
-        rig = kind or str(rng.choice(rigs))
-        world = draw_world(
-            rng, rig, float(rng.uniform(0.25, 0.4) if poor and rng.uniform() < 0.5 else rng.uniform(0.7, 1.0))
-        )
+        world, bench, poor = WORLDS[worlds](rng, chosen, seconds, kind)
         floor = float(np.hypot(bench.noise, bench.resolution / np.sqrt(12)))
         effects = []
         for name in chosen:
@@ -254,11 +139,11 @@ def draw(
             effects.append(truth)
         weakest = min((e["signal"] if e["absorbed"] else e["distinct"] for e in effects), default=np.inf)
         reached = np.abs(probe(world, seed)[0]).max()
-        sane = bool(np.isfinite(reached) and reached < 4.0)
+        sane = bool(np.isfinite(reached) and reached < world.bound)
         truth = {
             "seed": seed,
             "kind": label,
-            "rig": rig,
+            "rig": world.kind,
             "poor_excitation": poor,
             "visible": bool(weakest >= VISIBLE),
             "drawn": attempt + 1,
@@ -284,10 +169,11 @@ def _table(
     world: World, bench: Bench, command: Array, start: Array, rng: np.random.Generator, engine: str
 ) -> pl.DataFrame:
     """One trial as its log: sensors with noise and resolution, some rows lost."""
-    position, torque, _ = _engine(engine)(world.rig, world.plant, command, bench.rate, start, bench.settle)
+    step = {} if world.step is None else {"step": world.step}
+    position, torque, _ = _engine(engine)(world.rig, world.plant, command, bench.rate, start, bench.settle, **step)
     position = position + bench.noise * rng.normal(size=position.shape)
     position = np.round(position / bench.resolution) * bench.resolution
-    torque = torque + 0.002 * rng.normal(size=torque.shape)
+    torque = torque + world.torque_noise * rng.normal(size=torque.shape)
     columns: dict[str, Array] = {"time": np.arange(len(command)) / bench.rate}
     for i, joint in enumerate(world.rig.actuated):
         columns[f"{joint}.command"] = command[:, i].astype(np.float32)
@@ -351,14 +237,15 @@ def perform(seed: int, world: World, bench: Bench, engine: str = "own") -> tuple
     rng = np.random.default_rng([seed, 7])
     n, samples = len(world.rig.actuated), int(bench.seconds * bench.rate)
     offsets = rng.uniform(-1, 1, (bench.initialisations, n)) * np.deg2rad(rng.uniform(0.5, 3.0))
-    commands = {kind: KINDS[kind](rng, world.low, world.high, samples, bench.rate) for kind in bench.kinds}
-    fresh = {kind: make(rng, world.low, world.high, samples, bench.rate) for kind, make in KINDS.items()}
+    offsets = offsets * world.plant.angle_unit * world.homing
+    commands = {kind: command_of(world, kind, rng, samples, bench.rate) for kind in bench.kinds}
+    fresh = {kind: command_of(world, kind, rng, samples, bench.rate) for kind in KINDS}
 
     def record(init: int, command: Array) -> pl.DataFrame:
         there = copy(world)
         there.plant.offset[:] += offsets[init]
         command = command.astype(np.float32).astype(float)
-        start = command[0] - there.plant.offset + bench.start_error * rng.uniform(-1, 1, n)
+        start = command[0] - there.plant.offset + bench.start_error * rng.uniform(-1, 1, n) * there.plant.angle_unit
         return _table(there, bench, command, start, rng, engine)
 
     tables = {}
@@ -377,10 +264,13 @@ def write(
     names: list[str] | None = None,
     kind: str | None = None,
     engine: str = "own",
+    worlds: str = "usual",
 ) -> dict[str, Any]:
     """Draw the seed and write `out`/recording and `out`/truth.json; returns the truth."""
+    if engine != "own" and worlds != "usual":
+        raise ValueError(f"--engine {engine} moves the usual worlds only, got --worlds {worlds}; leave --engine out")
     for redrawn in range(ATTEMPTS):
-        world, bench, truth = draw(seed, seconds, names, kind, redrawn)
+        world, bench, truth = draw(seed, seconds, names, kind, redrawn, worlds)
         tables, unseen = perform(seed, world, bench, engine)
         if all(np.isfinite(table.to_numpy()).all() for _, _, table in (*tables.values(), *unseen.values())):
             break
@@ -398,5 +288,6 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seconds", type=float, help="length of every trial")
+    parser.add_argument("--worlds", choices=tuple(WORLDS), default="usual")
     args = parser.parse_args()
-    print(json.dumps(write(args.seed, args.out, args.seconds)["effects"], indent=1))
+    print(json.dumps(write(args.seed, args.out, args.seconds, worlds=args.worlds)["effects"], indent=1))

@@ -23,7 +23,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from generator import VISIBLE, write
+from generator import VISIBLE, WORLDS, write
 from matplotlib.figure import Figure
 from scoring import score
 
@@ -31,6 +31,7 @@ FIRST_SEED = 10_000
 RULES = "[tests/blind/scoring.py](../../tests/blind/scoring.py)"
 GENERATOR = "[generator](../../tests/blind/generator.py)"
 ROUNDS = "[rounds.md](rounds.md)"
+TITLES = {"usual": "", "sizes": ": machines of other sizes", "forms": ": other forms of the laws"}
 GOAL = 1.3
 """Error on unseen trials in units of the floor that is aimed at."""
 
@@ -62,10 +63,12 @@ def validation_error(recording: Path, model: Path, out: Path) -> float | None:
     return None if answer is None else float(answer["error"]["overall"])
 
 
-def judge(seed: int, folder: Path, seconds: float | None, keep: bool, engine: str = "own") -> dict[str, Any]:
+def judge(
+    seed: int, folder: Path, seconds: float | None, keep: bool, engine: str = "own", worlds: str = "usual"
+) -> dict[str, Any]:
     """Generate, diagnose, compare and judge one seed."""
     place = folder / f"draw_{seed}"
-    truth = write(seed, place, seconds, engine=engine)
+    truth = write(seed, place, seconds, engine=engine, worlds=worlds)
     started = time.perf_counter()
     diagnosis = run_command(
         "diagnose", place / "diagnose", f"recording={place / 'recording'}", "engine=fast", "rerun=false"
@@ -225,12 +228,18 @@ def _left_open(summary: dict[str, Any]) -> str:
     return f"- ambiguous answers: {len(summary['ambiguous_set_sizes'])}; candidates that each leaves open: {sizes}"
 
 
+def _worlds(command: str) -> str:
+    """The worlds that a judge's command names."""
+    words = command.split()
+    return words[words.index("--worlds") + 1] if "--worlds" in words else "usual"
+
+
 def markdown(lines: list[dict[str, Any]], command: str) -> str:
     """The summary as a page."""
     s = summarise(lines)
     share = (s["right"] + s["acceptable"]) / max(s["draws"], 1)
     page = [
-        "# Blind diagnosis of hidden effects",
+        f"# Blind diagnosis of hidden effects{TITLES[_worlds(command)]}",
         "",
         f"Command: `{command}`; commit: {', '.join(s['commits'])}. Right, acceptable and wrong are "
         f"defined in {RULES}; all rounds ever run stand in {ROUNDS}.",
@@ -304,8 +313,11 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--seconds", type=float, help="length of every trial (default: drawn)")
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own", help="what moves the measured rigs")
+    parser.add_argument("--worlds", choices=tuple(WORLDS), default="usual", help="what is measured")
     parser.add_argument("--keep", action="store_true", help="keep recordings and answers")
     args = parser.parse_args()
+    if args.engine != "own" and args.worlds != "usual":
+        parser.error(f"--engine {args.engine} moves the usual worlds only, got --worlds {args.worlds}")
     for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     args.out.mkdir(parents=True, exist_ok=True)
@@ -314,8 +326,9 @@ def main() -> None:
     command = f"python tests/blind/judge.py --draws {args.draws or len(done)} --first-seed {args.first_seed}"
     command += f" --seconds {args.seconds:g}" if args.seconds else ""
     command += f" --engine {args.engine}" * (args.engine != "own")
+    command += f" --worlds {args.worlds}" * (args.worlds != "usual")
     with ThreadPoolExecutor(args.jobs) as pool:
-        submitted = [pool.submit(judge, s, args.out, args.seconds, args.keep, args.engine) for s in wanted]
+        submitted = [pool.submit(judge, s, args.out, args.seconds, args.keep, args.engine, args.worlds) for s in wanted]
         for future in as_completed(submitted):
             line = future.result()
             with (args.out / "verdicts.jsonl").open("a") as lines:

@@ -7,7 +7,8 @@ Its dry friction is made as stiff as its step allows: by default a joint eases i
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from physics import ASYMMETRY, DELAY, MATRICES, VECTORS, Plant, follow, load_on_joint, read_sensors
+from physics import follow, load_on_joint, read_sensors
+from plant import ASYMMETRY, DELAY, MATRICES, VECTORS, Plant
 from rig import Rig
 
 Array = NDArray[np.float64]
@@ -20,7 +21,7 @@ def model(rig: Rig, plant: Plant, step: float) -> mujoco.MjModel:
     """The rig with its coupling and hidden mass; rotors are joint armatures."""
     text = lambda values: " ".join(f"{x:.9g}" for x in values)  # noqa: E731
     lines = [f'<mujoco><option timestep="{step}" gravity="{text(rig.gravity)}" integrator="implicitfast"/><worldbody>']
-    for link, axis, origin, com, mass, inertia in zip(rig.links, *rig.arrays(), strict=True):
+    for link, axis, origin, com, mass, inertia, _ in zip(rig.links, *rig.arrays(), strict=True):
         own = ""
         if link.follows is None:
             i = rig.actuated.index(link.joint)

@@ -22,6 +22,10 @@ class Link:
     upper: float
     follows: str | None = None
     """The actuated joint this one is coupled to, one to one."""
+    slides: bool = False
+    """Whether the joint is prismatic: then positions are metres and efforts newtons."""
+    effort: float = 10
+    velocity: float = 30
 
 
 @dataclass
@@ -51,8 +55,8 @@ class Rig:
                 c[row] = self.coupling_offset
         return s, c
 
-    def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
-        """Axes, origins, centres of mass, masses and diagonal inertias; the hidden tip mass is on the last link."""
+    def arrays(self) -> tuple[Array, Array, Array, Array, Array, NDArray[np.bool_]]:
+        """Axes, origins, centres of mass, masses, diagonal inertias, sliding or not; tip mass included."""
         axes, origins, coms = (np.array([getattr(x, n) for x in self.links], float) for n in ("axis", "origin", "com"))
         masses = np.array([x.mass for x in self.links])
         inertias = np.array([x.inertia for x in self.links], float)
@@ -63,7 +67,7 @@ class Rig:
             point = masses[-1] * self.tip_mass / total * (np.dot(shift, shift) - shift**2)
             coms[-1] = (masses[-1] * coms[-1] + self.tip_mass * tip) / total
             masses[-1], inertias[-1] = total, inertias[-1] + point
-        return axes, origins, coms, masses, inertias
+        return axes, origins, coms, masses, inertias, np.array([x.slides for x in self.links])
 
     def urdf(self) -> str:
         """The mechanism as its owner knows it: exact coupling, no hidden mass."""
@@ -77,11 +81,13 @@ class Rig:
             ]
         parent = "base"
         for link in self.links:
+            kind = "prismatic" if link.slides else "revolute"
+            limit = f'lower="{link.lower}" upper="{link.upper}" effort="{link.effort:g}" velocity="{link.velocity:g}"'
             mimic = f'<mimic joint="{link.follows}" multiplier="1" offset="0"/>' if link.follows else ""
             lines.append(
-                f'<joint name="{link.joint}" type="revolute"><parent link="{parent}"/><child link="{link.joint}_link"/>'
+                f'<joint name="{link.joint}" type="{kind}"><parent link="{parent}"/><child link="{link.joint}_link"/>'
                 f'<origin xyz="{_xyz(link.origin)}"/><axis xyz="{_xyz(link.axis)}"/>'
-                f'<limit lower="{link.lower}" upper="{link.upper}" effort="10" velocity="30"/>{mimic}</joint>'
+                f"<limit {limit}/>{mimic}</joint>"
             )
             parent = f"{link.joint}_link"
         return "\n".join([*lines, "</robot>", ""])

@@ -1,0 +1,112 @@
+"""Every constant of the blind world, and where each stands in the arrays that its compiled laws read."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Plant(NamedTuple):
+    """Every constant of the world; one number per actuated joint, or a square matrix between joints.
+
+    New ones go last: compiled laws in a cache remember where each stood.
+    """
+
+    # what a user's model has as well
+    kp: Array
+    kd: Array
+    torque_limit: Array
+    stiffness: Array
+    static_friction: Array
+    reflected_inertia: Array
+    offset: Array
+    # command
+    delay: Array
+    rate_limit: Array
+    error_dead_zone: Array
+    torque_dead_zone: Array
+    # motor and transmission
+    saturation: Array
+    lag: Array
+    velocity_lag: Array
+    gain: Array
+    bias: Array
+    crosstalk: Array
+    backlash: Array
+    cubic_stiffness: Array
+    transmission: Array
+    transmission_order: Array
+    transmission_phase: Array
+    # friction
+    viscous: Array
+    stribeck: Array
+    stribeck_velocity: Array
+    load_friction: Array
+    asymmetry: Array
+    presliding: Array
+    drift: Array
+    drift_time: Array
+    # joint torques
+    drag: Array
+    cogging: Array
+    cogging_order: Array
+    cogging_phase: Array
+    spring: Array
+    spring_centre: Array
+    detent: Array
+    detent_centre: Array
+    detent_width: Array
+    stop_lower: Array
+    stop_upper: Array
+    stop_stiffness: Array
+    viscous_coupling: Array
+    dry_coupling: Array
+    # in no catalogue
+    position_velocity: Array
+    disturbance: Array
+    disturbance_frequency: Array
+    disturbance_phase: Array
+    acceleration_friction: Array
+    relay: Array
+    relay_centre: Array
+    relay_width: Array
+    neighbour_friction: Array
+    even_drag: Array
+    # how far, how fast it moves and how slowly its loop answers, in a finger's
+    angle_unit: Array
+    speed_unit: Array
+    time_unit: Array
+
+
+MATRICES = ("crosstalk", "viscous_coupling", "dry_coupling", "neighbour_friction")
+INFINITE = ("rate_limit", "saturation", "stop_upper", "torque_limit", "stiffness")
+ONES = (
+    "gain", "stribeck_velocity", "transmission_order", "cogging_order", "detent_width", "drift_time", "angle_unit",
+    "speed_unit", "time_unit",
+)  # fmt: skip
+
+
+VECTORS = tuple(name for name in Plant._fields if name not in MATRICES)
+(
+    KP, KD, TORQUE_LIMIT, STIFFNESS, STATIC_FRICTION, REFLECTED_INERTIA, OFFSET, DELAY, RATE_LIMIT, ERROR_DEAD_ZONE,
+    TORQUE_DEAD_ZONE, SATURATION, LAG, VELOCITY_LAG, GAIN, BIAS, BACKLASH, CUBIC_STIFFNESS, TRANSMISSION,
+    TRANSMISSION_ORDER, TRANSMISSION_PHASE, VISCOUS, STRIBECK, STRIBECK_VELOCITY, LOAD_FRICTION, ASYMMETRY,
+    PRESLIDING, DRIFT, DRIFT_TIME, DRAG, COGGING, COGGING_ORDER, COGGING_PHASE, SPRING, SPRING_CENTRE, DETENT,
+    DETENT_CENTRE, DETENT_WIDTH, STOP_LOWER, STOP_UPPER, STOP_STIFFNESS, POSITION_VELOCITY, DISTURBANCE,
+    DISTURBANCE_FREQUENCY, DISTURBANCE_PHASE, ACCELERATION_FRICTION, RELAY, RELAY_CENTRE, RELAY_WIDTH, EVEN_DRAG,
+    ANGLE_UNIT, SPEED_UNIT, TIME_UNIT,
+) = range(len(VECTORS))  # fmt: skip
+CROSSTALK, VISCOUS_COUPLING, DRY_COUPLING, NEIGHBOUR_FRICTION = range(len(MATRICES))
+
+
+def neutral(joints: int) -> Plant:
+    """A plant in which every effect is off (and every controller gain zero)."""
+    values = {}
+    for name in Plant._fields:
+        shape = (joints, joints) if name in MATRICES else (joints,)
+        fill = np.inf if name in INFINITE else 1.0 if name in ONES else 0.0
+        values[name] = np.full(shape, fill)
+    values["stop_lower"] = np.full(joints, -np.inf)
+    return Plant(**values)
