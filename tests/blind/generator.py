@@ -20,6 +20,7 @@ import polars as pl
 import sizes
 import yaml
 from excitation import KINDS
+from forms import FAMILIES, OUTSIDE
 from numpy.typing import NDArray
 from physics import simulate
 from worlds import Bench, World, command_of, copy, draw_usual, probe
@@ -31,8 +32,8 @@ ATTEMPTS = 4
 """Worlds that a seed may draw until one runs through all its trials; some effects drive their joint."""
 VISIBLE = 1.5
 """A visible effect moves its joint by at least this multiple of the sensor noise, refitted constants removed."""
-WORLDS = {"usual": draw_usual, "sizes": sizes.draw_machine}
-"""What may be measured: the three usual rigs, or a machine of any size."""
+WORLDS = {"usual": draw_usual, "sizes": sizes.draw_machine, "forms": draw_usual}
+"""What may be measured: the usual rigs, machines of any size, the usual rigs with laws as other authors write them."""
 
 
 def visibility(plain: World, changed: World, joint: int, noise: float, seed: int) -> dict[str, float]:
@@ -82,7 +83,7 @@ def hide(
         world.torque_unit,
         world.time_unit,
     )
-    make = hidden.NAMED.get(name) or hidden.UNNAMED[name]
+    make, family = FAMILIES.get(name) or (hidden.NAMED.get(name) or hidden.UNNAMED[name], ())
     joints = [joint]
     if name == "command_delay" and n > 1 and rng.uniform() < 0.4:
         joints = list(range(n))
@@ -93,16 +94,21 @@ def hide(
         "name": name,
         "joints": [world.rig.actuated[i] for i in joints],
         "parameters": parameters,
-        "in_catalogue": name in hidden.NAMED,
+        "in_catalogue": name in hidden.NAMED or name in FAMILIES,
         "absorbed": name in hidden.ABSORBED,
         "any_joint": name in hidden.WHOLE_RIG,
         **visibility(world, changed, joint, noise, seed),
     }
+    if family:
+        truth |= {"names": list(family), "outside": name in OUTSIDE}
     return changed, truth
 
 
-def names_for(seed: int, rng: np.random.Generator) -> tuple[str, list[str]]:
+def names_for(seed: int, rng: np.random.Generator, worlds: str = "usual") -> tuple[str, list[str]]:
     """What the seed hides: its kind of truth and the names of the effects, cycling through all of them."""
+    if worlds == "forms":  # nothing in every sixth
+        turn = seed - seed // 6 - 1
+        return ("form", [list(FAMILIES)[turn % len(FAMILIES)]]) if seed % 6 else ("none", [])
     kind = CYCLE[seed % len(CYCLE)]
     turn = seed // len(CYCLE) * CYCLE.count(kind) + CYCLE[: seed % len(CYCLE)].count(kind)
     if kind == "none":
@@ -125,7 +131,7 @@ def draw(
 ) -> tuple[World, Bench, dict[str, Any]]:
     """The world, the bench and the truth of one seed; `names` and `kind` force what is hidden and where."""
     rng = np.random.default_rng([seed, 20231212, redrawn] if redrawn else [seed, 20231212])
-    label, chosen = names_for(seed, rng)
+    label, chosen = names_for(seed, rng, worlds)
     if names is not None:
         label, chosen = "forced", names
     strength = float(rng.uniform(0.15, 1.0))

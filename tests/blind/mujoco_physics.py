@@ -50,15 +50,16 @@ def simulate(
     data.qpos[:] = select @ start + shift
     p, m = (np.stack([getattr(plant, name) for name in names]) for names in (VECTORS, MATRICES))
     position, torque_out, joint_out = np.empty((samples, n)), np.empty((samples, n)), np.empty((samples, n))
-    held, state, filtered, bristle, relay = command[0].copy(), np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n)
-    felt = np.zeros(n)
+    held, state, filtered, relay = command[0].copy(), np.zeros(n), np.zeros(n), np.ones(n)
+    felt, bristle, memory = np.zeros(n), np.zeros((n, 4)), np.zeros((n, 2))
     per, lead = round(1.0 / (rate * step)), round(settle / step)
     for k in range(-lead, samples * per):
         t = k * step
         q, v = data.qpos[dofs], data.qvel[dofs]
         for i in range(n):
             late = int(np.floor((t - p[DELAY, i]) * rate + 1e-6))
-            follow(p, i, q[i], v[i], command[min(max(late, 0), samples - 1), i], step, held, filtered, state, relay)
+            target = command[min(max(late, 0), samples - 1), i]
+            follow(p, i, q[i], v[i], target, step, held, filtered, state, relay, memory)
         for i in range(n):
             torque, level = load_on_joint(p, m, i, t, q, v, step, state, relay, bristle, felt)
             data.qfrc_applied[dofs[i]] = torque
@@ -70,5 +71,6 @@ def simulate(
             break
         if k >= 0 and (k + 1) % per == 0:
             row = k // per
-            read_sensors(p, data.qpos[dofs], held, filtered, state, position[row], torque_out[row], joint_out[row])
+            q = data.qpos[dofs]
+            read_sensors(p, q, held, filtered, state, memory, position[row], torque_out[row], joint_out[row])
     return position, torque_out, joint_out

@@ -78,16 +78,42 @@ class Plant(NamedTuple):
     angle_unit: Array
     speed_unit: Array
     time_unit: Array
+    # laws of the catalogue as other authors write them
+    smooth_backlash: Array
+    smooth_torque: Array
+    damped_backlash: Array
+    gap_damping: Array
+    bristles: Array
+    micro_damping: Array
+    bouc_wen_shape: Array
+    stribeck_exponent: Array
+    jitter: Array
+    cogging_2: Array
+    cogging_phase_2: Array
+    cogging_3: Array
+    cogging_phase_3: Array
+    soft_limit: Array
+    torque_bend: Array
+    viscous_difference: Array
+    backdriven_friction: Array
+    velocity_lag_2: Array
+    stop_growth: Array
+    knee: Array
+    knee_stiffness: Array
+    drift_rate: Array
+    cubic_drag: Array
 
 
 MATRICES = ("crosstalk", "viscous_coupling", "dry_coupling", "neighbour_friction")
-INFINITE = ("rate_limit", "saturation", "stop_upper", "torque_limit", "stiffness")
+INFINITE = ("soft_limit", "knee", "rate_limit", "saturation", "stop_upper", "torque_limit", "stiffness")
 ONES = (
     "gain", "stribeck_velocity", "transmission_order", "cogging_order", "detent_width", "drift_time", "angle_unit",
-    "speed_unit", "time_unit",
+    "speed_unit", "time_unit", "smooth_torque", "knee_stiffness",
 )  # fmt: skip
 
 
+DAHL, MAXWELL, BOUC_WEN = 0.0, 1.0, 2.0
+"""Kinds of bristles."""
 VECTORS = tuple(name for name in Plant._fields if name not in MATRICES)
 (
     KP, KD, TORQUE_LIMIT, STIFFNESS, STATIC_FRICTION, REFLECTED_INERTIA, OFFSET, DELAY, RATE_LIMIT, ERROR_DEAD_ZONE,
@@ -96,7 +122,10 @@ VECTORS = tuple(name for name in Plant._fields if name not in MATRICES)
     PRESLIDING, DRIFT, DRIFT_TIME, DRAG, COGGING, COGGING_ORDER, COGGING_PHASE, SPRING, SPRING_CENTRE, DETENT,
     DETENT_CENTRE, DETENT_WIDTH, STOP_LOWER, STOP_UPPER, STOP_STIFFNESS, POSITION_VELOCITY, DISTURBANCE,
     DISTURBANCE_FREQUENCY, DISTURBANCE_PHASE, ACCELERATION_FRICTION, RELAY, RELAY_CENTRE, RELAY_WIDTH, EVEN_DRAG,
-    ANGLE_UNIT, SPEED_UNIT, TIME_UNIT,
+    ANGLE_UNIT, SPEED_UNIT, TIME_UNIT, SMOOTH_BACKLASH, SMOOTH_TORQUE, DAMPED_BACKLASH, GAP_DAMPING, BRISTLES,
+    MICRO_DAMPING, BOUC_WEN_SHAPE, STRIBECK_EXPONENT, JITTER, COGGING_2, COGGING_PHASE_2, COGGING_3,
+    COGGING_PHASE_3, SOFT_LIMIT, TORQUE_BEND, VISCOUS_DIFFERENCE, BACKDRIVEN_FRICTION, VELOCITY_LAG_2, STOP_GROWTH,
+    KNEE, KNEE_STIFFNESS, DRIFT_RATE, CUBIC_DRAG,
 ) = range(len(VECTORS))  # fmt: skip
 CROSSTALK, VISCOUS_COUPLING, DRY_COUPLING, NEIGHBOUR_FRICTION = range(len(MATRICES))
 
@@ -108,5 +137,6 @@ def neutral(joints: int) -> Plant:
         shape = (joints, joints) if name in MATRICES else (joints,)
         fill = np.inf if name in INFINITE else 1.0 if name in ONES else 0.0
         values[name] = np.full(shape, fill)
+    values["stribeck_exponent"] = np.full(joints, 2.0)
     values["stop_lower"] = np.full(joints, -np.inf)
     return Plant(**values)

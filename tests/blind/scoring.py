@@ -5,9 +5,15 @@
 | nothing | `adequate` | | everything else (a false alarm) |
 | one named effect | `missing_effect`, that name and joint | `ambiguous`, truth in the set; see below | the rest |
 | two named effects | `missing_effect` with exactly both | `ambiguous`, both in the sets; see below | the rest |
+| another form | `missing_effect`, its family alone, that joint | one in the set; outside: see below | the rest |
 | outside the catalogue | `unknown_effect` | `ambiguous`, `partly_explained` | the rest |
 
 `partly_explained` counts as `ambiguous` does: it names what it found, and says that this is not all.
+
+Forms are laws of the catalogue as other authors write them; the family of each, the catalogue's names that are right
+for it, stands in forms.py. `unknown_effect` is acceptable for the one that is marked as outside, gear_efficiency:
+friction that asks which way power flows differs from friction in proportion to the load in kind. For every other form
+it is wrong: a law of the catalogue says what the effect is.
 
 Exceptions, each counted apart and never as right by name:
 - `absorbed`: the plain model has a constant for it (Coulomb and viscous friction, stiffness, reflected inertia, joint
@@ -45,7 +51,7 @@ def _label(names: list[tuple[str, list[str]]]) -> str:
 
 
 def _matches(truth: dict[str, Any], name: str, joints: list[str]) -> bool:
-    return name == truth["name"] and (truth["any_joint"] or set(joints) == set(truth["joints"]))
+    return name in truth.get("names", [truth["name"]]) and (truth["any_joint"] or set(joints) == set(truth["joints"]))
 
 
 def _merged(diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
@@ -74,11 +80,12 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
     """Judge an answer where one or two catalogue effects are hidden."""
     verdict, answer = diagnosis["verdict"], _merged(diagnosis)
     found = [t for t in truths if any(_matches(t, e["name"], e["joints"]) for e in answer)]
+    only = all(any(_matches(t, e["name"], e["joints"]) for t in truths) for e in answer)
     if verdict == "missing_effect":
-        if len(found) == len(truths) == len(answer):
+        if only and len(found) == len(truths):
             return "right", "named"
         missed = [t for t in truths if t not in found]
-        if len(found) == len(answer) and at_floor:
+        if only and found and at_floor:
             return "acceptable", "absorbed" if all(t["absorbed"] for t in missed) else "invisible"
         if not found:
             return "wrong", "another effect"
@@ -90,6 +97,8 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
         if not at_floor:
             return "wrong", "missed"
         return "acceptable", "absorbed" if all(t["absorbed"] for t in truths) else "invisible"
+    if all(t.get("outside") for t in truths):
+        return "acceptable", "outside the law's form"
     return "wrong", "called unknown"
 
 

@@ -16,20 +16,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 import generator
 import hidden
 import judge
-import sizes
+import page
 from dynamics import mass_and_bias
 from physics import simulate
 from plant import neutral
-from rig import RIGS, Link, Rig
+from rig import RIGS
 from scoring import score
 
 QUICK = 3.0
-USUAL: dict[str, Any] = {
-    "parameters": {"order": 23.0, "amplitude": 0.04236506103443329},
-    "drawn": [6.23133, 0.00013367121980461215, 2000.0],
-    "means": (0.9988162025316455, 0.13718383014202118, 0.1369413137435913, 0.02870587259531021),
-}
-"""What a seed drew when there were no other worlds."""
 
 
 @pytest.mark.parametrize("kind", sorted(RIGS))
@@ -44,86 +38,6 @@ def test_dynamics_equal_those_of_mujoco(kind: str) -> None:
     mujoco.mj_forward(model, data)
     bias = mass_and_bias(*rig.arrays(), np.array(rig.gravity), data.qpos.copy(), data.qvel.copy())[1]
     np.testing.assert_allclose(bias, data.qfrc_bias, rtol=1e-6, atol=1e-9)
-
-
-def test_dynamics_of_sliding_and_turning_joints_equal_those_of_mujoco() -> None:
-    mujoco = pytest.importorskip("mujoco")
-    rng = np.random.default_rng(4)
-    links = []
-    for i, slides in enumerate((True, False, True, False, True)):
-        axis = rng.normal(size=3)
-        axis, origin, com = (tuple(v) for v in (axis / np.linalg.norm(axis), rng.normal(size=3), rng.normal(size=3)))
-        links.append(Link(f"j{i}", axis, origin, com, 1.0 + i, (1.0, 1.5, 2.0), -9.0, 9.0, slides=slides))
-    rig = Rig("mixed", links, (1.0, 2.0, -9.0))
-    header = '<mujoco><compiler fusestatic="false"/></mujoco><link name="base"/>'
-    model = mujoco.MjModel.from_xml_string(rig.urdf().replace('<link name="base"/>', header))
-    model.opt.gravity[:] = rig.gravity
-    data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = rng.normal(size=(2, 5))
-    mujoco.mj_forward(model, data)
-    mass, bias = mass_and_bias(*rig.arrays(), np.array(rig.gravity), data.qpos.copy(), data.qvel.copy())
-    np.testing.assert_allclose(-np.linalg.solve(mass, bias), data.qacc_smooth, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(bias, data.qfrc_bias, rtol=1e-6, atol=1e-9)
-
-
-def test_an_upright_axis_falls_as_mechanics_says_and_sags_by_its_weight() -> None:
-    links = [Link("z", (0, 0, 1), (0, 0, 0), (0, 0, 0), 20.0, (1.0, 1.0, 1.0), -9.0, 9.0, slides=True)]
-    rig, one = Rig("axis", links, (0.0, 0.0, -9.81)), lambda x: np.array([x])
-    loose = neutral(1)._replace(reflected_inertia=one(5.0), static_friction=one(30.0))
-    command = np.zeros((500, 1))
-    fallen = simulate(rig, loose, command, 1000.0, np.zeros(1), step=1e-4)[2][-1, 0]
-    assert fallen == pytest.approx(-0.5 * (20.0 * 9.81 - 30.0) / 25.0 * 0.5**2, rel=1e-3)
-    servo = neutral(1)._replace(kp=one(1e5), kd=one(2e3), stiffness=one(4e5))
-    reading, force, carriage = simulate(rig, servo, command, 1000.0, np.zeros(1), step=1e-4)
-    weight = 20.0 * 9.81
-    assert force[-1, 0] == pytest.approx(weight, rel=1e-4)
-    assert reading[-1, 0] == pytest.approx(-weight / 1e5, rel=1e-4)
-    assert carriage[-1, 0] == pytest.approx(-weight / 1e5 - weight / 4e5, rel=1e-4)
-
-
-def test_the_usual_worlds_are_those_of_earlier_rounds() -> None:
-    world, bench, truth = generator.draw(10_011, 2.0, ["cogging"], "pendulum")
-    assert truth["effects"][0]["parameters"] == pytest.approx(USUAL["parameters"], rel=1e-12)
-    assert [world.plant.kp[0], bench.noise, bench.seconds * bench.rate] == pytest.approx(USUAL["drawn"], rel=1e-12)
-    table = generator.perform(10_011, world, bench)[0]["trials/ramps_0.parquet"][2]
-    means = table.select(pl.selectors.float().abs().mean()).row(0)
-    assert means == pytest.approx(USUAL["means"], rel=1e-6)
-
-
-@pytest.mark.parametrize(("seed", "kind"), [(11, "turning"), (12, "sliding")])
-def test_machines_of_any_size_are_drawn_again_alike_and_follow_their_commands(seed: int, kind: str) -> None:
-    (world, bench, truth), again = (generator.draw(seed, None, [], kind, worlds="sizes") for _ in range(2))
-    assert again[2] == truth
-    assert world.rig.urdf() == again[0].rig.urdf()
-    assert ("prismatic" in world.rig.urdf()) == (kind == "sliding")
-    position, _, command = generator.probe(world, seed)
-    assert (np.abs(position - command).mean(axis=0) < 0.2 * (world.high - world.low)).all()
-    per = 1.0 / (bench.rate * world.step)
-    assert per == pytest.approx(round(per))
-
-
-def test_torques_of_machines_range_from_a_hundredth_of_a_newton_metre_to_a_thousand() -> None:
-    rng = np.random.default_rng(0)
-    arms = [sizes.arm(rng, 1, False, True).links[0] for _ in range(300)]
-    weights = np.array([9.81 * x.mass * abs(x.com[2]) for x in arms])
-    assert 0.004 < weights.min() < 0.05
-    assert 100.0 < weights.max() < 1000.0
-
-
-def test_a_hidden_effect_is_as_large_as_its_machine() -> None:
-    for seed in (21, 22):
-        world = sizes.draw_machine(np.random.default_rng(seed), [], None, None)[0]
-        changed, truth = generator.hide(world, "stribeck_friction", np.random.default_rng(0), 0.5, 0, 1e-4)
-        joint = world.rig.actuated.index(truth["joints"][0])
-        speeds = np.abs(np.diff(generator.probe(world, 0)[2], axis=0))[:, joint]
-        assert truth["parameters"]["velocity"] < 400.0 / world.time_unit * speeds.max()
-        torque = np.abs(generator.probe(world, 0)[1][:, joint])
-        assert 0.05 * torque.max() < changed.plant.stribeck[joint] < torque.max()
-
-
-def test_the_other_engine_refuses_worlds_that_it_does_not_know(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="--engine mujoco moves the usual worlds only, got --worlds sizes"):
-        generator.write(1, tmp_path, QUICK, engine="mujoco", worlds="sizes")
 
 
 def test_a_joint_sticks_without_creeping_and_slips_at_its_friction() -> None:
@@ -206,6 +120,12 @@ def _truth(*effects: tuple[str, str], catalogue: bool = True) -> dict[str, Any]:
     return {"effects": made, "rig": "finger", "repeat_scatter": 3e-4, "sensor_floor": 3e-4}
 
 
+def _form(*family: str, outside: bool = False) -> dict[str, Any]:
+    truth = _truth(("a form", "q1"))
+    truth["effects"][0] |= {"names": list(family), "outside": outside}
+    return truth
+
+
 def _answer(verdict: str, *effects: tuple[str, str], rivals: tuple[str, ...] = ()) -> dict[str, Any]:
     return {"verdict": verdict, "effects": [{"name": n, "joints": [j], "rivals": list(rivals)} for n, j in effects]}
 
@@ -234,6 +154,14 @@ PLAY, COGS, RUB = ("backlash", "q1"), ("cogging", "q2"), ("coulomb_friction", "q
         (_truth(RUB), _answer("adequate"), 1.0, "acceptable"),
         (_truth(PLAY, COGS), _answer("missing_effect", COGS, PLAY), 1.0, "right"),
         (_truth(PLAY, COGS), _answer("missing_effect", COGS), 1.5, "wrong"),
+        (_form("backlash"), _answer("missing_effect", PLAY), 2.0, "right"),
+        (_form("cogging", "backlash"), _answer("missing_effect", PLAY, ("cogging", "q1")), 2.0, "right"),
+        (_form("backlash"), _answer("missing_effect", PLAY, COGS), 2.0, "wrong"),
+        (_form("backlash"), _answer("partly_explained", PLAY), 2.0, "acceptable"),
+        (_form("backlash"), _answer("ambiguous", RUB, rivals=("backlash",)), 2.0, "acceptable"),
+        (_form("backlash"), _answer("unknown_effect"), 2.0, "wrong"),
+        (_form("backlash", outside=True), _answer("unknown_effect"), 2.0, "acceptable"),
+        (_form("backlash", outside=True), _answer("missing_effect", RUB), 2.0, "wrong"),
         (_truth(PLAY, catalogue=False), _answer("unknown_effect"), 3.0, "right"),
         (_truth(PLAY, catalogue=False), _answer("ambiguous", COGS), 3.0, "acceptable"),
         (_truth(PLAY, catalogue=False), _answer("missing_effect", COGS), 1.0, "wrong"),
@@ -270,12 +198,14 @@ def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
     }
     command = "python tests/blind/judge.py --draws 1 --first-seed 7"
     judged = [judge.judged({**line, "commit": "abc"})]
-    page = judge.markdown(judged, command)
-    assert f"Command: `{command}`; commit: abc." in page
-    assert "in 1 of 1 draws" in page
-    assert "1 stayed below that" in page
-    assert "ambiguous answers: 1; candidates that each leaves open: 2" in page
-    row = judge.round_row(judge.summarise(judged), command)
+    text = page.markdown(judged, judge.summarise(judged), command)
+    assert f"Command: `{command}`; commit: abc." in text
+    assert "in 1 of 1 draws" in text
+    assert "1 stayed below that" in text
+    assert "ambiguous answers: 1; candidates that each leaves open: 2" in text
+    sized = page.markdown(judged, judge.summarise(judged), f"{command} --worlds sizes")
+    assert sized.startswith("# Blind diagnosis of hidden effects: machines of other sizes\n")
+    row = page.round_row(judge.summarise(judged), command)
     assert row == "| 7, 1 | `abc` | 0, 1, 0 (0) | 0 of 0 | 2 | ... |"
 
 
