@@ -16,6 +16,7 @@ from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import Judgement, judge
@@ -119,6 +120,7 @@ def diagnose(
         known: the model to begin with, whose effects are no news; None: what the recording's owner states.
         criteria: what decides.
     """
+    recording = resolved(recording, effects, say, known)
     fitted_part, held_out = held_out_split(recording, seed=seed)
     fitted_part, tested = with_test_part(fitted_part, len(recording.trials), seed)
     noise = sensor_noise(recording)

@@ -16,6 +16,7 @@ from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import judge
@@ -77,8 +78,9 @@ def identify(
         InputError: an unknown effect or joint, or nothing to hold out.
     """
     wanted = resolve(effects, recording.joints)
-    fitted_part, held_out = held_out_split(recording, seed=seed)
     classes = tuple(dict.fromkeys(effect for effect, _ in wanted))
+    recording = resolved(recording, classes, say)
+    fitted_part, held_out = held_out_split(recording, seed=seed)
     search = Search(fitted_part, held_out, sensor_noise(recording), classes, say)
     base = search.fit_base()
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.identification.fitting.model import Model, Term, Unknown
@@ -40,6 +41,11 @@ def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model
     return Model(
         constants, terms, {trial.initialisation: np.zeros(len(recording.joints)) for trial in recording.trials}
     )
+
+
+def every_effect(effects: Sequence[type[Effect]], start: Model) -> tuple[type[Effect], ...]:
+    """The classes to compile: those to try, and those of the model to begin with."""
+    return tuple(dict.fromkeys([*effects, *(term.effect for term in start.terms)]))
 
 
 def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.base import nominal_model
+from tactile_cube.identification.fitting.base import every_effect, nominal_model
 from tactile_cube.identification.fitting.error_growth import steady_rows
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.shooting import Shooting
@@ -92,7 +92,7 @@ class Search(Division):
             folds: the same trials divided in other ways, for where these few held-out trials do not tell.
         """
         start = nominal_model(fitted, known)
-        effects = tuple(dict.fromkeys([*effects, *(term.effect for term in start.terms)]))
+        effects = every_effect(effects, start)
         shooting = Shooting(fitted, effects)
         windows = some(cut(fitted, noise, time=shooting.time), SEGMENTS)
         super().__init__(shooting, fitted, held_out, noise, steady_rows(shooting, start, windows), known)

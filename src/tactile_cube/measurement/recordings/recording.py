@@ -1,5 +1,7 @@
 """What was measured on a rig: its description, the mechanism, the controller and the trials."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -78,6 +80,11 @@ class Recording:
         control = self.description.controller.rate_hz or self.rate
         return max(1, math.ceil(self.step / longest - 1e-6), round(control / self.rate))
 
+    def with_controller_rate(self, rate: float) -> Recording:
+        """The same for a controller that computes its torque so often [Hz]."""
+        controller = self.description.controller.model_copy(update={"rate_hz": rate})
+        return replace(self, description=self.description.model_copy(update={"controller": controller}))
+
     @property
     def read(self) -> Literal["after", "before"]:
         """Whether a row shows the state at the end of the period in which its command acted, or at its beginning."""
@@ -98,6 +105,6 @@ class Recording:
         values = getattr(self.gains, constant, self.nominal.get(constant))
         return None if values is None else float(values[self.joints.index(joint)])
 
-    def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> "Recording":
+    def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Recording:
         """The same rig with these trials alone."""
         return replace(self, trials=tuple(trials))
