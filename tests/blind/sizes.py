@@ -16,7 +16,7 @@ from rig import Link, Rig
 from worlds import Bench, World, draw_bench, probe
 
 Array = NDArray[np.float64]
-SLIDING = 0.5
+SLIDING = 0.4
 """Share of linear axes where the hidden effect leaves the choice."""
 RATES = (125, 250, 500, 1000, 2000)
 ROWS = 12000
@@ -27,10 +27,10 @@ PEAK = 98
 """Percentile of a torque that counts as its peak."""
 FINGER_SPEED, FINGER_ACCELERATION = 3.0, 30.0
 """Peaks of the finger's commands [ranges/s, ranges/s^2]."""
-CONTROLLER_RATE = {False: 5000.0, True: 10000.0}
-"""At least so often the controllers of turning and of sliding joints, whose encoders are finer, compute [Hz].
+CONTROLLER_RATE = 10000.0
+"""At least so often the controllers compute their torque [Hz].
 
-Steps four times as fine then move the joints of most machines by less than a third of the sensor floor.
+Steps four times as fine move the joints by less than half of the sensor floor.
 """
 
 
@@ -215,7 +215,7 @@ def draw_machine(
         bench, poor = measure(rng, world, seconds)
         if _sane(world):
             break
-    world.step = 1.0 / (bench.rate * np.ceil(CONTROLLER_RATE[sliding] / bench.rate))
+    world.step = 1.0 / (bench.rate * np.ceil(CONTROLLER_RATE / bench.rate))
     if rng.uniform() < 0.5:
         world.nominal["controller"]["rate_hz"] = round(1.0 / world.step)
     return world, bench, poor
