@@ -2,6 +2,8 @@
 
 import io
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +29,7 @@ def read_policy(path: Path) -> tuple[list[bytes], PolicyInfo]:
     return [parameter.numpy().tobytes() for parameter in actor.parameters()], info
 
 
-def test_a_run_that_is_watched_learns_the_same_bit_for_bit_and_shows_episodes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tactile_cube.visualization.live.PATIENCE", 200.0)  # the machine may be busy
+def test_a_run_that_is_watched_learns_the_same_bit_for_bit_and_shows_episodes(tmp_path: Path) -> None:
     watched = tactile_cube.train(*RUN, *LIVE, folder=tmp_path / "watched" / "run")
     alone = tactile_cube.train(*RUN, folder=tmp_path / "alone" / "run")
     for mine, theirs in zip(*(read_policy(result.policy) for result in (watched, alone)), strict=True):
@@ -72,6 +71,44 @@ def test_a_run_outlives_the_process_that_shows_it(tmp_path: Path, capsys: pytest
         live.log(episodes, {"episodes": float(episodes), **Conditions(0.5, 1.0, 1.0).columns()})
     live.close()
     assert capsys.readouterr().err.count("the run goes on without") == 1
+
+
+@pytest.mark.parametrize(
+    ("asked", "patience", "status", "told"),
+    [
+        (True, 60.0, 0, ["draws what it was asked for last"]),
+        (True, 0.1, -signal.SIGTERM, ["draws what it was asked for last", "not drawn in time"]),
+        (False, 60.0, -signal.SIGTERM, []),
+    ],
+    ids=["it ends by itself", "it takes too long", "nothing was asked for"],
+)
+def test_the_end_of_a_run_waits_for_the_episode_that_was_asked_for_and_says_so(
+    asked: bool,
+    patience: float,
+    status: int,
+    told: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    draws = f"import sys, time; sys.stdin.read(); time.sleep({2 if status == 0 else 60})"
+    monkeypatch.setattr("tactile_cube.visualization.live.SILENCE", 0.5)
+    monkeypatch.setattr("tactile_cube.visualization.live.PATIENCE", patience)
+    monkeypatch.setattr(
+        "tactile_cube.visualization.live._start",
+        lambda folder, viewer: subprocess.Popen([sys.executable, "-c", draws], stdin=subprocess.PIPE, bufsize=0),
+    )
+    (tmp_path / "policy.safetensors").write_bytes(b"")
+    live = LiveView(tmp_path, 0, viewer="file")
+    process = live.process
+    assert process is not None
+    if asked:
+        live.log(1, {"episodes": 1.0, **Conditions(0.5, 1.0, 1.0).columns()})
+    live.close()
+    assert process.returncode == status
+    printed = capsys.readouterr().err.splitlines()
+    assert len(printed) == len(told)
+    assert all(words in line for words, line in zip(told, printed, strict=True))
 
 
 def test_of_requests_that_wait_only_the_newest_is_drawn() -> None:

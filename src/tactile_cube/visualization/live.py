@@ -20,8 +20,11 @@ from tactile_cube.training.run import POLICY
 from tactile_cube.visualization.viewer import has_display
 
 VIEWERS = ("auto", "window", "web", "file")
-PATIENCE = 10.0
-"""How long the end of a run waits for an episode that is being drawn [s]."""
+PATIENCE = 300.0
+"""How long the end of a run waits for an episode that was asked for [s]: with the start some ten s of a processor,
+which a busy machine spreads over minutes."""
+SILENCE = 5.0
+"""After so long it says what it waits for [s]."""
 
 
 class LiveView:
@@ -69,13 +72,29 @@ class LiveView:
         if self.process is None:
             return
         self.process.stdin.close()  # type: ignore[union-attr]
-        for end in (self.process.terminate, self.process.kill, self.process.wait):
-            try:
-                self.process.wait(PATIENCE)
-                break
-            except subprocess.TimeoutExpired:
-                end()
+        if self._shown < 0:  # nothing was asked for
+            self.process.terminate()
+        try:
+            if not self._ended(SILENCE):
+                words = f"draws what it was asked for last, for {PATIENCE:g} s at most; Ctrl-C leaves it out"
+                print(f"live view: {words}", file=sys.stderr, flush=True)
+                if not self._ended(PATIENCE):
+                    print("live view: that was not drawn in time", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            print("live view: left out", file=sys.stderr, flush=True)
+        self.process.terminate()  # without effect on one that has ended
+        if not self._ended(SILENCE):
+            self.process.kill()
+            self.process.wait()
         self.process = None
+
+    def _ended(self, patience: float) -> bool:
+        """Whether the process ends within so many seconds."""
+        try:
+            self.process.wait(patience)  # type: ignore[union-attr]
+        except subprocess.TimeoutExpired:
+            return False
+        return True
 
 
 def request_line(steps: int, conditions: Conditions) -> str:

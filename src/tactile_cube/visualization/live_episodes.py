@@ -134,6 +134,7 @@ def serve(requests: TextIO, episodes: LiveEpisodes) -> None:
 def open_target(folder: Path, viewer: str) -> tuple[str | Path, Viewer | None]:
     """Where the stream goes, and the viewer that was started for it; says where to look."""
     if viewer == "file":
+        print(f"live view: the first episode begins {folder / FILE}", flush=True)
         return folder / FILE, None
     if "://" in viewer:
         return viewer, None
