@@ -6,6 +6,11 @@ from omegaconf import DictConfig
 
 from tactile_cube.cli import command
 
+TOUCHED = (
+    "fingers touched the object or one another, which this recording does not describe: compare counts that as error. "
+    "For a log that judges the model of the hand: motion=multisine robot.cube=false runs=2"
+)
+
 
 @command("deploy")
 def main(config: DictConfig) -> None:
@@ -21,6 +26,8 @@ def main(config: DictConfig) -> None:
     recording = result.write(job.folder / "recording") if config.record else None
     if recording is not None:
         print(f"log: {recording}\nnext: python -m tactile_cube.compare recording={recording}")
+        if result.touched:
+            print(TOUCHED)
 
 
 if __name__ == "__main__":

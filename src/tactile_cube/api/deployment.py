@@ -50,6 +50,11 @@ class DeploymentResult:
         return "\n".join([*lines, f"computing time of a tick: {shown}; a period lasts {1e6 / self.rate:.0f} us"])
 
     @property
+    def touched(self) -> bool:
+        """Whether fingers touched what their recording does not describe: the object, or one another."""
+        return bool(self.turned) or self.job.config.motion == "policy"
+
+    @property
     def rate(self) -> float:
         """Of the fast loop [Hz]."""
         return float(self.job.config.robot.rate)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.controller import POLICY_RATE, TargetFilter
+from tactile_cube.deployment.controller import POLICY_RATE, Controller, TargetFilter
 from tactile_cube.deployment.limits import Limits
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.stop_rules import StopRules, Watchdog
@@ -102,6 +102,11 @@ class ControlLoop:
         self.q_n = self.q_f = self.q_d = self._home
         self._last: Reading | None = None
         self._before = self._since = self._in_place = self._asked = 0.0
+
+    @property
+    def decider(self) -> str:
+        """Who gives q_n, in words."""
+        return "the policy decides" if isinstance(self._decides, Controller) else "an excitation, no policy"
 
     def tick(self, now: float, reading: Reading | None) -> Array | None:
         """Return the desired angles q_d `(joints,)` [rad] to send, or None while nothing may be sent.

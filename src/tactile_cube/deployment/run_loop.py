@@ -78,4 +78,4 @@ def _announce(loop: ControlLoop, robot: Robot, say: Callable[[str], None]) -> No
         say("homing: the fingers go to the start angles")
     elif loop.mode is Mode.RUNNING:
         robot.hand_over()
-        say("running: the policy decides")
+        say(f"running: {loop.decider}")
