@@ -19,6 +19,8 @@ from tactile_cube.drivetrain.effects import Effect, catalogue
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "images" / "effects"
 JOINT = "q2"
+ELSEWHERE = {"coupling_error": "q3"}
+"""Effects whose picture is of another joint: q2 leads none."""
 STAGES = {
     "COMMAND": "command",
     "VELOCITY_SENSOR": "measured velocity",
@@ -46,7 +48,8 @@ def effects_page() -> str:
         "",
         "Every effect is one class, used in training, in simulation and in the search for what a model lacks.",
         "The pictures show what a measurement looks like beside a model that lacks the effect: the simulated finger of",
-        f"the hand with the effect at its typical size on {JOINT}, measured minus simulated angle there, during",
+        f"the hand with the effect at its typical size on {JOINT} (a coupling's on the joint that leads), measured minus",
+        "simulated angle there, during",
         "ramps (slow strokes and reversals) and a multisine (0.2 to 6 Hz). They are noise-free, so that the shape is",
         "seen; grey is the command, scales differ. `python docs/generate.py --pictures` draws them anew.",
         "",
@@ -132,7 +135,7 @@ def write_pictures() -> None:
 
 
 def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object, object]]]:
-    """Effect -> for each motion time [s], command [rad] and residual [mrad] of `JOINT`."""
+    """Effect -> for each motion time [s], command [rad] and residual [mrad] of its joint."""
     import numpy as np
 
     from tactile_cube.api.job import called_job
@@ -150,7 +153,6 @@ def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object,
         dict(config.controller) | dict(config.nominal), tuple(description.joints), 0.0, np.random.default_rng(0)
     )
     empty = session.unmeasured(description, rig, constants)
-    place = description.joints.index(JOINT)
     rng, trials = np.random.default_rng(3), []
     for motion in motions:
         command = session.free_command(motion, rig, description.joints, 0.5, 6.0, source.rate, rng)
@@ -159,7 +161,8 @@ def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object,
     found: dict[str, list[tuple[object, object, object]]] = {}
     still = np.zeros(len(description.joints))
     for name, kind in catalogue().items():
-        label = f"{name}@{JOINT}"
+        joint = ELSEWHERE.get(name, JOINT)
+        label, place = f"{name}@{joint}", description.joints.index(joint)
         replay = Replay(empty, [label], 0.001)
         plain = {p.name: p.neutral for p in kind.parameters}
         typical = (kind.forms[0] if kind.forms else {}) or {p.name: p.typical for p in kind.parameters}
