@@ -149,7 +149,7 @@ def ancestry_table(runs: Sequence[Ancestor]) -> list[str]:
 
 def _cells(run: Ancestor) -> list[str]:
     steps = UNKNOWN if run.steps is None else f"{run.steps:,}".replace(",", " ")
-    hours = [UNKNOWN if value is None else f"{value:.3g}" for value in (run.cpu_hours, run.wall_hours)]
+    hours = [UNKNOWN if value is None else _hours(value) for value in (run.cpu_hours, run.wall_hours)]
     return [run.name, steps, *hours, *(run.settings.get(key, "-") for key in SETTINGS), run.commit]
 
 
@@ -167,8 +167,12 @@ def _ancestor(row: Mapping[str, str]) -> Ancestor:
     return Ancestor(row["run"], steps, cpu, wall, settings, row["commit"])
 
 
+def _hours(value: float) -> str:
+    return f"{value:.3g}"
+
+
 def total(runs: Sequence[Ancestor]) -> str:
-    """CPU hours and hours on the clock of all runs, and whose are missing in them."""
-    cpu, wall = (sum(getattr(run, key) or 0.0 for run in runs) for key in ("cpu_hours", "wall_hours"))
+    """CPU hours and hours on the clock of all runs, as the table shows each of them, and whose are missing."""
+    cpu, wall = (sum(float(_hours(getattr(run, key) or 0.0)) for run in runs) for key in ("cpu_hours", "wall_hours"))
     lost = [run.name for run in runs if run.cpu_hours is None]
     return f"{cpu:.2f} ({wall:.2f} h on the clock)" + (f", without {', '.join(lost)} ({UNKNOWN})" if lost else "")
