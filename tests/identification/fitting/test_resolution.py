@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting import resolution
 from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.resolution import resolved, step_error
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
 from tests.measurement.small_rig import write
 
 EFFECTS = tuple(catalogue().values())  # one kernel is compiled for all tests
 
 
-@pytest.mark.parametrize(("left", "rate"), [(0.29, None), (0.5, 1000.0), (1.1, 2000.0), (1.3, 4000.0), (40.0, 4000.0)])
+@pytest.mark.parametrize(("left", "rate"), [(0.19, None), (0.3, 1000.0), (0.7, 2000.0), (0.9, 4000.0), (40.0, 4000.0)])
 def test_steps_are_as_short_as_the_error_that_they_leave_is_large(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: float, rate: float | None
 ) -> None:
@@ -27,10 +29,39 @@ def test_steps_are_as_short_as_the_error_that_they_leave_is_large(
     assert bool(said) == (rate is not None), "where steps become shorter it is said"
 
 
-def test_a_rate_that_is_stated_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(resolution, "step_error", lambda *_: 40.0)
+@pytest.mark.parametrize(
+    ("left", "rate"),
+    [
+        ({500.0: 0.19}, 500.0),
+        ({500.0: 0.21, 1000.0: 0.19}, 1000.0),
+        ({500.0: 4.0, 1000.0: 2.0, 2000.0: 1.0}, 4000.0),  # no lower rate will do
+    ],
+)
+def test_a_fast_controller_is_simulated_as_slowly_as_the_sensors_allow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: dict[float, float], rate: float
+) -> None:
+    said: list[str] = []
+    stated = read_recording(write(tmp_path, lambda data: data["controller"].update(rate_hz=4000.0)))
+
+    def error(recording: Recording, *rest: object) -> float:
+        slower = recording.description.controller.rate_hz
+        assert slower is not None
+        assert rest[-1] == 4000.0 / slower, "beside the controller's own rate"
+        return left[slower]
+
+    monkeypatch.setattr(resolution, "step_error", error)
+    assert resolved(stated, EFFECTS, said.append).description.controller.rate_hz == rate
+    assert bool(said) == (rate != 4000.0)
+
+
+def test_a_slow_controller_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resolution, "step_error", lambda *_: 0.0)
     stated = read_recording(write(tmp_path, lambda data: data["controller"].update(rate_hz=200.0)))
     assert resolved(stated, EFFECTS, print) is stated
+
+
+def test_what_steps_hide_is_less_than_what_an_effect_must_gain() -> None:
+    assert resolution.HIDDEN**2 == pytest.approx(STANDARD.least_gain)
 
 
 def test_a_torque_limit_that_is_reached_between_rows_needs_shorter_steps_where_the_encoder_is_fine(
@@ -45,7 +76,7 @@ def test_a_torque_limit_that_is_reached_between_rows_needs_shorter_steps_where_t
             write(where, lambda data: data["controller"].update(kp=30.0, kd=1.0, torque_limit=limit), spoil)
         )
         shooting = Shooting(recording, EFFECTS)
-        return step_error(recording, shooting, nominal_model(recording), np.full(2, noise))
+        return step_error(recording, shooting, nominal_model(recording), np.full(2, noise), 8)
 
     assert error(0.3, 1e-6) > 1.5 * error(1e3, 1e-6)
     assert error(0.3, 1e-6) == pytest.approx(100 * error(0.3, 1e-4), rel=0.5)

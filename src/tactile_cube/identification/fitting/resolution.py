@@ -1,4 +1,4 @@
-"""Simulation steps so short that shorter ones would change nothing that the sensors show."""
+"""Simulation steps as long as the sensors hide what they leave out, and no longer."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import finer
 from tactile_cube.identification.fitting.windows import cut, steps_per_row
+from tactile_cube.identification.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
-FINEST = 8  # times as short steps at most: so much longer does a diagnosis take
-HIDDEN = (
-    0.3  # of the sensor noise: an error of 0.3 beside it makes 1.04 of 1, less than anything that is asked of a model
-)
+FINEST = 8  # times as short steps at most where no rate is stated: so much longer does a diagnosis take
+HIDDEN = 0.2  # of the sensor noise: its square is `criteria.least_gain`, so that no effect can gain by it
+StepError = Callable[[Recording, int], float]
+"""What steps so many times as short change in a recording's prediction [sensor noise]."""
+WINDOWS = 100  # tell it, spread over the recording: 40 s of a finger
 
 
 def resolved(
@@ -31,34 +33,58 @@ def resolved(
     say: Callable[[str], None],
     known: ModelFile | None = None,
 ) -> Recording:
-    """The recording with steps that its noise calls for, where the controller's rate is not stated.
+    """The recording with the longest steps whose error the sensors do not show.
 
-    Rows far apart and a fine encoder show what steps leave out that suffice elsewhere: torque limits that are reached
-    between two rows above all.
+    Where the controller's rate is not stated these may be shorter than usual: rows far apart and a fine encoder show
+    what steps leave out that suffice elsewhere, torque limits that are reached between two rows above all. Where it is
+    stated they may be longer than its period, for a search takes as many times as long as a row has steps.
 
     Args:
         recording: any.
         effects: classes to compile in; their kernel is used again by a search for them.
-        say: takes a line where steps become shorter.
+        say: takes a line where steps become shorter or longer.
         known: the model to simulate; None: what the recording's owner states.
     """
-    if recording.description.controller.rate_hz is not None:
+    noise = sensor_noise(recording)
+
+    def error(one: Recording, times: int) -> float:
+        start = nominal_model(one, known)
+        return step_error(one, Shooting(one, every_effect(effects, start)), start, noise, times)
+
+    unstated = recording.description.controller.rate_hz is None
+    rate = (_shorter if unstated else _longer)(recording, joint_scales(recording)[0].time, error)
+    if rate is None:
         return recording
-    start = nominal_model(recording, known)
-    shooting = Shooting(recording, every_effect(effects, start))
-    left = step_error(recording, shooting, start, sensor_noise(recording))
-    times = next((k for k in (1, 2, 4) if left <= HIDDEN * k), FINEST)  # errors of the step are of first order
-    if times == 1:
-        return recording
-    rate = steps_per_row(recording, shooting.time) * times * recording.rate
-    say(f"shorter steps move {left:.1f} x sensor noise: simulated at {rate:g} Hz (controller.rate_hz states it)")
+    say(f"simulated at {rate:g} Hz, as its sensors call for")
     return recording.with_controller_rate(rate)
 
 
-def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array) -> float:
-    """RMS [sensor noise] by which steps `FINEST` times as short move what constants and starts cannot follow."""
+def _shorter(recording: Recording, time: float, error: StepError) -> float | None:
+    """Rate [Hz] of the steps that suffice; None: the usual ones do."""
+    left = error(recording, FINEST)
+    times = next((k for k in (1, 2, 4) if left <= HIDDEN * k), FINEST)  # errors of the step are of first order
+    return None if times == 1 else times * steps_per_row(recording, time) * recording.rate
+
+
+def _longer(recording: Recording, time: float, error: StepError) -> float | None:
+    """Rate [Hz] below the controller's that suffices; None: no lower one does."""
+    stated, steps = (steps_per_row(one, time) for one in (recording, recording.with_controller_rate(recording.rate)))
+    while steps < stated:
+        rate = steps * recording.rate
+        if stated % steps:
+            steps += 1
+        elif error(recording.with_controller_rate(rate), stated // steps) <= HIDDEN:
+            return rate
+        else:
+            steps *= 2
+    return None
+
+
+def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array, times: int) -> float:
+    """RMS [sensor noise] by which steps so many times as short move what constants and starts cannot follow."""
     windows = cut(recording, noise, time=shooting.time)
-    own, fine = Problem(shooting, windows), Problem(shooting.finer(FINEST), finer(windows, FINEST))
+    windows = windows.take(np.unique(np.linspace(0, len(windows) - 1, WINDOWS).round().astype(np.int64)))
+    own, fine = Problem(shooting, windows), Problem(shooting.finer(times), finer(windows, times))
     for problem in (own, fine):
         problem.linearise_starts(model)
     prediction, columns = own.columns(model, base_unknowns(recording, model.constants, shooting.sizes))
