@@ -61,7 +61,7 @@ def test_a_slow_controller_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_what_steps_hide_is_less_than_what_an_effect_must_gain() -> None:
-    assert resolution.HIDDEN**2 == pytest.approx(STANDARD.least_gain)
+    assert np.isclose(resolution.HIDDEN**2, STANDARD.least_gain)
 
 
 def test_a_torque_limit_that_is_reached_between_rows_needs_shorter_steps_where_the_encoder_is_fine(

@@ -14,7 +14,7 @@ from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.time_step import finer
+from tactile_cube.identification.fitting.time_step import finer, spread
 from tactile_cube.identification.fitting.windows import cut, steps_per_row
 from tactile_cube.identification.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
@@ -24,7 +24,6 @@ FINEST = 8  # times as short steps at most where no rate is stated: so much long
 HIDDEN = 0.2  # of the sensor noise: its square is `criteria.least_gain`, so that no effect can gain by it
 StepError = Callable[[Recording, int], float]
 """What steps so many times as short change in a recording's prediction [sensor noise]."""
-WINDOWS = 100  # tell it, spread over the recording: 40 s of a finger
 
 
 def resolved(
@@ -82,8 +81,7 @@ def _longer(recording: Recording, time: float, error: StepError) -> float | None
 
 def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array, times: int) -> float:
     """RMS [sensor noise] by which steps so many times as short move what constants and starts cannot follow."""
-    windows = cut(recording, noise, time=shooting.time)
-    windows = windows.take(np.unique(np.linspace(0, len(windows) - 1, WINDOWS).round().astype(np.int64)))
+    windows = spread(cut(recording, noise, time=shooting.time))
     own, fine = Problem(shooting, windows), Problem(shooting.finer(times), finer(windows, times))
     for problem in (own, fine):
         problem.linearise_starts(model)

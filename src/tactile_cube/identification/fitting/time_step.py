@@ -21,14 +21,17 @@ def step_shift(problem: Problem, fitted: Fit) -> Array:
 
     A Gauss-Newton step in the finer simulation, less the one in the model's own: what noise moves moves alike in both.
     """
-    windows = problem.windows
-    chosen = np.unique(np.linspace(0, len(windows) - 1, ENOUGH).round().astype(np.int64))
-    part = windows.take(chosen)
+    part = spread(problem.windows)
     problems = [Problem(problem.shooting, part), Problem(problem.shooting.finer(FINER), finer(part, FINER))]
     for one in problems:
         one.linearise_starts(fitted.model)
     own, fine = (full_step(one, fitted.model, fitted.unknowns) for one in problems)
     return np.asarray(fine - own)
+
+
+def spread(windows: Windows) -> Windows:
+    """As many windows as tell what a time step does, spread over the recording."""
+    return windows.take(np.unique(np.linspace(0, len(windows) - 1, ENOUGH).round().astype(np.int64)))
 
 
 def finer(windows: Windows, times: int) -> Windows:
