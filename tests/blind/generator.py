@@ -238,21 +238,33 @@ def repeat_scatter(tables: dict[str, tuple[int, str, pl.DataFrame]], joints: lis
 Tables = dict[str, tuple[int, str, pl.DataFrame]]
 
 
+def _offsets(world: World, bench: Bench, rng: np.random.Generator) -> Array:
+    """Joint offsets (initialisations, n) by which the robot finds its zeros [rad]."""
+    offsets = rng.uniform(-1, 1, (bench.initialisations, len(world.rig.actuated))) * np.deg2rad(rng.uniform(0.5, 3.0))
+    return np.asarray(offsets * world.plant.angle_unit * world.homing)
+
+
+def _record(
+    world: World, bench: Bench, offset: Array, command: Array, rng: np.random.Generator, engine: str
+) -> pl.DataFrame:
+    """The log of one command, played after an initialisation with this offset."""
+    there = copy(world)
+    there.plant.offset[:] += offset
+    command = command.astype(np.float32).astype(float)
+    start_error = bench.start_error * rng.uniform(-1, 1, len(offset)) * there.plant.angle_unit
+    return _table(there, bench, command, command[0] - there.plant.offset + start_error, rng, engine)
+
+
 def perform(seed: int, world: World, bench: Bench, engine: str = "own") -> tuple[Tables, Tables]:
     """The trials, file -> (initialisation, kind, table), and unseen ones of the last initialisation."""
     rng = np.random.default_rng([seed, 7])
-    n, samples = len(world.rig.actuated), int(bench.seconds * bench.rate)
-    offsets = rng.uniform(-1, 1, (bench.initialisations, n)) * np.deg2rad(rng.uniform(0.5, 3.0))
-    offsets = offsets * world.plant.angle_unit * world.homing
+    samples = int(bench.seconds * bench.rate)
+    offsets = _offsets(world, bench, rng)
     commands = {kind: command_of(world, kind, rng, samples, bench.rate) for kind in bench.kinds}
     fresh = {kind: command_of(world, kind, rng, samples, bench.rate) for kind in KINDS}
 
     def record(init: int, command: Array) -> pl.DataFrame:
-        there = copy(world)
-        there.plant.offset[:] += offsets[init]
-        command = command.astype(np.float32).astype(float)
-        start = command[0] - there.plant.offset + bench.start_error * rng.uniform(-1, 1, n) * there.plant.angle_unit
-        return _table(there, bench, command, start, rng, engine)
+        return _record(world, bench, offsets[init], command, rng, engine)
 
     tables = {}
     for init in range(bench.initialisations):
@@ -284,9 +296,34 @@ def write(
         raise RuntimeError(f"seed {seed}: no finite recording in {ATTEMPTS} attempts")
     _save(out / "recording", world, bench, tables)
     _save(out / "recording" / "validation", world, bench, unseen)
+    truth["redrawn"] = redrawn
     truth["repeat_scatter"] = repeat_scatter(tables, world.rig.actuated)
     (out / "truth.json").write_text(json.dumps(truth, indent=1))
     return truth
+
+
+def play(
+    out: Path,
+    commands: Path,
+    seconds: float | None = None,
+    engine: str = "own",
+    worlds: str = "usual",
+) -> None:
+    """Play a command file on the rig that `write` has put into `out`, and add the trial to its recording."""
+    truth = json.loads((out / "truth.json").read_text())
+    seed, redrawn = truth["seed"], truth["redrawn"]
+    world, bench, _ = draw(seed, seconds, redrawn=redrawn, worlds=worlds)
+    offset = _offsets(world, bench, np.random.default_rng([seed, 7]))[-1]  # still as the robot was initialised last
+    command = pl.read_csv(commands).select([f"{joint}.command" for joint in world.rig.actuated]).to_numpy()
+    table = _record(world, bench, offset, command, np.random.default_rng([seed, 8]), engine)
+    if not np.isfinite(table.to_numpy()).all():
+        raise RuntimeError(f"seed {seed}: {commands} has no finite answer")
+    description = out / "recording" / "recording.yaml"
+    data = yaml.safe_load(description.read_text())
+    name = "trials/next_experiment.parquet"
+    table.write_parquet(out / "recording" / name)
+    data["trials"].append({"file": name, "initialisation": bench.initialisations - 1, "kind": "next_experiment"})
+    description.write_text(yaml.safe_dump(data, sort_keys=False))
 
 
 if __name__ == "__main__":

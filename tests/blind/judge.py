@@ -23,7 +23,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from generator import WORLDS, write
+from generator import WORLDS, play, write
 from page import FIRST_SEED, GOAL, markdown, picture, round_row
 from scoring import score
 
@@ -72,14 +72,34 @@ def judge(
         return line
     model = place / "diagnose" / "model.yaml"
     line["validation_error"] = validation_error(place / "recording", model, place / "validation")
+    experiment = place / "diagnose" / "next_experiment.csv"
+    if experiment.is_file():
+        line["after_experiment"] = settled(place, experiment, seconds, engine, worlds)
     if not keep:
         shutil.rmtree(place / "recording")
         shutil.rmtree(place / "diagnose")
+        shutil.rmtree(place / "diagnose_again", ignore_errors=True)
     return line
+
+
+def settled(place: Path, experiment: Path, seconds: float | None, engine: str, worlds: str) -> dict[str, Any]:
+    """What is answered once the recommended experiment has been played on the rig, and its error on unseen trials."""
+    play(place, experiment, seconds, engine, worlds)
+    out = place / "diagnose_again"
+    diagnosis = run_command("diagnose", out, f"recording={place / 'recording'}", "engine=fast", "rerun=false")
+    error = validation_error(place / "recording", out / "model.yaml", place / "validation_again")
+    return {"diagnosis": diagnosis, "validation_error": error}
 
 
 def judged(line: dict[str, Any]) -> dict[str, Any]:
     """The line with its score and the error on unseen trials in units of sensor noise and of the repeats' scatter."""
+    scored = _scored(line)
+    if again := line.get("after_experiment"):
+        scored["after_experiment"] = _scored({"truth": line["truth"], **again})
+    return scored
+
+
+def _scored(line: dict[str, Any]) -> dict[str, Any]:
     truth, diagnosis, error = line["truth"], line["diagnosis"], line.get("validation_error")
     ratios = {
         "noise_ratio": None if error is None else error / truth["sensor_floor"],
@@ -130,6 +150,7 @@ def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
     none = [x for x in lines if not x["truth"]["effects"]]
     known = [x for x in lines if x["truth"]["effects"] and all(e["in_catalogue"] for e in x["truth"]["effects"])]
     sets = sorted(set_size(x["diagnosis"]) for x in lines if x["score"]["answer"].startswith("ambiguous"))
+    played = [x for x in lines if "after_experiment" in x]
     matrix: dict[str, Counter[str]] = {}
     for line in lines:
         matrix.setdefault(_truth_class(line), Counter())[_answer_class(line)] += 1
@@ -141,6 +162,9 @@ def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
         "confidently_wrong": sum(x["score"]["confident"] for x in lines),
         "false_alarms": [sum(x["score"]["outcome"] == "wrong" for x in none), len(none)],
         "ambiguous_set_sizes": sets,
+        "after_experiment": dict(
+            Counter(f"{x['score']['outcome']}, then {x['after_experiment']['score']['outcome']}" for x in played)
+        ),
         "commits": sorted({x.get("commit", "not recorded") for x in lines}),
         "drawn_again": sum(x["truth"].get("drawn", 1) > 1 for x in lines),
         "below_visible": sum(not x["truth"].get("visible", True) for x in lines),
@@ -204,6 +228,12 @@ def main() -> None:
                 f"{line['seed']}  {found['truth']}  ->  {found['answer']}  {found['outcome']} ({found['why']})",
                 flush=True,
             )
+            if "after_experiment" in line:
+                again = judged(line)["after_experiment"]["score"]
+                print(
+                    f"        after the next experiment: {again['answer']}  {again['outcome']} ({again['why']})",
+                    flush=True,
+                )
             report(args.out, command)
     summary = report(args.out, command)
     print(json.dumps({k: v for k, v in summary.items() if k != "draws_judged"}, indent=1))

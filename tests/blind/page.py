@@ -85,6 +85,12 @@ def _left_open(summary: dict[str, Any]) -> str:
     return f"- ambiguous answers: {len(summary['ambiguous_set_sizes'])}; candidates that each leaves open: {sizes}"
 
 
+def _played(summary: dict[str, Any]) -> str:
+    """What the recommended experiments settled once they were played on the hidden rig."""
+    turns = "; ".join(f"{turn} {count}" for turn, count in sorted(summary["after_experiment"].items())) or "-"
+    return f"- answers after the recommended experiment was played on the hidden rig and its trial added: {turns}"
+
+
 def _worlds(command: str) -> str:
     """The worlds that a judge's command names."""
     words = command.split()
@@ -105,6 +111,7 @@ def markdown(lines: list[dict[str, Any]], s: dict[str, Any], command: str) -> st
         f"- false alarms where nothing is hidden: {s['false_alarms'][0]} of {s['false_alarms'][1]}",
         *(_sentence(s, key, words) for key, words in FLOORS.items()),
         _left_open(s),
+        _played(s),
         _drawn(s),
         f"- median time of a diagnosis: {s['median_seconds']} s",
         "",

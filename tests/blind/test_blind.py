@@ -53,6 +53,23 @@ def test_a_joint_sticks_without_creeping_and_slips_at_its_friction() -> None:
     assert moved[-1, 0] > 0.005
 
 
+def test_a_recommended_command_is_played_on_the_rig_that_was_measured(tmp_path: Path) -> None:
+    truth = generator.write(7, tmp_path, seconds=QUICK)
+    description = tmp_path / "recording" / "recording.yaml"
+    last = yaml.safe_load(description.read_text())["trials"][-1]
+    measured = pl.read_parquet(tmp_path / "recording" / last["file"])
+    measured.write_csv(tmp_path / "next_experiment.csv")
+    generator.play(tmp_path, tmp_path / "next_experiment.csv", seconds=QUICK)
+    added = yaml.safe_load(description.read_text())["trials"][-1]
+    assert added["initialisation"] == last["initialisation"]
+    again = pl.read_parquet(tmp_path / "recording" / added["file"])
+    joints = [name for name in measured.columns if name.endswith(".position")]
+    common = measured.select("time", *joints).join(again.select("time", *joints), on="time", suffix="_again")
+    different = np.stack([(common[name] - common[f"{name}_again"]).to_numpy() for name in joints])
+    assert len(common) > 0.8 * len(measured)
+    assert 0.0 < np.median(np.abs(different)) < 3.0 * truth["sensor_floor"], "a log of its own of the same machine"
+
+
 @pytest.mark.parametrize(("kind", "name"), [("finger", "torque_crosstalk"), ("pendulum", "stribeck_friction")])
 def test_both_engines_measure_the_same(kind: str, name: str) -> None:
     pytest.importorskip("mujoco")
