@@ -128,9 +128,12 @@ def elasticity(s: Scene, i: int) -> Truth:
 
 
 def stiffening_elasticity(s: Scene, i: int) -> Truth:
-    stretch = s.peak_torque[i] / s.stiffness(i)
+    deflection = s.peak_torque[i] / s.stiffness(i)
     soft = _put(s.plant.stiffness, i, 0.5 * s.stiffness(i))
-    return {"stiffness": soft, "cubic": _put(s.plant.cubic_stiffness, i, float(soft * s.size(1.0, 8.0) / stretch**2))}
+    return {
+        "stiffness": soft,
+        "cubic": _put(s.plant.cubic_stiffness, i, float(soft * s.size(1.0, 8.0) / deflection**2)),
+    }
 
 
 def transmission_error(s: Scene, i: int) -> Truth:

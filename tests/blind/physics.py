@@ -22,7 +22,7 @@ SLIP_AT, SLIP_SHARE = (0.3, 0.8, 1.6, 3.0), (0.4, 0.3, 0.2, 0.1)
 
 @njit(cache=True)
 def _deflection(p, i, torque):
-    """The stretch d of the drive: stiffness d + cubic d^3 = torque, or another stiffness from its knee on."""
+    """The deflection d of the drive: stiffness d + cubic d^3 = torque, or another stiffness from its knee on."""
     stiffness, cubic, knee = p[at.STIFFNESS, i], p[at.CUBIC_STIFFNESS, i], p[at.KNEE, i]
     d = torque / stiffness
     if abs(d) > knee:
@@ -40,11 +40,11 @@ def _dead_zone(x, width):
 
 @njit(cache=True)
 def _closed_loop(p, i, error, speed, gap):
-    """Controller torque, the drive's stretch in the loop; `error` is q_d minus the joint's reading, `gap` the play."""
+    """Controller torque, the drive's deflection in the loop; `error` is q_d minus the joint's reading, `gap` the play."""
     torque = 0.0
     for _ in range(40):
-        stretch = _deflection(p, i, torque)
-        wanted = p[at.KP, i] * _dead_zone(error - gap - stretch, p[at.ERROR_DEAD_ZONE, i]) - p[at.KD, i] * speed
+        deflection = _deflection(p, i, torque)
+        wanted = p[at.KP, i] * _dead_zone(error - gap - deflection, p[at.ERROR_DEAD_ZONE, i]) - p[at.KD, i] * speed
         wanted = _dead_zone(wanted, p[at.TORQUE_DEAD_ZONE, i])
         limit = min(p[at.TORQUE_LIMIT, i], p[at.SATURATION, i])
         wanted = min(max(wanted, -limit), limit)
@@ -171,8 +171,8 @@ def follow(p, i, q, v, target, step, held, filtered, state, relay, memory):
     error = held[i] - q - p[at.OFFSET, i]
     error -= p[at.TRANSMISSION, i] * np.sin(p[at.TRANSMISSION_ORDER, i] * q + p[at.TRANSMISSION_PHASE, i])
     if p[at.LAG, i] > 0.0:
-        stretch = _deflection(p, i, state[i])
-        wanted = p[at.KP, i] * (error - stretch) - p[at.KD, i] * filtered[i]
+        deflection = _deflection(p, i, state[i])
+        wanted = p[at.KP, i] * (error - deflection) - p[at.KD, i] * filtered[i]
         wanted = min(max(wanted, -p[at.TORQUE_LIMIT, i]), p[at.TORQUE_LIMIT, i])
         state[i] += (wanted - state[i]) * step / p[at.LAG, i]
     elif p[at.SMOOTH_BACKLASH, i] > 0.0:

@@ -68,6 +68,7 @@ def _from_file(path: Path) -> PolicySource:
     reading = 2 * joints  # q_m and e_q
     stack = max(1, info.observation_size // reading)
     require_sizes(path, info, stack * reading, joints)
-    file = path.name if path.parent == SHIPPED else str(path)
+    shipped = path.parent == SHIPPED
+    file, label = (path.name, path.stem) if shipped else (str(path), f"{path.resolve().parent.name}/{path.stem}")
     provenance = {"file": file, **info.model_dump(exclude={"config"})}
-    return PolicySource(ActorPolicy(actor), path.stem, provenance, info.config, stack, joints)
+    return PolicySource(ActorPolicy(actor), label, provenance, info.config, stack, joints)
