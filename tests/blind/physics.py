@@ -40,7 +40,7 @@ def _dead_zone(x, width):
 
 @njit(cache=True)
 def _closed_loop(p, i, error, speed, gap):
-    """Controller torque, the drive's deflection in the loop; `error` is q_d minus the joint's reading, `gap` the play."""
+    """Controller torque, the drive's deflection in the loop; `error` is q_d minus the reading, `gap` the play."""
     torque = 0.0
     for _ in range(40):
         deflection = _deflection(p, i, torque)

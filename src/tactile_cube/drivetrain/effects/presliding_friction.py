@@ -3,15 +3,16 @@
 from math import exp
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.signals import FRICTION, JOINT_TORQUE, VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, FRICTION, JOINT_TORQUE, VELOCITY
 
 
 class PreslidingFriction(Effect):
     """Dahl's friction: the bristle deflection z follows the motion and saturates at the friction limit.
 
-    z' = v / breakaway * (1 - z sgn v); torque -(limit + excess) * z. It takes the place of rigid Coulomb
-    friction, so the joint creeps elastically below break-away and shows hysteresis loops in (q, tau).
-    Source: Dahl, A solid friction model, 1968; Canudas de Wit et al., LuGre, 1995 (its quasi-static part).
+    z' = v / breakaway * (1 - z sgn v); torque -(limit + excess) * z - micro_damping * breakaway * z'. It takes the
+    place of rigid Coulomb friction, so the joint creeps elastically below break-away and shows hysteresis loops in
+    (q, tau); damped bristles (LuGre) add drag where the motion turns round, and none while it slides.
+    Source: Dahl, A solid friction model, 1968; Canudas de Wit et al., LuGre, 1995 (Stribeck's curve apart).
     """
 
     name = "presliding_friction"
@@ -28,11 +29,21 @@ class PreslidingFriction(Effect):
             typical=0.0,
             source="friction beyond the nominal static friction",
         ),
+        Parameter(
+            "micro_damping",
+            unit="N m s/rad",
+            neutral=0.0,
+            low=0.0,
+            high=2.0,
+            typical=0.0,
+            source="0.5 to 1 of what damps the link critically on its bristles, 2 sqrt(limit / breakaway * inertia)",
+        ),
     )
 
     forms = (
         {"breakaway": 0.003},
         {"breakaway": 0.003, "excess": 0.02},
+        {"breakaway": 0.003, "excess": 0.02, "micro_damping": 0.1},
     )
 
     @classmethod
@@ -48,5 +59,7 @@ class PreslidingFriction(Effect):
         limit = max(x[FRICTION, j] + p[1], 0.0)
         direction = 1.0 if x[VELOCITY, j] >= 0.0 else -1.0
         s[0] = direction + (s[0] - direction) * exp(-abs(x[VELOCITY, j]) * dt / p[0])
-        x[JOINT_TORQUE, j] -= limit * s[0]
+        drag = p[2] * (1.0 - direction * s[0])
+        x[DAMPING, j] += drag
+        x[JOINT_TORQUE, j] -= limit * s[0] + drag * x[VELOCITY, j]
         return 0.0
