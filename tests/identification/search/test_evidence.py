@@ -36,7 +36,7 @@ def test_the_same_difference_many_times_is_no_proof() -> None:
 
 def test_blocks_keep_the_sum_and_do_not_cross_trials() -> None:
     one = replace(judged(2.0), trial=np.arange(60) // 15)
-    difference = np.repeat([3.0, -1.0, 2.0, 0.5], 15) + np.random.default_rng(0).normal(size=60) * 0.01
+    difference = np.repeat([30.0, -10.0, 20.0, 5.0], 15) + np.random.default_rng(0).normal(size=60) * 0.01
     blocks = in_blocks(difference, one)
     assert blocks.sum() == pytest.approx(difference.sum())
     assert 4 <= len(blocks) < 20
@@ -55,3 +55,13 @@ def test_an_effect_that_shows_in_fast_motion_alone_is_proven_by_each_segment_of_
     motion = np.repeat([1.0, 12.0, 2.0, 9.0, 0.5, 4.0], 10) * np.random.default_rng(2).uniform(0.9, 1.1, 60)
     after = replace(before, costs=before.costs - motion, trial=np.zeros(60, dtype=np.int64))
     assert p_value(before, after) < 1e-9, "sizes that follow the motion are no dependence"
+
+
+def test_trials_in_which_nothing_moves_do_not_hide_what_the_others_show() -> None:
+    rng, before = np.random.default_rng(3), judged(2.0)
+    moving, still = rng.uniform(20.0, 400.0, 24), np.repeat([-0.3, 0.2, -0.4], 12) * rng.uniform(0.5, 1.5, 36)
+    difference, trial = np.concatenate([moving, still]), np.arange(60) // 12
+    assert correlation_length(difference, trial) > 5, "the still ones alone would make blocks of half a trial"
+    after = replace(before, costs=before.costs - difference, trial=trial)
+    assert p_value(before, after) < 1e-6
+    assert p_value(before, replace(after, costs=before.costs - 0.002 * difference)) > 1e-3, "slight everywhere"

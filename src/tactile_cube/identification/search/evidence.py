@@ -20,6 +20,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 Array = NDArray[np.float64]
 TRIALS = 1_000_000  # more than any part has: tells those of several parts apart
 FEWEST_BLOCKS = 5  # that a signed-rank test needs to come below 5 %
+SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
 FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
 NORMAL_95 = 1.96
 
@@ -121,8 +122,15 @@ def p_value(before: Judgement, after: Judgement) -> float:
 
 
 def in_blocks(difference: Array, judged: Judgement) -> Array:
-    """Sums (B,) of differences (G,) over neighbouring segments of a trial, as many as their correlation is long."""
+    """Sums (B,) of differences (G,) over neighbouring segments of a trial, as many as their correlation is long.
+
+    Where enough segments tell the two models apart the others are left out, as ties are: where nothing moves neither
+    is better, and next to trials in which one always is that would pass for a correlation as long as a trial.
+    """
     counted = judged.samples > 0
+    telling = counted & (np.abs(difference) >= SLIGHT)
+    if np.count_nonzero(telling) >= FEWEST_PAIRS:
+        counted = telling
     difference, trial = difference[counted], judged.trial[counted]
     length = correlation_length(difference, trial)
     if length == 1:
