@@ -2,7 +2,8 @@
 
 Each maker belongs to a family, the catalogue's names for what it is, which are right answers where it is hidden.
 `OUTSIDE` lists the forms that the catalogue's law misses in kind and not by degree: only there is `unknown_effect`
-acceptable. All of this was decided before any diagnosis of a form was run.
+acceptable. All of this was decided before any diagnosis of a form was run. The catalogue has
+had LuGre's form itself since.
 """
 
 import numpy as np

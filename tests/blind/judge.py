@@ -43,7 +43,10 @@ def run_command(name: str, out: Path, *words: str) -> dict[str, Any] | None:
     with (out / "words.txt").open("w") as words_of_verb:
         subprocess.run(command, stdout=words_of_verb, stderr=subprocess.STDOUT, check=False)
     path = out / answer
-    return json.loads(path.read_text()) if path.is_file() else None
+    if not path.is_file():
+        return None
+    text = path.read_text().replace(f"{out.resolve()}/", "")  # a result names no machine's folders
+    return dict(json.loads(text))
 
 
 def validation_error(recording: Path, model: Path, out: Path) -> float | None:

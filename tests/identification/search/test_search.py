@@ -3,13 +3,12 @@ from types import SimpleNamespace
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, forms
-from tactile_cube.identification.search.evidence import Judgement, gain, p_value
+from tactile_cube.identification.search.evidence import Judgement, p_value
 from tactile_cube.identification.search.screening import Score
-from tactile_cube.identification.search.search import Search, pursued, with_better_ones
+from tactile_cube.identification.search.search import Search, pursued
 from tactile_cube.identification.search.shortlist import of_each, with_groups
 from tests.identification.test_verdict import explanation, findings, judged
 
@@ -35,13 +34,6 @@ def test_the_simplest_of_equals_is_pursued_beside_the_best() -> None:
     order = [one.effects[0].effect.name for one in pursued([profile, curved, bias, poor])]
     assert order == ["position_torque", "torque_bias", "stribeck_friction", "payload"]
     assert [one.error for one in pursued([bias, profile])] == [bias.error, profile.error], "the best may be simplest"
-
-
-def test_what_takes_more_of_the_error_than_what_is_proven_stays_beside_it() -> None:
-    lag, delay = explanation("actuator_lag", 1.20), explanation("command_delay", 1.00)
-    alike, poor = explanation("elasticity", 1.18), explanation("payload", 2.0)
-    assert 0.0 < gain(lag.judgement, alike.judgement) < STANDARD.least_gain, "alike by chance"
-    assert with_better_ones([lag], [poor, alike, lag, delay]) == [delay, lag]
 
 
 def score(name: str, joint: str, gain: float) -> Score:

@@ -21,7 +21,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 FINEST = 8  # times as short steps at most where no rate is stated: so much longer does a diagnosis take
-HIDDEN = 0.2  # of the sensor noise: its square is `criteria.least_gain`, so that no effect can gain by it
+HIDDEN = 0.2  # of the sensor noise: its square is `criteria.least_gain`, so that mending it is no reason for an effect
 StepError = Callable[[Recording, int], float]
 """What steps so many times as short change in a recording's prediction [sensor noise]."""
 

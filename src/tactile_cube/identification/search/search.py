@@ -133,7 +133,7 @@ class Search(Division):
             better = [e for parent, e in found if self.worthwhile(e, parent, base)]
             if not better:
                 return levels, scores, [e for parent, e in found if unproven(e, parent, self.criteria)]
-            better = with_better_ones(better, [e for _, e in found], self.criteria)
+            better.sort(key=lambda e: e.judgement.costs.sum())
             better[0] = self.pruned(better[0])
             levels.append(tuple(better))
             least = better[0].judgement.costs.sum()
@@ -230,23 +230,6 @@ class Search(Division):
                 self.say(f"  {explanation.effects[place].label} is not needed")
                 return self.pruned(replace(explanation, effects=left, fit=fitted, judgement=judgement))
         return explanation
-
-
-def with_better_ones(
-    proven: Sequence[Explanation], found: Sequence[Explanation], criteria: Criteria = STANDARD
-) -> list[Explanation]:
-    """What was proven, and what takes clearly more of the error than all of that: best first.
-
-    That something is missing at all the former have proven. Which of them it is, the error tells: a second effect that
-    sits in few segments explains nearly all there, and hardly shows by rank.
-    """
-    best, kept = min(proven, key=_cost), {id(e) for e in proven}
-    clearer = [e for e in found if gain(best.judgement, e.judgement) > criteria.least_gain and id(e) not in kept]
-    return sorted([*proven, *clearer], key=_cost)
-
-
-def _cost(one: Explanation) -> float:
-    return float(one.judgement.costs.sum())
 
 
 def pursued(better: Sequence[Explanation], criteria: Criteria = STANDARD) -> list[Explanation]:
