@@ -7,12 +7,14 @@ from tactile_cube.drivetrain.effects.harmonic import harmonic
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, TORQUE
 
 RIPPLE = "1-5 % of the rating"
+OVERTONES = ("sine_2", "cosine_2", "sine_3", "cosine_3")
 
 
 class Cogging(Effect):
     """tau += sine * sin(harmonic q) + cosine * cos(harmonic q) in the motor, or the same at the joint.
 
-    A ripple of the motor also bends the drive's elasticity; one of a gear's last stage or a bearing does not.
+    A ripple of the motor also bends the drive's elasticity; one of a gear's last stage or a bearing does not. Waves of
+    twice and three times the harmonic act where the first one does.
     Source: Holtz and Springob, Identification and compensation of torque ripple, 1996.
     """
 
@@ -24,21 +26,33 @@ class Cogging(Effect):
         harmonic(source="poles times gear ratio"),
         Parameter("joint_sine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
         Parameter("joint_cosine", unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source=RIPPLE),
+        *(
+            Parameter(name, unit="N m", neutral=0.0, low=-0.3, high=0.3, typical=0.0, source="slots, saturation")
+            for name in OVERTONES
+        ),
     )
 
     forms = (
         {"sine": 0.01, "cosine": 0.0, "harmonic": 10.0},
         {"joint_sine": 0.01, "joint_cosine": 0.0, "harmonic": 10.0},
     )
+    details = OVERTONES
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
         angle = p[2] * x[ANGLE, j]
-        return x[JOINT_TORQUE, j] + p[3] * sin(angle) + p[4] * cos(angle)
+        if p[3] == 0.0 and p[4] == 0.0:
+            return x[JOINT_TORQUE, j]
+        ripple = p[3] * sin(angle) + p[4] * cos(angle)
+        ripple += p[5] * sin(2 * angle) + p[6] * cos(2 * angle) + p[7] * sin(3 * angle) + p[8] * cos(3 * angle)
+        return x[JOINT_TORQUE, j] + ripple
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Motor torque [N m]."""
         angle = p[2] * x[ANGLE, j]
-        return x[TORQUE, j] + p[0] * sin(angle) + p[1] * cos(angle)
+        ripple = p[0] * sin(angle) + p[1] * cos(angle)
+        if p[3] == 0.0 and p[4] == 0.0:
+            ripple += p[5] * sin(2 * angle) + p[6] * cos(2 * angle) + p[7] * sin(3 * angle) + p[8] * cos(3 * angle)
+        return x[TORQUE, j] + ripple

@@ -110,6 +110,8 @@ class Effect:
 
     Empty: one form, all parameters at their typical values.
     """
+    details: ClassVar[tuple[str, ...]] = ()
+    """Parameters that make a form richer: a search frees them where the form follows the data already, never before."""
     contains: ClassVar[tuple[str, ...]] = ()
     """Names of simpler effects that this one becomes at some of its values, so that it always follows data as well."""
     constant_reading: ClassVar[str] = ""

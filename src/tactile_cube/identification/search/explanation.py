@@ -56,9 +56,13 @@ class Explanation:
         return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
 
 
+def first_term(model: Model, effects: Sequence[Candidate], place: int) -> int:
+    """Which of a model's terms, the last of which are those of `effects`, is the first one of an effect."""
+    known = len(model.terms) - sum(len(candidate.joints) for candidate in effects)
+    return known + sum(len(candidate.joints) for candidate in effects[:place])
+
+
 def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Model:
     """A fitted model, whose last terms are those of `effects`, without one of them."""
-    known = len(model.terms) - sum(len(candidate.joints) for candidate in effects)
-    first = known + sum(len(candidate.joints) for candidate in effects[:place])
-    last = first + len(effects[place].joints)
-    return replace(model, terms=(*model.terms[:first], *model.terms[last:]))
+    first = first_term(model, effects, place)
+    return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))

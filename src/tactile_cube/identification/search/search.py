@@ -21,6 +21,7 @@ from tactile_cube.identification.search.division import BRIEF, LONG, SEGMENTS, D
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
 from tactile_cube.identification.search.explanation import NEARLY, Explanation, without_effect
 from tactile_cube.identification.search.other_starts import other_starts
+from tactile_cube.identification.search.relatives import special_cases, with_details
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.screening import Score, screen
 from tactile_cube.identification.search.shared_offset import shared_offset
@@ -162,19 +163,29 @@ class Search(Division):
         known = {(term.effect, term.joint) for term in self.start.terms}
         return [one for one in wanted if not any((one.effect, joint) in known for joint in one.joints)]
 
+    def and_richer(self, frozen: Fit, fitted: Sequence[tuple[Candidate, Fit]]) -> list[tuple[Candidate, Fit]]:
+        """Laws, and those with the details of their law, fitted from there, that follow the data clearly better."""
+        found = list(fitted)
+        for candidate, plain in fitted:
+            if richer := with_details(candidate, plain.model):
+                detailed, model, unknowns = richer
+                tried = fit(self.problem, model, unknowns, LONG, frozen)
+                found += [(detailed, tried)] if tried.cost < (1.0 - self.criteria.least_gain) * plain.cost else []
+        return found
+
     def special(self, frozen: Fit, candidate: Candidate, fitted: Fit) -> list[tuple[Candidate, Fit]]:
         """Simpler laws that a fitted profile looks like, fitted, but for those that stay far behind it."""
         wanted = self.new(special_candidates(candidate, fitted.model.terms[-1], self.effects))
         # beside the joint offsets and constants that were fitted together with the profile
         before = replace(fitted.model, terms=fitted.model.terms[:-1])
-        tried = [self.refit(frozen, one, LONG, before) for one in wanted]
+        tried = self.and_richer(frozen, [self.refit(frozen, one, LONG, before) for one in wanted])
         self.tell(tried)
         return [pair for pair in tried if pair[1].cost <= FAR_BEHIND * fitted.cost]
 
     def race(self, frozen: Fit, chosen: Sequence[Candidate]) -> list[tuple[Candidate, Fit]]:
         """Refit briefly, then the leaders at length; those that stay far behind drop out. Best first."""
         brief = sorted((self.refit(frozen, candidate, BRIEF) for candidate in chosen), key=lambda pair: pair[1].cost)
-        leaders = [(c, self.continued(frozen, f)) for c, f in of_each(brief, RACED)]
+        leaders = self.and_richer(frozen, [(c, self.continued(frozen, f)) for c, f in of_each(brief, RACED)])
         leaders.sort(key=lambda pair: pair[1].cost)
         self.tell(leaders)
         if not leaders:
@@ -221,7 +232,10 @@ class Search(Division):
         return explanation
 
     def pruned(self, explanation: Explanation) -> Explanation:
-        """Without the effects that it does not need: a later one may have done an earlier one's work."""
+        """Without the effects that it does not need, and none richer than it has to be.
+
+        A later one may have done an earlier one's work, or what an earlier one's law was bent to.
+        """
         for place in range(len(explanation.effects) if len(explanation.effects) > 1 else 0):
             model = without_effect(explanation.fit.model, explanation.effects, place)
             fitted, judgement = self.settled(model)
@@ -229,6 +243,12 @@ class Search(Division):
                 left = explanation.effects[:place] + explanation.effects[place + 1 :]
                 self.say(f"  {explanation.effects[place].label} is not needed")
                 return self.pruned(replace(explanation, effects=left, fit=fitted, judgement=judgement))
+            for simple, model in special_cases(explanation.fit.model, explanation.effects, place, self.effects):
+                fitted, judgement = self.settled(model)
+                if not worse(judgement, explanation.judgement, self.criteria):
+                    effects = (*explanation.effects[:place], simple, *explanation.effects[place + 1 :])
+                    self.say(f"  {simple.label} does for {explanation.effects[place].label}")
+                    return self.pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement))
         return explanation
 
 

@@ -1,0 +1,96 @@
+"""Simpler and richer laws of the same kind as one that is fitted."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from tactile_cube.drivetrain.effects import catalogue, find_effect
+from tactile_cube.identification.fitting.model import Model
+from tactile_cube.identification.search import search as module
+from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.relatives import special_cases, with_details
+from tactile_cube.identification.search.search import Search
+from tests.identification.test_verdict import FIT, judged
+
+KNOWN = list(catalogue().values())
+
+
+def fitted(*names: str, joints: tuple[str, ...] = ("q2",)) -> tuple[list[Candidate], Model]:
+    """Effects in their first forms, and a model that has them."""
+    effects, model = [], Model({}, (), {})
+    for name in names:
+        effects.append(Candidate(find_effect(name), joints, forms(find_effect(name))[0]))
+        model = effects[-1].added_to(model)[0]
+    return effects, model
+
+
+def test_the_details_of_a_law_are_freed_from_where_its_plain_form_is() -> None:
+    (drift,), model = fitted("friction_drift", joints=("q1", "q2"))
+    warm = replace(model.terms[1], values={**model.terms[1].values, "change": -0.013})
+    found = with_details(drift, replace(model, terms=(model.terms[0], warm)))
+    assert found is not None
+    candidate, detailed, unknowns = found
+    assert tuple(candidate.form) == ("change", "time_constant", "friction")
+    assert [(u.place, u.key) for u in unknowns] == [(k, name) for k in (0, 1) for name in candidate.form]
+    assert detailed.terms[1].values == warm.values, "where the plain form is, with the details at no effect"
+    assert detailed.terms[1].values["friction"] == 0.0
+    assert with_details(candidate, detailed) is None, "all are free already"
+
+
+def test_only_the_last_effect_gets_details_and_a_law_without_any_gets_none() -> None:
+    (_, ripple), model = fitted("torque_gain", "cogging")
+    found = with_details(ripple, model)
+    assert found is not None
+    assert found[1].terms[0] == model.terms[0]
+    assert found[0].size == 7
+    assert {u.place for u in found[2]} == {1}
+    (gain,), model = fitted("torque_gain")
+    assert with_details(gain, model) is None
+
+
+def test_a_special_case_takes_the_place_of_the_richer_law() -> None:
+    effects, model = fitted("torque_curve", "command_dead_zone")
+    ((simple, changed),) = special_cases(model, effects, 0, KNOWN)
+    assert simple.effect.name == "torque_gain"
+    assert [term.effect.name for term in changed.terms] == ["torque_gain", "command_dead_zone"]
+    assert changed.terms[1] == model.terms[1]
+    assert list(special_cases(model, effects, 1, KNOWN)) == [], "a dead zone contains nothing simpler"
+
+
+def test_a_special_case_has_fewer_numbers() -> None:
+    effects, model = fitted("stiffening_elasticity", "coulomb_friction")
+    assert [one.effect.name for one, _ in special_cases(model, effects, 0, KNOWN)] == ["elasticity"]
+    effects, model = fitted("backlash", "coulomb_friction")
+    assert list(special_cases(model, effects, 0, KNOWN)) == [], "elasticity has as many as a play"
+
+
+class Stubbed(Search):
+    """A search whose fits end at given costs and whose models do as well on the held-out trials as is said."""
+
+    def __init__(self, errors: dict[str, float]) -> None:
+        self.errors, self.effects, self.problem = errors, KNOWN, None  # type: ignore[assignment]
+        self.said: list[str] = []
+        self.say = self.said.append
+
+    def settled(self, model: Model) -> tuple[object, object]:  # type: ignore[override]
+        names = "+".join(term.effect.name for term in model.terms)
+        return replace(FIT, model=model), judged(self.errors.get(names, 9.0))
+
+
+@pytest.mark.parametrize(("error", "kept"), [(1.0, "torque_gain"), (1.6, "torque_curve")])
+def test_of_two_laws_in_a_set_the_simpler_is_kept_if_it_does(error: float, kept: str) -> None:
+    effects, model = fitted("torque_curve", "command_dead_zone")
+    found = Explanation(tuple(effects), replace(FIT, model=model), judged(1.0), 1e-9, 0.5)
+    pruned = Stubbed({"torque_gain+command_dead_zone": error}).pruned(found)
+    assert [one.effect.name for one in pruned.effects] == [kept, "command_dead_zone"]
+    assert [term.effect.name for term in pruned.fit.model.terms] == [kept, "command_dead_zone"]
+
+
+@pytest.mark.parametrize(("cost", "tried"), [(50.0, 2), (99.0, 1)])
+def test_details_come_along_where_they_help_clearly(cost: float, tried: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    (drift,), model = fitted("friction_drift")
+    monkeypatch.setattr(module, "fit", lambda problem, model, *_: SimpleNamespace(cost=cost, model=model))
+    found = Stubbed({}).and_richer(FIT, [(drift, SimpleNamespace(cost=100.0, model=model))])  # type: ignore[list-item]
+    assert [len(one.form) for one, _ in found] == [2, 3][:tried]
