@@ -106,7 +106,7 @@ def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say:
     config = job.config
     held = len(with_object(recording).trials)
     if held and not has_free_motion(recording):
-        compared = compare_contact(recording, model, config.step, say)
+        compared = compare_contact(recording, model, config.step or comparison.USUAL_STEP, say)
         return ComparisonResult(compared, job, job.seconds)
     if held:
         say(f"{held} trials with an object are left out here; diagnose and identify use them")

@@ -204,10 +204,13 @@ def floor_source(floor: NoiseFloor) -> str:
     return f"scatter of {floor.repeats} repeats" if floor.source == "repeats" else "sensor noise, a guess: no repeats"
 
 
-def floor_in_words(floor: NoiseFloor, unit: str) -> list[str]:
-    """The noise floor and what stands beside it, each by its name."""
+def floor_in_words(floor: NoiseFloor, unit: str, step: float) -> list[str]:
+    """The noise floor and what stands beside it, each by its name; `step` is the simulator's [s]."""
     lines = [f"noise floor: {floor_source(floor)}"]
-    for name, by_joint in (("sensor noise", floor.sensor), ("the simulator's own time step", floor.step_size)):
+    for name, by_joint in (
+        ("sensor noise", floor.sensor),
+        (f"the simulator's own time step, {1e3 * step:g} ms,", floor.step_size),
+    ):
         if by_joint:
             size = (sum(value**2 for value in by_joint.values()) / len(by_joint)) ** 0.5
             lines.append(f"beside it: {name} {milli(size, unit)}")

@@ -16,7 +16,7 @@ def summary(comparison: Comparison) -> str:
         lines.append(f"{joint:<16}{1e3 * error:>9.3f}{1e3 * floor:>9.3f}{error / floor:>11.2f}")
     overall, floor = comparison.errors.overall, comparison.floor.overall
     lines.append(f"{'all':<16}{1e3 * overall:>9.3f}{1e3 * floor:>9.3f}{comparison.ratio:>11.2f}")
-    lines += ["", *floor_in_words(comparison.floor, common_unit(units.values()))]
+    lines += ["", *floor_in_words(comparison.floor, common_unit(units.values()), comparison.step)]
     if comparison.band is not None:
         inside = 100 * comparison.band.inside
         lines.append(

@@ -1,10 +1,13 @@
 import json
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tactile_cube.measurement.comparing.comparison import Comparison, as_json, compare
+from tactile_cube.measurement.comparing import comparison as module
+from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, as_json, compare
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.measurement.small_rig import write
+from tests.measurement.small_rig import Table, table, write
 
 
 @pytest.fixture(scope="module")
@@ -36,3 +39,21 @@ def test_the_band_holds_a_share_of_the_samples(comparison: Comparison) -> None:
 
 def test_there_is_a_sentence_for_each_joint(comparison: Comparison) -> None:
     assert sorted(line[0] for line in comparison.sentences) == ["a", "b"]
+
+
+@pytest.mark.parametrize(("noise", "step", "used"), [(2e-4, None, 0.002), (1e-6, None, 0.00025), (1e-6, 0.002, 0.002)])
+def test_steps_are_shorter_where_the_sensors_would_show_their_error(
+    noise: float, step: float | None, used: float, tmp_path: Path
+) -> None:
+    def fine_encoder(data: dict[str, Any]) -> None:
+        data["sensors"]["position_resolution"] = noise
+
+    def quiet(columns: Table) -> None:
+        columns.update(table(noise=noise))
+
+    recording = read_recording(write(tmp_path, fine_encoder, quiet))
+    comparison, usual = compare(recording, step=step), compare(recording, step=USUAL_STEP)
+    assert comparison.step == pytest.approx(used)
+    smaller = comparison.floor.step_size["a"] / usual.floor.step_size["a"]
+    assert smaller == pytest.approx(1.0 if used == USUAL_STEP else 1.0 / (module.FINER - 1))
+    assert (comparison.errors == usual.errors) == (used == USUAL_STEP)

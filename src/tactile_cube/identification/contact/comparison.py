@@ -43,4 +43,4 @@ def compare_contact(
     finally:
         replay.close()
     floor = NoiseFloor(SIGMA, dict.fromkeys(held.joints, SIGMA), "contact", 0, {})
-    return describe(held, model, simulated, floor, None)
+    return describe(held, model, simulated, floor, None, step)

@@ -13,16 +13,18 @@ from tactile_cube.measurement.comparing.error import ErrorSummary, residuals, su
 from tactile_cube.measurement.comparing.failing_intervals import FailingInterval, failing_intervals
 from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.joint_offsets import fitted_offsets, no_offsets, replay_each
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
 from tactile_cube.measurement.comparing.regimes import Regime, regimes
 from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import Parameters, nominal_parameters, require_same_joints
+from tactile_cube.measurement.replay.parameters import nominal_parameters, require_same_joints
 from tactile_cube.measurement.replay.rig_replay import Engine, Simulated
 
 Array = NDArray[np.float64]
 AT_THE_FLOOR = 1.3  # error over floor and time step up to which a model is as good as they can tell
+USUAL_STEP = 0.002  # [s] that of the world that training uses
 FINER = 8  # times smaller than the simulation's step, to see the error of the step itself
+HIDDEN = 0.5  # of the sensor noise: an error of the step that adds an eighth to what a perfect model leaves
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Comparison:
         cross_correlations: what it goes with, strongest first.
         failing_intervals: where it is far above the floor.
         band: randomised simulations, or None.
+        step: of the simulation, at most [s].
     """
 
     recording: Recording
@@ -58,6 +61,7 @@ class Comparison:
     cross_correlations: list[CrossCorrelation]
     failing_intervals: list[FailingInterval]
     band: Band | None
+    step: float
 
     @property
     def ratio(self) -> float:
@@ -74,7 +78,7 @@ def compare(
     recording: Recording,
     model: ModelFile | None = None,
     engine: Engine = "fast",
-    step: float = 0.002,
+    step: float | None = None,
     simulations: int = 0,
     spread: Mapping[str, float] | None = None,
     seed: int = 0,
@@ -87,7 +91,8 @@ def compare(
         model: the model file, simulated with the joint offsets of each initialisation that suit it best; None for the
             values in recording.yaml and no offsets.
         engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
-        step: simulation step [s].
+        step: longest simulation step [s]; None: the usual one, or an eighth of it where the sensors would show its
+            error and the engine is `fast`.
         simulations: how many randomised simulations make the band; 0 for none.
         spread: relative half widths of constants without an interval, `offset` in rad.
         seed: of the randomised simulations.
@@ -95,17 +100,36 @@ def compare(
     """
     if model is not None:
         require_same_joints(recording, model)
+    used = USUAL_STEP if step is None else step
     parameters = nominal_parameters(recording, model)
-    offsets = fitted_offsets(recording, parameters, step) if model is not None else no_offsets(recording)
-    simulated = replay_each(recording, parameters, offsets, engine, step)
-    if floor is None:
-        floor = noise_floor(recording, step_size_error(recording, parameters, offsets, simulated, step))
-    band = simulate_band(recording, model, simulations, spread or {}, step, seed) if simulations else None
-    return describe(recording, model, simulated, floor, band)
+
+    def simulated_at(step: float) -> tuple[list[Simulated], dict[int, Array]]:
+        offsets = fitted_offsets(recording, parameters, step) if model is not None else no_offsets(recording)
+        return replay_each(recording, parameters, offsets, engine, step), offsets
+
+    simulated, offsets = simulated_at(used)
+    fine = replay_each(recording, parameters, offsets, "fast", used / FINER)
+    left = summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
+    band = simulate_band(recording, model, simulations, spread or {}, used, seed) if simulations else None
+    if step is None and engine == "fast" and _shown(recording, left):
+        used, left = used / FINER, left.times(1.0 / (FINER - 1))  # errors of the step are of first order
+        simulated, _ = simulated_at(used)
+    return describe(recording, model, simulated, floor or noise_floor(recording, left), band, used)
+
+
+def _shown(recording: Recording, left: ErrorSummary) -> bool:
+    """Whether the position sensors would show an error of the simulation's step."""
+    noise = dict(zip(recording.joints, sensor_noise(recording), strict=True))
+    return any(error > HIDDEN * noise[joint] for joint, error in left.joints.items())
 
 
 def describe(
-    recording: Recording, model: ModelFile | None, simulated: list[Simulated], floor: NoiseFloor, band: Band | None
+    recording: Recording,
+    model: ModelFile | None,
+    simulated: list[Simulated],
+    floor: NoiseFloor,
+    band: Band | None,
+    step: float,
 ) -> Comparison:
     """What simulations of the trials, one each, leave of the measurement, and where."""
     trials, joints = recording.trials, recording.joints
@@ -126,19 +150,8 @@ def describe(
         cross_correlations=cross_correlations(trials, errors, joints),
         failing_intervals=_failing_intervals(recording, errors, floor),
         band=band,
+        step=step,
     )
-
-
-def step_size_error(
-    recording: Recording,
-    parameters: Parameters,
-    offsets: Mapping[int, Array],
-    simulated: list[Simulated],
-    step: float,
-) -> ErrorSummary:
-    """Difference between a simulation and the same one in much smaller steps."""
-    fine = replay_each(recording, parameters, offsets, "fast", step / FINER)
-    return summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
 
 
 def _failing_intervals(recording: Recording, errors: list[Array], floor: NoiseFloor) -> list[FailingInterval]:
@@ -165,6 +178,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
             "sensor": floor.sensor,
             "step_size": floor.step_size,
         },
+        "step": comparison.step,
         "regimes": [asdict(one) for one in comparison.regimes],
         "trials": [
             {"name": trial.name, "file": trial.file, "kind": trial.kind, "initialisation": trial.initialisation}

@@ -1,5 +1,7 @@
 """How far a simulation is from a measurement: RMS position error, the constant joint offsets removed."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +19,10 @@ class ErrorSummary:
 
     overall: float
     joints: dict[str, float]
+
+    def times(self, factor: float) -> ErrorSummary:
+        """So many times as large."""
+        return ErrorSummary(factor * self.overall, {joint: factor * error for joint, error in self.joints.items()})
 
 
 def joint_offsets(trials: Sequence[Trial], simulated: Sequence[Array]) -> dict[int, Array]:
