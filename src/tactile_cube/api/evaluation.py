@@ -38,10 +38,17 @@ class EvaluationResult:
 
     @property
     def text(self) -> str:
-        """A sentence for each condition."""
+        """A sentence for each condition, and in which of its worlds the object is lost most."""
+        from tactile_cube.evaluation.lost_worlds import lost_where
         from tactile_cube.evaluation.summary import sentence
 
-        return "\n".join(sentence(one.variant.name, one.summary) for one in self.variants)
+        lines = []
+        for one in self.variants:
+            lines += [
+                sentence(one.variant.name, one.summary),
+                *(f"  {where.text}" for where in lost_where(one.results)),
+            ]
+        return "\n".join(lines)
 
     def episode(self, number: int, variant: int = 0) -> EpisodeRecord:
         """Every signal of an episode; it runs once more, equal to the bit."""

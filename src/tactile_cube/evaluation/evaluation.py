@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from torchrl.envs import TransformedEnv
 
 from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.lost_worlds import drawn, lost_where
 from tactile_cube.evaluation.policies import Policy, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.replay import NearlyEqualStart
@@ -35,12 +36,14 @@ class VariantResult:
 
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
-        flags = succeeded(self.results, self.success_share)
-        episodes = [{**result.as_dict(), "success": flag} for result, flag in zip(self.results, flags, strict=True)]
+        flags, varied = succeeded(self.results, self.success_share), drawn(self.results)
+        rows = [result.as_dict() for result in self.results]
+        worlds = [{name: result.world[name] for name in varied} for result in self.results]
         return {
             "variant": dataclasses.asdict(self.variant),
             "summary": self.summary.as_dict(),
-            "episodes": episodes,
+            "episodes": [{**row, "world": w, "success": f} for row, w, f in zip(rows, worlds, flags, strict=True)],
+            "lost_where": [dataclasses.asdict(one) for one in lost_where(self.results)],
         }
 
 

@@ -64,6 +64,7 @@ class EpisodeResult:
         max_tilt: largest tilt of the cube [rad].
         reward_terms: sum of each weighed term of the reward.
         exploits: names of physical exploits found; empty when the turning is honest.
+        world: constants of its world, SI units, as `EpisodeRecord.constants` has them.
     """
 
     episode: int
@@ -79,6 +80,7 @@ class EpisodeResult:
     max_tilt: float
     reward_terms: dict[str, float]
     exploits: tuple[str, ...]
+    world: dict[str, float | str]
 
     @property
     def kept(self) -> bool:
@@ -110,6 +112,7 @@ def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResu
         max_tilt=float(np.max(tilt(record))),
         reward_terms={name: float(np.sum(term)) for name, term in record.reward_terms.items()},
         exploits=tuple(exploits(record)),
+        world=dict(record.constants),
     )
 
 
