@@ -6,15 +6,16 @@ from types import SimpleNamespace
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
+from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search import search as module
-from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.candidates import Candidate, candidates, forms
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.relatives import special_cases, with_details
 from tactile_cube.identification.search.search import Search
 from tests.identification.test_verdict import FIT, judged
 
-KNOWN = list(catalogue().values())
+KNOWN = candidates({"q2": FINGER}, list(catalogue().values()))
 
 
 def fitted(*names: str, joints: tuple[str, ...] = ("q2",)) -> tuple[list[Candidate], Model]:
@@ -53,7 +54,7 @@ def test_only_the_last_effect_gets_details_and_a_law_without_any_gets_none() -> 
 def test_a_special_case_takes_the_place_of_the_richer_law() -> None:
     effects, model = fitted("torque_curve", "command_dead_zone")
     ((simple, changed),) = special_cases(model, effects, 0, KNOWN)
-    assert simple.effect.name == "torque_gain"
+    assert [one.effect.name for one in simple] == ["torque_gain", "command_dead_zone"]
     assert [term.effect.name for term in changed.terms] == ["torque_gain", "command_dead_zone"]
     assert changed.terms[1] == model.terms[1]
     assert list(special_cases(model, effects, 1, KNOWN)) == [], "a dead zone contains nothing simpler"
@@ -61,7 +62,7 @@ def test_a_special_case_takes_the_place_of_the_richer_law() -> None:
 
 def test_a_special_case_has_fewer_numbers() -> None:
     effects, model = fitted("stiffening_elasticity", "coulomb_friction")
-    assert [one.effect.name for one, _ in special_cases(model, effects, 0, KNOWN)] == ["elasticity"]
+    assert [sets[0].effect.name for sets, _ in special_cases(model, effects, 0, KNOWN)] == ["elasticity"]
     effects, model = fitted("backlash", "coulomb_friction")
     assert list(special_cases(model, effects, 0, KNOWN)) == [], "elasticity has as many as a play"
 
@@ -70,7 +71,8 @@ class Stubbed(Search):
     """A search whose fits end at given costs and whose models do as well on the held-out trials as is said."""
 
     def __init__(self, errors: dict[str, float]) -> None:
-        self.errors, self.effects, self.problem = errors, KNOWN, None  # type: ignore[assignment]
+        self.errors, self.candidates, self.problem = errors, KNOWN, None  # type: ignore[assignment]
+        self.start = Model({}, (), {})
         self.said: list[str] = []
         self.say = self.said.append
 

@@ -29,7 +29,10 @@ class FrictionDrift(Effect):
         Parameter("friction", unit="N m", neutral=0.0, low=-0.1, high=0.5, typical=0.0, source="cold, beyond nominal"),
     )
 
-    forms = ({"change": 0.02, "time_constant": 5.0},)
+    forms = (
+        {"change": 0.02, "time_constant": 5.0},
+        {"change": -0.02, "time_constant": 5.0, "friction": 0.04},
+    )
     details = ("friction",)
 
     @staticmethod

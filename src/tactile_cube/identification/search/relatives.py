@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.search.candidates import Candidate, term_unknowns
 from tactile_cube.identification.search.explanation import first_term
@@ -33,21 +31,20 @@ def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, 
 
 
 def special_cases(
-    model: Model, effects: Sequence[Candidate], place: int, known: Sequence[type[Effect]]
-) -> Iterator[tuple[Candidate, Model]]:
-    """Models with an effect's special cases in its place, at their starts, fewest numbers first.
+    model: Model, effects: Sequence[Candidate], place: int, known: Sequence[Candidate]
+) -> Iterator[tuple[tuple[Candidate, ...], Model]]:
+    """Sets, and their models, with a special case of an effect's law in its place, at its start.
 
     Args:
         model: fitted; its last terms are those of `effects`.
         effects: in the order in which they were added.
         place: of the effect.
-        known: classes to try.
+        known: candidates to try.
     """
     one, first = effects[place], first_term(model, effects, place)
-    simpler = [effect for effect in known if effect.name in one.effect.contains]
-    starts = [(effect, start) for effect in simpler for start in effect.forms_at(one.sizes.get(one.joints[0], FINGER))]
-    for effect, start in sorted(starts, key=lambda pair: len(pair[1])):
-        special = Candidate(effect, one.joints, start, one.sizes)
-        if special.size < one.size and not set(effect.from_residual) & set(start):
+    for special in known:
+        contained = special.effect.name in one.effect.contains and special.joints == one.joints
+        if contained and special.size < one.size:
             added, _ = special.added_to(replace(model, terms=model.terms[:first]))
-            yield special, replace(model, terms=(*added.terms, *model.terms[first + len(one.joints) :]))
+            rest = model.terms[first + len(one.joints) :]
+            yield (*effects[:place], special, *effects[place + 1 :]), replace(model, terms=(*added.terms, *rest))

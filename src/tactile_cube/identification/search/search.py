@@ -243,11 +243,12 @@ class Search(Division):
                 left = explanation.effects[:place] + explanation.effects[place + 1 :]
                 self.say(f"  {explanation.effects[place].label} is not needed")
                 return self.pruned(replace(explanation, effects=left, fit=fitted, judgement=judgement))
-            for simple, model in special_cases(explanation.fit.model, explanation.effects, place, self.effects):
+            for effects, model in special_cases(
+                explanation.fit.model, explanation.effects, place, self.new(self.candidates)
+            ):
                 fitted, judgement = self.settled(model)
                 if not worse(judgement, explanation.judgement, self.criteria):
-                    effects = (*explanation.effects[:place], simple, *explanation.effects[place + 1 :])
-                    self.say(f"  {simple.label} does for {explanation.effects[place].label}")
+                    self.say(f"  {effects[place].label} does for {explanation.effects[place].label}")
                     return self.pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement))
         return explanation
 

@@ -13,6 +13,7 @@ from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.division import BRIEF, Division
 from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation, without_effect
+from tactile_cube.identification.search.relatives import special_cases
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.simplicity import named_by
 from tactile_cube.identification.search.subsets import best_subsets, candidate_columns
@@ -151,20 +152,12 @@ class Together:
 
     def special(self, proposal: Proposal) -> list[Proposal]:
         """The set with one of its effects exchanged for one that its law contains, refitted."""
-        found = []
-        for place, effect in enumerate(proposal.effects):
-            simpler = [
-                one
-                for one in self.search.new(self.search.candidates)
-                if one.effect.name in effect.effect.contains and one.joints == effect.joints and one.size < effect.size
-            ]
-            if not simpler:
-                continue
-            frozen = self.without(proposal, place)
-            for one in simpler:
-                model, _ = one.added_to(frozen.fit.model)
-                found.append(Proposal((*frozen.effects, one), self.search.refitted(model)))
-        return found
+        known = self.search.new(self.search.candidates)
+        return [
+            Proposal(effects, self.search.refitted(model))
+            for place in range(len(proposal.effects))
+            for effects, model in special_cases(proposal.fit.model, proposal.effects, place, known)
+        ]
 
     def explanation(self, one: Proposal, evidence: Judgement, judged: int) -> Explanation:
         """A set with its evidence, of which so many sets are judged."""
