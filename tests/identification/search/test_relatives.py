@@ -27,6 +27,12 @@ def fitted(*names: str, joints: tuple[str, ...] = ("q2",)) -> tuple[list[Candida
     return effects, model
 
 
+def waving(model: Model, harmonic: float) -> Model:
+    """The model with its last effect, a ripple, at a harmonic."""
+    *others, ripple = model.terms
+    return replace(model, terms=(*others, replace(ripple, values={**ripple.values, "harmonic": harmonic})))
+
+
 def test_the_details_of_a_law_are_freed_from_where_its_plain_form_is() -> None:
     (drift,), model = fitted("friction_drift", joints=("q1", "q2"))
     warm = replace(model.terms[1], values={**model.terms[1].values, "change": -0.013})
@@ -40,9 +46,16 @@ def test_the_details_of_a_law_are_freed_from_where_its_plain_form_is() -> None:
     assert with_details(candidate, detailed) is None, "all are free already"
 
 
+@pytest.mark.parametrize(("harmonic", "told"), [(8.0, False), (12.0, True)])
+def test_overtones_are_told_where_a_ripple_is_seen_to_repeat(harmonic: float, told: bool) -> None:
+    """A finger's 1.2 rad are 1.5 and 2.3 periods; three waves follow any torque over a single one."""
+    (ripple,), model = fitted("cogging")
+    assert (with_details(ripple, waving(model, harmonic)) is not None) == told
+
+
 def test_only_the_last_effect_gets_details_and_a_law_without_any_gets_none() -> None:
     (_, ripple), model = fitted("torque_gain", "cogging")
-    found = with_details(ripple, model)
+    found = with_details(ripple, waving(model, 12.0))
     assert found is not None
     assert found[1].terms[0] == model.terms[0]
     assert found[0].size == 7

@@ -1,12 +1,15 @@
 """A torque ripple that repeats with the position."""
 
-from math import cos, sin
+from collections.abc import Mapping
+from math import cos, pi, sin
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
 from tactile_cube.drivetrain.effects.harmonic import harmonic
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, TORQUE
 
 RIPPLE = "1-5 % of the rating"
+REPEATS = 2.0  # periods within the range of motion from which on a torque is seen to be periodic
 OVERTONES = ("sine_2", "cosine_2", "sine_3", "cosine_3")
 
 
@@ -37,6 +40,12 @@ class Cogging(Effect):
         {"joint_sine": 0.01, "joint_cosine": 0.0, "harmonic": 10.0},
     )
     details = OVERTONES
+
+    @classmethod
+    def details_at(cls, scales: Scales, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Overtones of a ripple that is seen to repeat: three waves follow whatever does not."""
+        repeats = values["harmonic"] * scales.span / (2.0 * pi)
+        return cls.details if repeats >= REPEATS else ()
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

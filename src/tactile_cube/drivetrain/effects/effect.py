@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import isfinite, nan
@@ -183,6 +183,11 @@ class Effect:
     def placed_at(cls, scales: Scales) -> dict[str, float]:
         """Values of parameters that are not fitted but follow from what a recording shows of the joint."""
         return {}
+
+    @classmethod
+    def details_at(cls, scales: Scales, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Those of `details` that a recording of the joint can tell, where the plain form has these values."""
+        return cls.details
 
     @classmethod
     def can_act(cls, scales: Scales) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.search.candidates import Candidate, term_unknowns
 from tactile_cube.identification.search.explanation import first_term
@@ -13,17 +14,19 @@ from tactile_cube.identification.search.explanation import first_term
 def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, tuple[Unknown, ...]] | None:
     """The last effect of a fitted model with the details of its law free too: as candidate, model and unknowns.
 
-    None for a law that has none, or none that is not fitted already.
+    None for a law of which the recording can tell no details that are not fitted already.
 
     Args:
         candidate: the last effect.
         model: fitted.
     """
-    details = [name for name in candidate.effect.details if name not in candidate.form]
+    first = len(model.terms) - len(candidate.joints)
+    scales = candidate.sizes.get(candidate.joints[0], FINGER)
+    told = candidate.effect.details_at(scales, model.terms[first].values)
+    details = [name for name in told if name not in candidate.form]
     if not details:
         return None
     neutral = {name: p.neutral for name, p in candidate.parameters(candidate.joints[0]).items() if name in details}
-    first = len(model.terms) - len(candidate.joints)
     terms = [replace(term, fitted=(*term.fitted, *details)) for term in model.terms[first:]]
     unknowns = [u for k, term in enumerate(terms) for u in term_unknowns(term, first + k, candidate.sizes)]
     detailed = replace(candidate, form={**candidate.form, **neutral})
