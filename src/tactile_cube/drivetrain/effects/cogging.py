@@ -9,7 +9,9 @@ from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, TORQUE
 
 RIPPLE = "1-5 % of the rating"
-REPEATS = 2.0  # periods within the range of motion from which on a torque is seen to be periodic
+REPEATS = (
+    1.5  # periods within the range of motion: half of one is seen again, which a torque that does not repeat fails
+)
 OVERTONES = ("sine_2", "cosine_2", "sine_3", "cosine_3")
 
 
