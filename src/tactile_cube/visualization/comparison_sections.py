@@ -185,9 +185,9 @@ def method_section() -> Section:
         "difference of each joint in each robot initialisation is removed first, because a joint's zero is "
         "calibrated anew each time.",
         "Noise floor: standard deviation of repeats of one command about their mean, or the sensor's noise where "
-        "nothing was repeated; compare, diagnose and identify state the same. Time step: difference between the "
-        "simulation at its own time step and at an eighth of it. A model is at the floor within 1.3 times "
-        "both in quadrature.",
+        "nothing was repeated; compare, diagnose and identify state the same. Time step: what the simulation's "
+        "own step adds, from the difference that steps of an eighth make. A model is at the floor within 1.3 "
+        "times both in quadrature.",
         "Just after a reversal: within 0.2 s after a joint's velocity changed its sign. Standstill, low, medium and "
         "high speed: below 0.02, 0.3, 1.5 rad/s and above (m/s where a joint slides). Low and "
         "high load: below and above half of the largest torque.",
