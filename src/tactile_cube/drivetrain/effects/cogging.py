@@ -9,9 +9,7 @@ from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, TORQUE
 
 RIPPLE = "1-5 % of the rating"
-REPEATS = (
-    1.5  # periods within the range of motion: half of one is seen again, which a torque that does not repeat fails
-)
+REPEATS = 1.5  # periods in the range of motion: half a period is seen again, as of a torque that repeats
 OVERTONES = ("sine_2", "cosine_2", "sine_3", "cosine_3")
 
 

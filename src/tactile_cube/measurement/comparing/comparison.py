@@ -108,13 +108,15 @@ def compare(
         return replay_each(recording, parameters, offsets, engine, step), offsets
 
     simulated, offsets = simulated_at(used)
-    fine = replay_each(recording, parameters, offsets, "fast", used / FINER)
-    left = summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
     band = simulate_band(recording, model, simulations, spread or {}, used, seed) if simulations else None
-    if step is None and engine == "fast" and _shown(recording, left):
-        used, left = used / FINER, left.times(1.0 / (FINER - 1))  # errors of the step are of first order
-        simulated, _ = simulated_at(used)
-    return describe(recording, model, simulated, floor or noise_floor(recording, left), band, used)
+    if floor is None or step is None:
+        fine = replay_each(recording, parameters, offsets, "fast", used / FINER)
+        left = summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
+        if step is None and engine == "fast" and _shown(recording, left):
+            used, left = used / FINER, left.times(1.0 / (FINER - 1))  # errors of the step are of first order
+            simulated, _ = simulated_at(used)
+        floor = floor or noise_floor(recording, left)
+    return describe(recording, model, simulated, floor, band, used)
 
 
 def _shown(recording: Recording, left: ErrorSummary) -> bool:
