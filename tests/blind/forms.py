@@ -89,7 +89,7 @@ def soft_saturation(s: Scene, i: int) -> Truth:
 
 
 def concave_torque(s: Scene, i: int) -> Truth:
-    """The motor's torque falls short of the command by the square of it."""
+    """The motor's torque falls short of the command by the square of it, until it grows no more."""
     short = s.size(0.1, 0.35)
     return {"short_at_peak": short, "bend": _put(s.plant.torque_bend, i, float(short / s.peak_torque[i]))}
 

@@ -208,7 +208,9 @@ def _bristles(p, i, v, step, z):
 @njit(cache=True)
 def load_on_joint(p, m, i, t, q, v, step, state, relay, bristle, felt):
     """Torque on joint i but for gravity and dry friction, and the level of that, without its asymmetry."""
-    load = p[at.GAIN, i] * state[i] * (1.0 - p[at.TORQUE_BEND, i] * abs(state[i])) + p[at.BIAS, i]
+    bend = p[at.TORQUE_BEND, i]
+    asked = min(abs(state[i]), 0.5 / bend) if bend > 0.0 else abs(state[i])  # beyond its top the curve stays there
+    load = p[at.GAIN, i] * np.sign(state[i]) * asked * (1.0 - bend * asked) + p[at.BIAS, i]
     for j in range(q.shape[0]):
         load += m[at.CROSSTALK, i, j] * state[j]
     torque = load + _joint_torques(p, m, i, t, q, v, relay)

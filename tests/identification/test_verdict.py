@@ -55,6 +55,14 @@ def explanation(name: str, error: float, base: float = 20.0, seed: int = 0) -> E
     return Explanation((candidate,), FIT, after, 1e-9, gain(before, after))
 
 
+def at_its_edge(name: str) -> Fit:
+    """A fit in which the first number of the last effect is as large as it may be."""
+    effect = find_effect(name)
+    first = effect.parameters[0]
+    term = Term(effect, "q1", {p.name: p.high for p in effect.parameters}, (first.name,))
+    return replace(FIT, model=Model({}, (term,), {}), unknowns=tuple(term_unknowns(term, 0, {})))
+
+
 def findings(base: float, *level: Explanation) -> Findings:
     start = Explanation((), FIT, judged(base), 1.0, 0.0)
     return Findings(start, judged(2 * base), (level,) if level else (), ())
@@ -78,6 +86,16 @@ def test_two_effects_that_do_equally_well_are_ambiguous() -> None:
     verdict = decide(findings(20.0, explanation("torque_bias", 1.03), explanation("torque_gain", 1.031, seed=1)))
     assert verdict.kind == "ambiguous"
     assert [one.effects[0].effect.name for one in verdict.rivals] == ["torque_gain"]
+
+
+def test_a_part_is_named_where_the_rest_is_followed_by_an_implausible_law() -> None:
+    stop, curve = explanation("joint_stop", 4.5), explanation("position_torque", 1.5)
+    both = replace(curve, effects=(*stop.effects, *curve.effects), fit=at_its_edge("position_torque"))
+    verdict = decide(findings(20.0, stop, both))
+    assert (verdict.kind, verdict.chosen) == ("partly_explained", stop)
+    poor = replace(stop, judgement=judged(9.0))
+    assert decide(findings(20.0, poor, both)).kind == "unknown_effect"
+    assert decide(findings(20.0, replace(both, effects=curve.effects))).kind == "unknown_effect"
 
 
 def test_a_richer_effect_that_does_no_better_is_no_rival() -> None:
@@ -184,7 +202,11 @@ def test_a_second_effect_that_a_large_remainder_needs_is_no_detail_of_the_first(
     stop, small = explanation("joint_stop", 14.0), explanation("joint_stop", 3.5)
     assert worthwhile(replace(explanation("stribeck_friction", 2.5), gain=0.97), stop, base, JOINTS)
     assert not worthwhile(replace(explanation("stribeck_friction", 8.0), gain=0.7), stop, base, JOINTS)
-    assert not worthwhile(replace(explanation("stribeck_friction", 1.3), gain=0.9), small, base, JOINTS)
+    assert not worthwhile(replace(explanation("stribeck_friction", 1.4), gain=0.84), small, base, JOINTS)
+    nearly_all = replace(explanation("stribeck_friction", 1.2), gain=0.84)
+    middling = explanation("joint_stop", 3.0)
+    assert worthwhile(nearly_all, middling, base, JOINTS)
+    assert not worthwhile(nearly_all, explanation("joint_stop", 1.9), base, JOINTS), "a detail of the first"
 
 
 @pytest.mark.parametrize(("own", "enough"), [(1.02, True), (1.4, False)])

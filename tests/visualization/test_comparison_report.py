@@ -207,13 +207,18 @@ def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison
     time = np.linspace(0, 1, 50)
     wave = np.sin(time)[:, None] * [1.0, 1.0]
     predictions = {"command_delay@a": wave, "actuator_lag@a": 1.01 * wave}
-    experiment = Experiment("multisine", ("a", "b"), time, wave, 0.004, "a", predictions)
+    experiment = Experiment("multisine", ("a", "b"), time, wave, 4.0, "a", predictions)
     report = diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment)
     text = page(report, tmp_path / "d.html")
     assert "What to record next" in text
     assert "next_experiment.csv" in text
-    assert "at least 4 mrad" in text
+    assert "Each should say 4 times as much" in text
     assert "actuator_lag@a" in text
+    alike = (("command_delay@a", "actuator_lag@a"),)
+    experiment = Experiment("multisine", ("a", "b"), time, wave, 0.1, "a", predictions, alike)
+    text = page(diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
+    assert "No command tried would tell command_delay@a from actuator_lag@a" in text
+    assert "To decide" not in text
 
 
 def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Comparison, tmp_path: Path) -> None:
@@ -236,7 +241,7 @@ def test_what_the_trials_do_not_prove_is_named_and_more_is_asked_for(comparison:
     unsure = DIAGNOSIS | {"verdict": "unknown_effect", "effects": [], "unproven_effects": [maybe]}
     time = np.arange(3) * 0.1
     predictions = {"none of them": np.zeros((3, 2)), "backlash@a": np.ones((3, 2))}
-    experiment = Experiment("slow triangles", ("a", "b"), time, np.ones((3, 2)), 1e-3, "a", predictions)
+    experiment = Experiment("slow triangles", ("a", "b"), time, np.ones((3, 2)), 4.0, "a", predictions)
     asked = unsure | {"next_experiment": "next_experiment.csv"}
     text = page(diagnosis_report(asked, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
     assert "these trials do not suffice to prove what" in text

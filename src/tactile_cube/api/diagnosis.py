@@ -69,13 +69,12 @@ class DiagnosisResult:
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_model(self.model, folder / "model.yaml")
-        experiment = write_experiment(self.free, folder) if self.free else None
-        data = self.data | {"next_experiment": str(experiment) if experiment else None}
-        (folder / "diagnosis.json").write_text(json.dumps(data, indent=1), encoding="utf-8")
+        (folder / "diagnosis.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
         if self.free is None:
-            self._report_contact(folder, data)
+            self._report_contact(folder, self.data)
         else:
-            self._report_free(folder, data, self.free)
+            write_experiment(self.free, folder)
+            self._report_free(folder, self.data, self.free)
 
     def _report_contact(self, folder: Path, data: dict[str, Any]) -> None:
         from tactile_cube.visualization.contact_report import contact_diagnosis_report
@@ -182,7 +181,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     criteria = Criteria(**config.criteria)
     found = diagnose_free(moving, effects, config.engine, config.step, config.seed, say, known, criteria)
     model = model_file(moving, found.fitted, found.errors(), [*found.held_out, *found.tested], job.command, config.seed)
-    data = as_json(found, None, job.seconds) | {"units": recording.units}
+    data = as_json(found, job.seconds) | {"units": recording.units}
     if known is not None:
         model = model.model_copy(update={"effects": model.with_effects(known.object_effects)})
         data["known_effects"] += [one.effect for one in known.object_effects]

@@ -12,6 +12,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import nominal_model
+from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
@@ -151,18 +152,21 @@ def diagnose(
         known=tuple(term.label for term in search.start.terms),
         common=common_offsets(findings.base, search.shooting.sizes) if verdict.kind == "adequate" else (),
     )
-    models = open_models(diagnosis)
-    experiment = next_experiment(search.shooting, recording, models, noise, seed) if len(models) > 1 else None
+    fits = open_fits(diagnosis)
+    if len(fits) == 1:
+        return diagnosis
+    extended = not diagnosis.rivals
+    experiment = next_experiment(search.shooting, recording, fits, noise, seed, criteria, extended)
     return replace(diagnosis, experiment=experiment)
 
 
-def open_models(diagnosis: Diagnosis) -> dict[str, Model]:
+def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:
     """The chosen model and those that may be true as well: its rivals, or else what these trials do not prove."""
     chosen = diagnosis.verdict.chosen
-    models = {chosen.label if chosen.effects else "none of them": diagnosis.fitted.model}
+    fits = {chosen.label if chosen.effects else "none of them": diagnosis.fitted.fit}
     if diagnosis.rivals:
-        return models | {one.label: fit.model for one, fit in diagnosis.rivals}
-    return models | {one.label: one.fit.model for one in diagnosis.unproven}
+        return fits | {one.label: fitted.fit for one, fitted in diagnosis.rivals}
+    return fits | {one.label: one.fit for one in diagnosis.unproven}
 
 
 def test_errors(
@@ -272,4 +276,5 @@ def _unexplained(search: Search, joints: Sequence[str], beside: Mapping[str, Jud
 
 def write_experiment(diagnosis: Diagnosis, folder: Path) -> Path | None:
     """The command file of the next experiment, if one is needed."""
-    return diagnosis.experiment.write(folder) if diagnosis.experiment else None
+    experiment = diagnosis.experiment
+    return experiment.write(folder) if experiment and experiment.decides else None

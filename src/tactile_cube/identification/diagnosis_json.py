@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from tactile_cube.drivetrain.model_file import EffectEstimate
 from tactile_cube.identification.diagnosis import Diagnosis
 from tactile_cube.identification.fitting.intervals import Fitted, bounds
 from tactile_cube.identification.fitting.model import effect_path
+from tactile_cube.identification.next_experiment import FILE
 from tactile_cube.identification.recommended import effect_estimate
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import Explanation
@@ -18,9 +18,9 @@ from tactile_cube.identification.verdict import unexplained_joints
 RANKED = 20
 
 
-def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> dict[str, Any]:
+def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
     """The content of diagnosis.json; errors in rad."""
-    verdict = diagnosis.verdict
+    verdict, experiment = diagnosis.verdict, diagnosis.experiment
     explanations = [(verdict.chosen, diagnosis.fitted), *diagnosis.rivals]
     names = [_names(one) for one, _ in explanations]
     effects = [
@@ -46,7 +46,8 @@ def as_json(diagnosis: Diagnosis, experiment: Path | None, seconds: float) -> di
         "unproven_effects": _unproven(diagnosis),
         "known_effects": list(diagnosis.known),
         "common_offsets": [asdict(one) for one in diagnosis.common],
-        "next_experiment": str(experiment) if experiment else None,
+        "next_experiment": FILE if experiment and experiment.decides else None,
+        "inseparable": [list(pair) for pair in experiment.inseparable] if experiment else [],
         "held_out": diagnosis.held_out,
         "tested": diagnosis.tested,
         "seconds": round(seconds, 2),

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.identification.next_experiment import Experiment
+from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
 
 OPENING = {
@@ -55,7 +55,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
         f"noise floor {milli(error['noise_floor'], unit)}."
     )
     if experiment is not None:
-        lines.append(f"To decide, play {result['next_experiment']}: {expected(experiment, units)}")
+        lines += next_steps(experiment)
     return "\n".join(lines)
 
 
@@ -90,13 +90,19 @@ def sets_in_words(sets: Sequence[Sequence[str]]) -> str:
     return ", or ".join(" and ".join(names) for names in sets)
 
 
-def expected(experiment: Experiment, units: Mapping[str, str]) -> str:
-    """What the next experiment is expected to show."""
-    names = ", ".join(experiment.predictions)
-    return (
-        f"{experiment.name} of {experiment.time[-1]:.0f} s; at {experiment.joint} any two of {names} will differ by at "
-        f"least {milli(experiment.difference, units.get(experiment.joint, TURNS))}."
-    )
+def next_steps(experiment: Experiment) -> list[str]:
+    """What to play to decide, and between what nothing that can be played decides."""
+    lines = [
+        f"No command tried would tell {one} from {other}: the machine moves alike either way."
+        for one, other in experiment.inseparable
+    ]
+    if experiment.decides:
+        lines.append(
+            f"To decide, play {FILE} twice, add both trials and diagnose again: {experiment.name} of "
+            f"{experiment.time[-1]:.0f} s. Each should say {short(experiment.told, 2)} times as much against the wrong "
+            "one, however it is refitted, as it takes to drop it."
+        )
+    return lines
 
 
 def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:

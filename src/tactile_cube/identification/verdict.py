@@ -61,7 +61,7 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
     if at_bound(chosen):
         as_good = [one for one in plausible if not worse(one.judgement, chosen.judgement, criteria)]
         if not as_good:
-            return Verdict("unknown_effect", chosen)
+            return _but_for_the_implausible(chosen, plausible, base, criteria)
         chosen = simplest(as_good, criteria)
     chosen = next((one for one in plausible if contains(chosen, one) and ask.alike(chosen, one)), chosen)
     whole = _explains(chosen, base, ask, criteria) and not ask.follows_signals(chosen)
@@ -72,6 +72,14 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
     if not whole:
         return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
+
+
+def _but_for_the_implausible(
+    chosen: Explanation, plausible: Sequence[Explanation], base: Explanation, criteria: Criteria
+) -> Verdict:
+    """What is left to say where the best explanation stands in for another law: its plausible part, if that is most."""
+    part = [one for one in plausible if named(one) < named(chosen) and one.explained(base) > criteria.most]
+    return Verdict("partly_explained", simplest(part, criteria)) if part else Verdict("unknown_effect", chosen)
 
 
 def _explains(chosen: Explanation, base: Explanation, ask: Questions, criteria: Criteria) -> bool:

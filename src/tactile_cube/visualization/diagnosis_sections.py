@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactile_cube.identification.in_words import GAIN_OF
+from tactile_cube.identification.in_words import GAIN_OF, next_steps
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
@@ -141,7 +141,7 @@ def next_section(
 ) -> Section:
     """What to record or to type next."""
     if experiment is not None:
-        return experiment_section(experiment, str(diagnosis["next_experiment"]), before.recording.units)
+        return experiment_section(experiment, before.recording.units)
     folder, model = before.recording.folder, model_path or "MODEL.yaml"
     found = [_typed(effect["name"], joint) for effect in diagnosis["effects"] for joint in effect["joints"]]
     names = [*diagnosis.get("known_effects", []), *found]
@@ -164,25 +164,21 @@ def next_section(
     return Section("What to do next", [said], [Listing(lines, code=True)])
 
 
-def experiment_section(experiment: Experiment, file: str, units: Mapping[str, str]) -> Section:
-    """The commands that would decide, and what each rival predicts."""
-    text = [
-        "This recording cannot decide between the candidates. Play these commands on the rig, add the trial to the "
-        "recording and diagnose again:"
-    ]
-    joint, unit = experiment.joints.index(experiment.joint), units.get(experiment.joint, TURNS)
-    predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
-    mean = sum(predictions.values()) / len(predictions)
-    lines = [
-        Line(name, experiment.time, 1e3 * (values - mean), PALETTE[k % len(PALETTE)], 1.3)
-        for k, (name, values) in enumerate(predictions.items())
-    ]
-    chart = line_chart(Axes("time [s]", f"{experiment.joint} [{THOUSANDTHS[unit]}]", height=220), lines)
-    caption = (
-        f"What each candidate predicts for {experiment.joint}, relative to their mean: they differ by at least "
-        f"{milli(experiment.difference, unit)} (RMS)."
-    )
-    return Section("What to record next", text, [Listing([file], code=True), Figure(chart, caption)])
+def experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Section:
+    """The commands that would decide, what each rival predicts, and between what nothing would decide."""
+    text, blocks = next_steps(experiment), []
+    if experiment.decides:
+        joint, unit = experiment.joints.index(experiment.joint), units.get(experiment.joint, TURNS)
+        predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
+        mean = sum(predictions.values()) / len(predictions)
+        lines = [
+            Line(name, experiment.time, 1e3 * (values - mean), PALETTE[k % len(PALETTE)], 1.3)
+            for k, (name, values) in enumerate(predictions.items())
+        ]
+        chart = line_chart(Axes("time [s]", f"{experiment.joint} [{THOUSANDTHS[unit]}]", height=220), lines)
+        caption = f"What each candidate predicts for {experiment.joint} before any refit, relative to their mean."
+        blocks = [Figure(chart, caption)]
+    return Section("What to record next", text, blocks)
 
 
 def _typed(effect: str, joint: str) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.drivetrain.signals import MEASURED_VELOCITY, ROWS, TORQUE
+from tactile_cube.drivetrain.signals import DAMPING, MEASURED_VELOCITY, ROWS, TORQUE
 
 LATE = 0.012  # [s]
 
@@ -16,17 +16,19 @@ def test_a_ramp_comes_out_late_by_the_time_constant(name: str, row: int, dt: flo
     state, x = np.zeros(effect.state_size(dt)), np.zeros((ROWS, 1))
     for k in range(round(20 * LATE / dt)):
         x[row, 0] = 3.0 * k * dt
-        out = effect.law(x, 0, np.array([LATE]), state, dt)
+        out = effect.law(x, 0, np.array([LATE, 0.0]), state, dt)
     assert x[row, 0] - out == pytest.approx(3.0 * LATE, rel=1e-3)
 
 
-def test_the_speed_remembered_of_a_step_is_that_of_its_end() -> None:
-    """A speed that grows steadily is late by the time constant alone, and not by half a step more."""
+@pytest.mark.parametrize("second", [0.0, 0.005, LATE])
+def test_the_speed_remembered_of_a_step_is_that_of_its_end(second: float) -> None:
+    """A speed that grows steadily is late by the time constants alone, and not by half a step more."""
     dt, effect = 0.002, find_effect("velocity_filter_lag")
     state, x = np.zeros(effect.state_size(dt)), np.zeros((ROWS, 1))
     x[2, 0] = 3.0  # acceleration
-    for k in range(120):
+    for k in range(150):
         x[MEASURED_VELOCITY, 0] = 3.0 * (k - 0.5) * dt
-        out = effect.law(x, 0, np.array([LATE]), state, dt)
-    share = state[3]  # of the present speed, which the midpoint damping carries on
-    assert 3.0 * 119 * dt - out - share * 3.0 * 0.5 * dt == pytest.approx(3.0 * LATE, rel=1e-3)
+        x[DAMPING, 0] = 1.0
+        out = effect.law(x, 0, np.array([LATE, second]), state, dt)
+    share = x[DAMPING, 0]  # of the present speed, which the midpoint damping carries on
+    assert 3.0 * 149 * dt - out - share * 3.0 * 0.5 * dt == pytest.approx(3.0 * (LATE + second), rel=1e-3)

@@ -11,7 +11,9 @@ SHARES = (0.03, 0.12, 0.3)
 class JointStop(Effect):
     """A spring and a damper beyond the upper or the lower stop; they push, never pull.
 
-    Source: rubber end stops; Hunt and Crossley 1975 without the nonlinear term.
+    stiffness * depth * (deep / depth)^exponent at `deep` beyond it: a spring that stiffens by an exponent above 1.
+    Source: rubber end stops; Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, 1975
+    (the exponent; without their damping in proportion to the depth).
     """
 
     name = "joint_stop"
@@ -39,12 +41,23 @@ class JointStop(Effect):
         ),
         Parameter("stiffness", unit="N m/rad", neutral=5.0, low=0.1, high=500.0, typical=5.0, source="rubber to metal"),
         Parameter("damping", unit="N m s/rad", neutral=0.0, low=0.0, high=2.0, typical=0.0, source="rubber to metal"),
+        Parameter(
+            "exponent", unit="1", neutral=1.0, low=0.7, high=3.0, typical=1.0, source="1.5 of spheres", scale=0.3
+        ),
+        Parameter("depth", unit="rad", neutral=0.05, low=1e-3, high=1.0, typical=0.05, source="some degrees"),
     )
 
     forms = (
         {"upper": 1.0, "stiffness": 5.0},
         {"lower": -1.0, "stiffness": 5.0},
     )
+
+    details = ("exponent",)
+
+    @classmethod
+    def placed_at(cls, scales: Scales) -> dict[str, float]:
+        """The stiffness is that of a push as deep as the nearest start lies within the range."""
+        return {"depth": SHARES[0] * scales.span}
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
@@ -60,9 +73,11 @@ class JointStop(Effect):
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Joint torque [N m]."""
         over = x[ANGLE, j] - p[0]
-        if over > 0.0:
-            return x[JOINT_TORQUE, j] - max(p[2] * over + p[3] * x[VELOCITY, j], 0.0)
         under = p[1] - x[ANGLE, j]
-        if under > 0.0:
-            return x[JOINT_TORQUE, j] + max(p[2] * under - p[3] * x[VELOCITY, j], 0.0)
-        return x[JOINT_TORQUE, j]
+        deep = max(over, under)
+        if deep <= 0.0:
+            return x[JOINT_TORQUE, j]
+        spring = p[2] * deep if p[4] == 1.0 else p[2] * p[5] * (deep / p[5]) ** p[4]
+        if over > 0.0:
+            return x[JOINT_TORQUE, j] - max(spring + p[3] * x[VELOCITY, j], 0.0)
+        return x[JOINT_TORQUE, j] + max(spring - p[3] * x[VELOCITY, j], 0.0)

@@ -7,9 +7,9 @@ from tactile_cube.drivetrain.signals import FRICTION, VELOCITY
 
 
 class StribeckFriction(Effect):
-    """(Fs - Fc) exp(-(v / vs)^2): spikes after standstill, and a gain that drops at small amplitudes.
+    """(Fs - Fc) exp(-|v / vs|^exponent): spikes after standstill, and a gain that drops at small amplitudes.
 
-    Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994).
+    Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), who report exponents of 0.5 to 2.
     """
 
     name = "stribeck_friction"
@@ -18,9 +18,13 @@ class StribeckFriction(Effect):
     parameters = (
         Parameter("excess", "N m", 0.0, 0.0, 0.5, 0.04, "+10-50 % of the Coulomb friction"),
         Parameter("velocity", "rad/s", 0.15, 0.01, 1.0, 0.15, "0.05-0.3 rad/s"),
+        Parameter("exponent", "1", 2.0, 0.3, 4.0, 2.0, "0.5-2", scale=0.5),
     )
+
+    forms = ({"excess": 0.04, "velocity": 0.15},)
+    details = ("exponent",)
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:  # noqa: D102
-        speed = x[VELOCITY, j] / p[1]
-        return x[FRICTION, j] + p[0] * exp(-speed * speed)
+        speed = abs(x[VELOCITY, j] / p[1])
+        return x[FRICTION, j] + p[0] * exp(-(speed * speed if p[2] == 2.0 else speed ** p[2]))

@@ -7,21 +7,25 @@ from tactile_cube.drivetrain.signals import ACCELERATION, DAMPING, MEASURED_VELO
 
 
 class VelocityFilterLag(Effect):
-    """The controller's velocity passes a first-order low-pass: time_constant * v_f' = v - v_f.
+    """The controller's velocity passes a first-order low-pass, time_constant * v_f' = v - v_f, and maybe a second one.
 
-    Source: any controller that differentiates an encoder.
+    Source: any controller that differentiates an encoder; the filters of servo drives are of first or second order.
     """
 
     name = "velocity_filter_lag"
     stage = Stage.VELOCITY_SENSOR
     parameters = (
         Parameter("time_constant", unit="s", neutral=0.0, low=0.0, high=0.2, typical=0.005, source="1-30 ms"),
+        Parameter("second", unit="s", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="as the first, or none"),
     )
+
+    forms = ({"time_constant": 0.005},)
+    details = ("second",)
 
     @classmethod
     def state_size(cls, dt: float) -> int:
-        """Filtered velocity, first-call flag, velocity of the last step, its own share in what was filtered."""
-        return 4
+        """First-call flag, speed of the last step; of each filter its output and its last input's share in that."""
+        return 6
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
@@ -32,17 +36,23 @@ class VelocityFilterLag(Effect):
         asked = x[MEASURED_VELOCITY, j]
         if p[0] <= 0.0:
             return asked
-        if s[1] == 0.0:
-            s[0] = asked
-            s[1] = 1.0
+        if s[0] == 0.0:
+            s[0] = 1.0
+            s[1] = asked
             s[2] = asked
+            s[4] = asked
         later = 0.5 * dt * x[ACCELERATION, j]
-        s[0] += s[3] * later
-        s[2] += later
-        kept = exp(-dt / p[0])
-        mean = (1.0 - kept) * p[0] / dt
-        x[DAMPING, j] *= 1.0 - mean
-        s[0] = kept * s[0] + (mean - kept) * s[2] + (1.0 - mean) * asked
-        s[2] = asked
-        s[3] = 1.0 - mean
-        return s[0]
+        before = s[1] + later
+        s[1] = asked
+        for k in range(2, 6, 2):
+            time_constant = p[k // 2 - 1]
+            if time_constant > 0.0:
+                later *= s[k + 1]
+                last = s[k] + later
+                kept = exp(-dt / time_constant)
+                mean = (1.0 - kept) * time_constant / dt
+                x[DAMPING, j] *= 1.0 - mean
+                s[k] = kept * last + (mean - kept) * before + (1.0 - mean) * asked
+                s[k + 1] = 1.0 - mean
+                before, asked = last, s[k]
+        return asked

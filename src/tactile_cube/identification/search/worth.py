@@ -20,8 +20,8 @@ def worthwhile(
     """Whether an effect earns its place.
 
     Significantly, and by more than a few per cent; a further effect has to complete the explanation, or that of the
-    joints where it acts, or to do most of what is left while that is a real part of the whole, or so much that it
-    cannot be a detail of the effect before.
+    joints where it acts, or to do most of what is left while that is a real part of the whole, or nearly all of it,
+    where that leaves nothing or was too much for a detail of the effect before.
     What is next to nothing beside the whole is a detail too, where there is little left anyway.
     """
     if explanation.gain < criteria.least_gain or not proven(explanation, parent, criteria):
@@ -38,7 +38,7 @@ def worthwhile(
     share = explanation.explained(parent)
     if parent.explained(base) < criteria.nearly_whole:
         return share > criteria.completing
-    return parent.error > criteria.far and share > criteria.most
+    return share > criteria.most and (parent.error > criteria.far or explanation.error <= criteria.adequate)
 
 
 def proven(explanation: Explanation, parent: Explanation, criteria: Criteria = STANDARD) -> bool:
@@ -65,7 +65,8 @@ def least_gain(parent: Explanation, base: Explanation, criteria: Criteria = STAN
         return criteria.least_gain
     squares = parent.judgement.joint_errors**2
     poor = squares[squares > criteria.adequate**2]
-    completing = [1.0 - (criteria.floor / parent.error) ** 2, *(poor - criteria.floor**2) / squares.sum()]
+    nearly_all = max(1.0 - (criteria.adequate / parent.error) ** 2, criteria.most * (1.0 - parent.error**-2))
+    completing = [1.0 - (criteria.floor / parent.error) ** 2, nearly_all, *(poor - criteria.floor**2) / squares.sum()]
     return max(criteria.least_gain, float(min(completing)))
 
 
