@@ -165,6 +165,7 @@ def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
         "confidently_wrong": sum(x["score"]["confident"] for x in lines),
         "false_alarms": [sum(x["score"]["outcome"] == "wrong" for x in none), len(none)],
         "ambiguous_set_sizes": sets,
+        "said_inseparable": sum(bool((x["diagnosis"] or {}).get("inseparable")) for x in lines),
         "after_experiment": dict(
             Counter(f"{x['score']['outcome']}, then {x['after_experiment']['score']['outcome']}" for x in played)
         ),

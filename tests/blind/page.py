@@ -82,7 +82,11 @@ def _drawn(summary: dict[str, Any]) -> str:
 
 def _left_open(summary: dict[str, Any]) -> str:
     sizes = ", ".join(map(str, summary["ambiguous_set_sizes"])) or "-"
-    return f"- ambiguous answers: {len(summary['ambiguous_set_sizes'])}; candidates that each leaves open: {sizes}"
+    alike = summary.get("said_inseparable", 0)
+    return (
+        f"- ambiguous answers: {len(summary['ambiguous_set_sizes'])}; candidates that each leaves open: {sizes}; "
+        f"answers that say of some that no command tells them apart: {alike}"
+    )
 
 
 def _played(summary: dict[str, Any]) -> str:
