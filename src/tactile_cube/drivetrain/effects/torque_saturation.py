@@ -9,11 +9,14 @@ from tactile_cube.drivetrain.signals import DAMPING, TORQUE
 LEVELS = 9
 """Between the torque exceeded in half of the samples and the largest ones, by equal factors."""
 
+HARD = 0.02
+"""A softness below this is none: within 1.4 % of the limit, and larger powers overflow."""
+
 
 class TorqueSaturation(Effect):
-    """|tau| <= limit.
+    """|tau| <= limit; with a softness s it is neared as u / (1 + |u / limit|^(1 / s))^s, u the torque asked for.
 
-    Source: current limits of drives.
+    Source: current limits of drives; iron that saturates nears its torque softly (0.4 is close to a tanh).
     """
 
     name = "torque_saturation"
@@ -29,7 +32,11 @@ class TorqueSaturation(Effect):
             source="a fraction of the stated limit",
             scale=0.02,
         ),
+        Parameter(
+            "softness", unit="1", neutral=0.0, low=0.0, high=1.0, typical=0.0, source="0 hard, 0.4 tanh", scale=0.2
+        ),
     )
+    details = ("softness",)
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
@@ -39,6 +46,10 @@ class TorqueSaturation(Effect):
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Motor torque [N m]."""
+        if p[1] > HARD:
+            asked = 1.0 + abs(x[TORQUE, j] / p[0]) ** (1.0 / p[1])
+            x[DAMPING, j] *= asked ** -(p[1] + 1.0)
+            return x[TORQUE, j] * asked ** -p[1]
         if abs(x[TORQUE, j]) > p[0]:
             x[DAMPING, j] = 0.0
         return min(max(x[TORQUE, j], -p[0]), p[0])
