@@ -32,6 +32,19 @@ def test_a_held_joint_feels_only_what_goes_beyond_the_gap(command: float, torque
     assert plant.signal(memory, MOTOR_POSITION)[0] == pytest.approx(lead + torque / STIFFNESS, abs=1e-12)
 
 
+def test_a_gap_full_of_oil_is_crossed_in_a_while_and_pulls_meanwhile() -> None:
+    plant, memory = plant_and_memory(friction=1.0, play=0.0, gap=GAP, crossing=20 * DT)
+    plant.reset(memory, 0.0)
+    leads, command = [], 0.008
+    for _ in range(40):
+        plant.kernel.step(np.array([command]), memory)
+        torque = plant.signal(memory, TORQUE)[0]
+        leads.append(plant.signal(memory, MOTOR_POSITION)[0] - torque / STIFFNESS)
+        assert torque == pytest.approx(SLOPE * (command - leads[-1]), abs=1e-12)
+    assert leads[19] == pytest.approx(command * (1.0 - np.exp(-1.0)))
+    assert leads[39] == pytest.approx(command * (1.0 - np.exp(-2.0)))
+
+
 @pytest.mark.parametrize("command", [0.05, -0.03])
 def test_a_smooth_backlash_leads_by_half_of_it_on_either_flank(command: float) -> None:
     plant, memory = plant_and_memory(friction=1.0, play=0.0, smooth=GAP, softness=0.002)
@@ -52,7 +65,7 @@ def test_a_play_keeps_the_reading_until_the_joint_has_moved_through_it() -> None
     for q in (0.0, 0.03, 0.02, 0.01, 0.0):
         x = np.zeros((ROWS, 1))
         x[MOTOR_POSITION, 0] = q
-        readings.append(Backlash.law(x, 0, np.array([GAP, 0.0, 0.0, 0.01]), state, DT))
+        readings.append(Backlash.law(x, 0, np.array([GAP, 0.0, 0.0, 0.01, 0.0]), state, DT))
     assert readings == pytest.approx([0.0, 0.02, 0.02, 0.02, 0.01])
 
 

@@ -46,8 +46,10 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
 
 
 def gaps(plant: Plant, memory: Array) -> Array:
-    """Width of the gap in each joint's transmission (n,) [rad]; 0 without one. `memory` is (size,)."""
+    """Width of the gap that each joint's motor moves through freely (n,) [rad]; 0 without one. `memory` is (size,)."""
     if Backlash not in plant.effects:
         return np.zeros(len(plant.joint_names))
-    width = plant.view(memory, "parameters:backlash")[:, [p.name for p in Backlash.parameters].index("gap")]
-    return np.asarray(np.where(plant.view(memory, "active:backlash") != 0.0, width, 0.0))
+    places = [[p.name for p in Backlash.parameters].index(name) for name in ("gap", "crossing")]
+    width, crossing = plant.view(memory, "parameters:backlash")[:, places].T
+    freely = (plant.view(memory, "active:backlash") != 0.0) & (crossing <= 0.0)
+    return np.asarray(np.where(freely, width, 0.0))
