@@ -157,7 +157,7 @@ FAMILIES: dict[str, tuple[Maker, tuple[str, ...]]] = {
         (damped_backlash, ("backlash",)),
         (maxwell_slip, ("presliding_friction",)),
         (heavy_tailed_stribeck, ("stribeck_friction",)),
-        (concave_torque, ("torque_curve",)),
+        (concave_torque, ("torque_curve", "torque_saturation")),
         (two_slope_elasticity, ("stiffening_elasticity",)),
         (bouc_wen, ("presliding_friction",)),
         (steady_warm_up, ("friction_drift",)),
