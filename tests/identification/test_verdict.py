@@ -82,6 +82,13 @@ def test_the_only_effect_that_reaches_the_noise_is_the_missing_one() -> None:
     assert verdict.chosen.effects[0].effect.name == "command_delay"
 
 
+def test_a_base_that_leaves_something_at_one_joint_is_not_adequate() -> None:
+    found = findings(1.05)
+    one_joint = replace(found.base.judgement, joint_errors=np.array([1.4, 1.0]))
+    assert decide(found).kind == "adequate"
+    assert decide(replace(found, base=replace(found.base, judgement=one_joint))).kind == "unknown_effect"
+
+
 def test_two_effects_that_do_equally_well_are_ambiguous() -> None:
     verdict = decide(findings(20.0, explanation("torque_bias", 1.03), explanation("torque_gain", 1.031, seed=1)))
     assert verdict.kind == "ambiguous"

@@ -10,8 +10,8 @@ class Criteria:
     """Errors are in units of the sensor noise, shares are of squared errors, all on held-out trials.
 
     Attributes:
-        floor: error at which nothing is left to explain.
-        adequate: error that a model may have to which nothing significant can be added.
+        floor: error at which nothing is left to explain, if it is no more at any joint.
+        adequate: error that a model may have, at each joint too, to which nothing significant can be added.
         tolerated: error up to which an explanation is complete.
         far: error of what is no explanation by itself, and that a near miss may have.
         least_gain: share that an effect has to explain at least.

@@ -55,7 +55,7 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
     """The answer to what a search has found."""
     base, ask = findings.base, questions or Questions()
     if not findings.levels:
-        return Verdict("adequate" if base.error <= criteria.adequate else "unknown_effect", base)
+        return Verdict("adequate" if base.largest_error <= criteria.adequate else "unknown_effect", base)
     found = [one for level in findings.levels for one in level]
     plausible, chosen = [one for one in found if not at_bound(one)], simplest(found, criteria)
     if at_bound(chosen):

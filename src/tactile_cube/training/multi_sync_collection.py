@@ -102,6 +102,12 @@ class MultiSyncCollection(WorkerCollection):
                 raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
 
     def _kill(self) -> None:
+        self._kill_children()
+        with contextlib.suppress(Exception):  # the thread may have been about to start one more
+            self._thread.submit(lambda: None).result(timeout=1.0)
+        self._kill_children()
+
+    def _kill_children(self) -> None:
         # also those of a start that did not come to its end: they would be waited for when the program ends
         for process in set(multiprocessing.active_children()) - self._others:
             process.kill()

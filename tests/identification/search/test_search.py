@@ -1,12 +1,16 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, p_value
+from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.search import Search, pursued
 from tactile_cube.identification.search.shortlist import of_each, with_groups
@@ -86,3 +90,29 @@ def test_the_more_effects_are_judged_beside_it_the_less_significant_is_each(
     assert 0.01 < alone < 0.25, "so that four times it is no probability above one"
     found = Contest(names, after).extend(base, base)
     assert [one.p_value for one in found] == pytest.approx([len(names) * alone] * len(names))
+
+
+class OneOfThree(Search):
+    """A search whose base is at the noise over three joints together, and that finds what is missing at the first."""
+
+    def __init__(self, first_joint: float) -> None:
+        self.say = lambda line: None
+        self.last_scores = []
+        start = findings(1.05).base
+        self.base = replace(start, judgement=replace(start.judgement, joint_errors=np.array([first_joint, 1.0, 1.0])))
+
+    def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
+        return [explanation("actuator_lag", 0.99, base=1.05)]
+
+    def worthwhile(self, one: Explanation, parent: Explanation, base: Explanation) -> bool:
+        return True
+
+    def pruned(self, explanation: Explanation) -> Explanation:
+        return explanation
+
+
+@pytest.mark.parametrize(("first_joint", "levels"), [(1.24, 1), (1.08, 0)])
+def test_the_noise_is_asked_of_each_joint(first_joint: float, levels: int) -> None:
+    search = OneOfThree(first_joint)
+    assert search.base.error < STANDARD.floor
+    assert len(search.one_by_one(search.base)[0]) == levels

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -36,6 +37,15 @@ def test_two_initialisations_that_agree_are_worth_a_word_and_no_more(second: flo
     assert [(one.joint, one.initialisations) for one in common_offsets(start, SIZES)] == (
         [("q1", 2)] if second < 0 else []
     )
+
+
+@pytest.mark.parametrize(("scatter", "found"), [(0.004, True), (0.03, False)])
+def test_three_initialisations_tell_by_what_the_offsets_of_all_joints_scatter(scatter: float, found: bool) -> None:
+    start = base(*([-0.08 + 0.004 * k, scatter * k, -scatter * k] for k in (-1, 0, 1)))
+    three = SimpleNamespace(joints=("q1", "q2", "q3"))
+    named = shared_offset(start, three, list(catalogue().values()), dict.fromkeys(three.joints, FINGER))
+    assert (named is not None) == found
+    assert named is None or named.effects[0].joints == ("q1",)
 
 
 def test_one_initialisation_tells_nothing() -> None:

@@ -37,6 +37,11 @@ class Explanation:
         return self.judgement.error
 
     @property
+    def largest_error(self) -> float:
+        """The same of the joint where it is largest, which the mean over many joints hides."""
+        return max(self.error, float(self.judgement.joint_errors.max()))
+
+    @property
     def label(self) -> str:
         """Readable."""
         return " & ".join(c.label for c in self.effects) or "base"

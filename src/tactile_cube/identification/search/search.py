@@ -115,7 +115,7 @@ class Search(Division):
             folds = [Division(self.shooting, *one, self.noise, self.segment, self.known) for one in self.folds]
             if sets := Together(self, base, folds).run(self.leaders, best):
                 levels, surpassed, doubtful = [sets], found, []
-        if not levels and base.error <= self.criteria.floor:
+        if not levels and base.largest_error <= self.criteria.floor:
             shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
             levels = [(shared,)] if shared else []
         unproven = tuple(sorted(doubtful, key=lambda e: e.error))
@@ -128,7 +128,7 @@ class Search(Division):
         levels: list[tuple[Explanation, ...]] = []
         scores: tuple[Score, ...] = ()
         beam: tuple[Explanation, ...] = (base,)
-        while len(levels) < DEEPEST and not any(e.error <= self.criteria.floor for e in beam):
+        while len(levels) < DEEPEST and not any(e.largest_error <= self.criteria.floor for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
             scores = scores or tuple(self.last_scores)
             better = [e for parent, e in found if self.worthwhile(e, parent, base)]

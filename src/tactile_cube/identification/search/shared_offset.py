@@ -49,7 +49,7 @@ def shared_offset(
     effect = next((effect for effect in effects if effect.constant_reading), None)
     if effect is None or len(base.judgement.model.offsets) < 2:
         return None
-    mean, by_chance = _mean_and_chance(base)
+    mean, by_chance = _mean_and_chance(base, sizes)
     least = LEAST * np.array([sizes[joint].of("rad") for joint in fitted.joints])
     shared = (np.abs(mean) > least) & (by_chance < UNLIKELY)
     if not shared.any():
@@ -70,7 +70,7 @@ def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
     count = len(base.judgement.model.offsets)
     if count < 2:
         return ()
-    mean, by_chance = _mean_and_chance(base)
+    mean, by_chance = _mean_and_chance(base, sizes)
     return tuple(
         CommonOffset(joint, float(mean[j]), count, float(by_chance[j]))
         for j, (joint, scales) in enumerate(sizes.items())
@@ -78,9 +78,17 @@ def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:
     )
 
 
-def _mean_and_chance(base: Explanation) -> tuple[Array, Array]:
-    """Mean offsets (n,) over the initialisations, and how probable their likeness is (Student's t)."""
-    offsets = -np.array([base.judgement.model.offsets[k] for k in sorted(base.judgement.model.offsets)])
-    mean, scatter = offsets.mean(axis=0), offsets.std(axis=0, ddof=1)
+def _mean_and_chance(base: Explanation, sizes: Sizes) -> tuple[Array, Array]:
+    """Mean offsets (n,) over the initialisations, and how probable their likeness is (Student's t).
+
+    The joints of a machine are initialised in one way, so what their offsets scatter by, each in its own scale, is one
+    number that all of them tell: three initialisations of a single joint say little. Where a joint's own scatter is
+    larger it counts.
+    """
+    scale = np.array([one.of("rad") for one in sizes.values()])
+    offsets = -np.array([base.judgement.model.offsets[k] for k in sorted(base.judgement.model.offsets)]) / scale
+    mean, variance = offsets.mean(axis=0), offsets.var(axis=0, ddof=1)
+    scatter = np.sqrt(np.maximum(variance, variance.mean()))
     ratio = np.abs(mean) / np.maximum(scatter, 1e-9) * np.sqrt(len(offsets))
-    return mean, np.minimum(1.0, 2.0 * student_t.sf(ratio, len(offsets) - 1) * len(mean))
+    freedom = (len(offsets) - 1) * len(mean)
+    return mean * scale, np.minimum(1.0, 2.0 * student_t.sf(ratio, freedom) * len(mean))

@@ -33,7 +33,7 @@ def worthwhile(
         and parent.error**2 - explanation.error**2 < criteria.small_part * base.error**2
     ):
         return False
-    if explanation.error <= criteria.floor or completes_its_joints(explanation, parent, joints, criteria):
+    if explanation.largest_error <= criteria.floor or completes_its_joints(explanation, parent, joints, criteria):
         return True
     share = explanation.explained(parent)
     if parent.explained(base) < criteria.nearly_whole:
@@ -48,7 +48,7 @@ def proven(explanation: Explanation, parent: Explanation, criteria: Criteria = S
         enough = criteria.significant_if_large
     if explanation.gain > criteria.most_gain:
         enough = criteria.significant_if_most
-    if explanation.error <= criteria.floor and not parent.effects:
+    if explanation.largest_error <= criteria.floor and not parent.effects:
         enough = criteria.significant_if_most
     return explanation.p_value <= enough
 
