@@ -48,7 +48,8 @@ def test_an_unchanged_machine_raises_no_alarm(folder: Path, reference: ModelFile
     same = recorded(folder, "same", 1, "viscous_friction@j: damping=0.04")
     seen = tactile_cube.monitor(same, reference, say=lambda line: None)
     assert not seen.alarm
-    assert seen.text.startswith(f"nothing has changed: {len(seen.drifts)} numbers agree")
+    assert seen.text.startswith("nothing has changed: error 1.0")
+    assert f"with the {len(seen.drifts)} numbers as they were" in seen.text
 
 
 def test_more_friction_is_a_changed_number_and_play_is_something_new(folder: Path, reference: ModelFile) -> None:
@@ -70,7 +71,7 @@ def test_more_friction_is_a_changed_number_and_play_is_something_new(folder: Pat
 
 def test_what_cannot_be_compared_is_told_in_one_line(folder: Path, reference: ModelFile) -> None:
     recording = recorded(folder, "any", 4)
-    with pytest.raises(InputError, match=r"errors\.with_effects and errors\.noise_floor are missing"):
+    with pytest.raises(InputError, match=r"errors\.over_noise is missing"):
         tactile_cube.monitor(recording, ModelFile(joints=["j"]))
     with pytest.raises(InputError, match="last=1: give at least 2 trials"):
         tactile_cube.monitor(recording, reference, "last=1")

@@ -61,7 +61,7 @@ def drawn(draw: int, seed: int, significance: float, folder: Path) -> dict[str, 
 def row(result: MonitorResult) -> dict[str, Any]:
     """The answer in few words."""
     names = [one.name for one in result.changed]
-    return {"alarm": result.alarm, "missing": result.missing, "changed": names, "ratios": result.ratios,
+    return {"alarm": result.alarm, "missing": result.missing, "changed": names, "errors": result.errors,
             "smallest_p": result.drifts[0].p_value}  # fmt: skip
 
 

@@ -28,8 +28,9 @@ class MonitorResult:
         before: the reference model.
         refitted: the same effects fitted to the newest recording.
         drifts: every number that both know, the least probable difference first.
-        changed: those that are no chance.
-        ratios: held-out error over noise floor, of the reference then and of the refitted model now.
+        changed: those that are no chance, where the held-out trials speak against the numbers as they were.
+        errors: held-out error over the sensor noise: `before`, of the reference on its own recording; `as_before`, of
+            the reference on the newest; `now`, of the refitted model there.
         missing: whether the refitted model has become so much worse that something new is missing.
         diagnosis: names it, where that was asked for.
         job: the call.
@@ -39,7 +40,7 @@ class MonitorResult:
     refitted: IdentificationResult
     drifts: list[Drift]
     changed: list[Drift]
-    ratios: tuple[float, float]
+    errors: dict[str, float]
     missing: bool
     diagnosis: DiagnosisResult | None
     job: Job
@@ -52,13 +53,15 @@ class MonitorResult:
     @property
     def text(self) -> str:
         """What has changed, in words."""
-        then, now = self.ratios
+        then, now = self.errors["before"], self.errors["now"]
         lines = [f"changed: {_described(one)}" for one in self.changed]
         if self.missing:
-            lines.append(f"something new is missing: error {now:.2f} times the noise floor, {then:.2f} times before")
+            lines.append(f"something new is missing: error {now:.2f} times the sensor noise, {then:.2f} times before")
         if not lines:
+            kept = self.errors["as_before"]
             lines.append(
-                f"nothing has changed: {len(self.drifts)} numbers agree, error {now:.2f} times the noise floor"
+                f"nothing has changed: error {kept:.2f} times the sensor noise with the {len(self.drifts)} numbers as "
+                f"they were, {now:.2f} refitted"
             )
         return "\n".join([*lines, *([self.diagnosis.text] if self.diagnosis else [])])
 
@@ -76,11 +79,10 @@ class MonitorResult:
             }
             for one in self.drifts
         }
-        ratios = dict(zip(("before", "now"), self.ratios, strict=True))
         named = self.diagnosis.effects if self.diagnosis else None
         made = {"command": self.job.command, "seconds": self.job.seconds}
         return (
-            {"alarm": self.alarm, "missing": self.missing, "error_over_floor": ratios, "named": named}
+            {"alarm": self.alarm, "missing": self.missing, "error_over_noise": self.errors, "named": named}
             | made
             | {"numbers": rows}
         )
@@ -123,24 +125,33 @@ def monitor(
 
 
 def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> MonitorResult:
-    """Refit the reference's effects on the newest recording, and hold the numbers and the errors side by side."""
+    """Refit the reference's effects on the newest recording, and hold the numbers and the errors side by side.
+
+    Numbers that trade places with each other differ from recording to recording by more than their intervals say; a
+    machine that has changed is not followed any more by the numbers as they were.
+    """
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.identification import identify
     from tactile_cube.identification.drift import changed, drifts
+    from tactile_cube.identification.identification import judge_known
+    from tactile_cube.identification.search.evidence import worse
+    from tactile_cube.measurement.bench import without_touches
     from tactile_cube.measurement.replay.parameters import require_same_joints
 
     config = job.config
-    then = error_over_floor(before)
+    then = error_over_noise(before)
     require_same_joints(recording, before)
     newest = newest_trials(recording, config.last)
     settings = [f"engine={config.engine}", f"step={config.step}", f"seed={config.seed}"]
     refitted = identify(newest, [one.effect for one in before.drive_effects], *settings, say=say)
-    now = error_over_floor(refitted.model)
+    assert refitted.free is not None  # it was asked for effects of the drive
+    now, kept = refitted.free.judgement, judge_known(without_touches(newest), before, config.seed)
     found = drifts(before, refitted.model)
-    gone = changed(found, config.significance)
-    missing = now > config.growth * max(then, 1.0)
+    gone = changed(found, config.significance) if worse(kept, now) else []
+    missing = now.error > config.growth * max(then, 1.0)
+    errors = {"before": then, "as_before": kept.error, "now": now.error}
     named = diagnose(newest, *settings, model=before, say=say) if config.name_it and (gone or missing) else None
-    return MonitorResult(before, refitted, found, gone, (then, now), missing, named, job)
+    return MonitorResult(before, refitted, found, gone, errors, missing, named, job)
 
 
 def newest_trials(recording: Recording, last: int | None) -> Recording:
@@ -156,18 +167,17 @@ def newest_trials(recording: Recording, last: int | None) -> Recording:
     return recording.with_trials(recording.trials[-last:])
 
 
-def error_over_floor(model: ModelFile) -> float:
-    """Held-out error of an identified model over the noise floor of its recording.
+def error_over_noise(model: ModelFile) -> float:
+    """Held-out error of an identified model over the sensor noise of its recording.
 
     Raises:
-        InputError: the model's file does not state them.
+        InputError: the model's file does not state it.
     """
-    if model.errors.with_effects is None or not model.errors.noise_floor:
+    if model.errors.over_noise is None:
         raise InputError(
-            f"model of {model.rig}: errors.with_effects and errors.noise_floor are missing; "
-            "take the model.yaml that identify or diagnose wrote"
+            f"model of {model.rig}: errors.over_noise is missing; take the model.yaml that identify or diagnose wrote"
         )
-    return model.errors.with_effects / model.errors.noise_floor
+    return model.errors.over_noise
 
 
 def _described(one: Drift) -> str:

@@ -84,12 +84,16 @@ class Provenance(_Strict):
 
 
 class ModelErrors(_Strict):
-    """RMS position error [rad] on held-out trials at each stage; `joints` maps a stage to joint -> error."""
+    """RMS position error [rad] on held-out trials at each stage; `joints` maps a stage to joint -> error.
+
+    `over_noise` is that of the last stage in segments that are simulated one by one, in units of the sensor noise.
+    """
 
     nominal: float | None = None
     refitted: float | None = None
     with_effects: float | None = None
     noise_floor: float | None = None
+    over_noise: float | None = None
     joints: dict[str, dict[str, float]] = Field(default_factory=dict)
 
 

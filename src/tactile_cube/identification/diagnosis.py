@@ -96,7 +96,8 @@ class Diagnosis:
         """The staircase as the model file and diagnosis.json state it [rad]."""
         overall = {stage: summary.overall for stage, summary in self.stages.items()}
         joints = {stage: summary.joints for stage, summary in self.stages.items()}
-        return ModelErrors(**overall, noise_floor=self.floor.overall, joints=joints)
+        over_noise = self.over_noise["with_effects"]
+        return ModelErrors(**overall, noise_floor=self.floor.overall, over_noise=over_noise, joints=joints)
 
 
 def diagnose(

@@ -9,17 +9,17 @@ import numpy as np
 
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.model_file import ModelErrors
+from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.diagnosis import with_offsets
+from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.search.candidates import candidates
-from tactile_cube.identification.search.evidence import judge
+from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.error import ErrorSummary
@@ -37,12 +37,14 @@ class Identification:
         fitted: the final model with intervals.
         stages: name of a step -> free-running held-out error [rad], from `nominal` to the last effect.
         floor: noise floor of the recording.
+        judgement: of the last step's model on the held-out trials, in segments.
         held_out: names of the held-out trials.
     """
 
     fitted: Fitted
     stages: dict[str, ErrorSummary]
     floor: NoiseFloor
+    judgement: Judgement
     held_out: list[str]
 
     def errors(self) -> ModelErrors:
@@ -52,6 +54,7 @@ class Identification:
             refitted=self.stages["refitted"].overall,
             with_effects=list(self.stages.values())[-1].overall,
             noise_floor=self.floor.overall,
+            over_noise=self.judgement.error,
             joints={stage: summary.joints for stage, summary in self.stages.items()},
         )
 
@@ -79,30 +82,45 @@ def identify(
     """
     wanted = resolve(effects, recording.joints)
     classes = tuple(dict.fromkeys(effect for effect, _ in wanted))
-    recording = resolved(recording, classes, say)
-    fitted_part, held_out = held_out_split(recording, seed=seed)
-    search = Search(fitted_part, held_out, sensor_noise(recording), classes, say)
-    base = search.fit_base()
+    search, floor = _divided(recording, classes, seed, say)
+    held_out, base = search.held_out, search.fit_base()
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
-    current = base.fit
+    current, judgement = base.fit, base.judgement
     for effect, joint in wanted:
         current = _with_effect(search, current, effect, joint)
         label = current.model.terms[-1].label
-        stages[f"+ {label}"] = _judged(search, held_out, current.model)
+        judgement = search.judged(current.model)
+        stages[f"+ {label}"] = judgement.model
         say(f"fitted {label}")
     fitted = final_fit(Problem(search.shooting, search.all_windows), current.model, search.unknowns(current.model))
     last = list(stages)[-1]
     stages[last] = with_offsets(fitted.model, stages[last])
     say("simulating the held-out trials")
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
-    return Identification(fitted, summaries, noise_floor(recording), [trial.name for trial in held_out.trials])
+    return Identification(fitted, summaries, floor, judgement, [trial.name for trial in held_out.trials])
 
 
-def _judged(search: Search, held_out: Recording, model: Model) -> Model:
-    """The model with the joint offsets of the held-out initialisations."""
-    full = search.with_known_offsets(model)
-    search.validation.linearise_starts(full)
-    return judge(search.validation, held_out, full).model
+def judge_known(recording: Recording, model: ModelFile, seed: int = 0) -> Judgement:
+    """How an identified model does, none of its numbers refitted, on the trials that `identify` would hold out.
+
+    Args:
+        recording: two or more trials, of the model's joints.
+        model: identified on another recording.
+        seed: which trials are held out.
+    """
+    effects = resolve([one.effect for one in model.drive_effects], recording.joints)
+    classes = tuple(dict.fromkeys(effect for effect, _ in effects))
+    search, _ = _divided(recording, classes, seed, lambda line: None)
+    return search.judged(nominal_model(search.held_out, model))
+
+
+def _divided(
+    recording: Recording, effects: Sequence[type[Effect]], seed: int, say: Callable[[str], None]
+) -> tuple[Search, NoiseFloor]:
+    """The trials to fit and those to judge by, with the effects compiled in."""
+    recording = resolved(recording, effects, say)
+    fitted, held_out = held_out_split(recording, seed=seed)
+    return Search(fitted, held_out, sensor_noise(recording), effects, say), noise_floor(recording)
 
 
 def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str) -> Fit:
