@@ -23,7 +23,6 @@ from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import FINER, finer
-from tactile_cube.identification.fitting.windows import cut
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 
@@ -95,7 +94,7 @@ def next_experiment(
     """
     excitations = safe_excitations(recording, seed, shooting.time)
     trials = [_trial(recording, name, commands) for name, commands in excitations.items()]
-    whole = finer(cut(recording, noise, trials, segment=len(trials[0].time), time=shooting.time), FINER)
+    whole = finer(shooting.cut(recording, noise, trials, segment=len(trials[0].time)), FINER)
     names, fits = list(rivals), list(rivals.values())
     predicted = shooting.finer(FINER).positions([_without_offsets(one.model) for one in fits], whole)
     shown = [[_measured(trial, one) for trial, one in zip(trials, by_trial, strict=True)] for by_trial in predicted]
@@ -138,7 +137,7 @@ def _told(
     with what speaks against an explanation (`worse`), the error counting that the simulation's own steps make of the
     true one: what differs in fine steps is the machine's, the rest is the simulation's.
     """
-    problem = Problem(shooting, cut(recording, noise, trials, time=shooting.time))
+    problem = Problem(shooting, shooting.cut(recording, noise, trials))
     fine = shooting.finer(FINER)
 
     def in_fine_steps(model: Model) -> Array:

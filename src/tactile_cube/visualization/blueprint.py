@@ -97,10 +97,7 @@ def episode_blueprint(fingers: Sequence[str], hand_name: str) -> rrb.Blueprint:
         hand_name: of the robot in the hand's URDF.
     """
     views = EpisodeViews(fingers, hand_name)
-    left = rrb.Vertical(views.scene(), views.theta(), row_shares=[4, 1])
-    joints = rrb.Tabs(*(views.finger(finger) for finger in fingers))
-    right = rrb.Vertical(rrb.Tabs(*views.task()), joints, row_shares=[2, 3])
-    return whole(rrb.Horizontal(left, right, column_shares=[5, 4]))
+    return _one_episode(views, views.task())
 
 
 def pair_blueprint(fingers: Sequence[str], hand_name: str, names: dict[str, str], curves: bool) -> rrb.Blueprint:
@@ -120,9 +117,8 @@ def pair_blueprint(fingers: Sequence[str], hand_name: str, names: dict[str, str]
     episodes = rrb.Horizontal(*sides)
     if not curves:
         return whole(episodes)
-    picture = rrb.Spatial2DView(name="Learning curves", origin="/curves", background=(255, 255, 255))
     words = rrb.TextDocumentView(name="Run", origin="/run")
-    return whole(rrb.Horizontal(episodes, rrb.Vertical(picture, words), column_shares=[5, 2]))
+    return whole(rrb.Horizontal(episodes, rrb.Vertical(_learning_curves(), words), column_shares=[5, 2]))
 
 
 def live_blueprint(fingers: Sequence[str], hand_name: str, seconds: float) -> rrb.Blueprint:
@@ -134,10 +130,18 @@ def live_blueprint(fingers: Sequence[str], hand_name: str, seconds: float) -> rr
         seconds: an episode lasts at most [s]: so much of the signals is shown.
     """
     views = EpisodeViews(fingers, hand_name, window=seconds)
-    picture = rrb.Spatial2DView(name="Learning curves", origin="/curves", background=(255, 255, 255))
+    return _one_episode(views, [_learning_curves(), *views.task()])
+
+
+def _learning_curves() -> rrb.View:
+    return rrb.Spatial2DView(name="Learning curves", origin="/curves", background=(255, 255, 255))
+
+
+def _one_episode(views: EpisodeViews, task: Sequence[rrb.View]) -> rrb.Blueprint:
+    """Scene and theta on the left; on the right what concerns the task, below it the signals of a finger."""
     left = rrb.Vertical(views.scene(), views.theta(), row_shares=[4, 1])
-    joints = rrb.Tabs(*(views.finger(finger) for finger in fingers))
-    right = rrb.Vertical(picture, rrb.Tabs(*views.task()), joints, row_shares=[3, 2, 2])
+    joints = rrb.Tabs(*(views.finger(finger) for finger in views.fingers))
+    right = rrb.Vertical(rrb.Tabs(*task), joints, row_shares=[2, 3])
     return whole(rrb.Horizontal(left, right, column_shares=[5, 4]))
 
 

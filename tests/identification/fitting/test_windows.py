@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.identification.fitting.noise import sensor_noise
-from tactile_cube.identification.fitting.windows import Drive, _states, cut, steps_per_row
+from tactile_cube.identification.fitting.windows import Drive, _half_width, _states, cut, steps_per_row
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tests.measurement.small_rig import write
@@ -81,6 +81,23 @@ def test_a_start_in_the_middle_of_a_jerk_is_read_without_bias(recording: Recordi
     drive = Drive(*(np.full(2, value) for value in (4.0, 0.0, 1.0, 0.04)))
     motor = (link + 4.0 * 0.04 * command) / (1.0 + 4.0 * 0.04)
     trial = replace(recording.trials[0], time=time, position=motor)
-    position, speed, _ = _states(trial, command, np.zeros_like(command), drive, np.array([row]))
+    half = _half_width(trial.step, np.full(2, 1e-4), 0.02, time=1.0)
+    assert half == 12, "this noise asks for no more"
+    position, speed, _, spread = _states(trial, command, np.zeros_like(command), drive, np.array([row]), half)
+    assert np.all(spread * 1e-4 < 0.02)
     assert position[0] == pytest.approx(motor[row])
     assert speed[0] == pytest.approx(3.0 * pulse[row], abs=0.06)
+
+
+def test_where_few_rows_leave_the_speed_too_noisy_more_are_taken() -> None:
+    fast, noise = 0.1, np.array([2e-4])  # ten times as fast as a finger, sampled at 500 Hz
+    assert _half_width(0.002, noise, np.inf, fast) == 2
+    assert _half_width(0.002, noise, 0.01, fast) == 5
+    assert _half_width(0.002, noise, 1e-6, fast) == 10, "half a segment at most"
+
+
+def test_a_start_is_known_no_better_than_the_noise_lets_it(recording: Recording) -> None:
+    rough, fine = (cut(recording, np.array([noise, noise])).start_noise for noise in (2e-4, 1e-4))
+    assert rough.shape == (*cut(recording, np.array([2e-4, 2e-4])).position.shape[:2], 4)
+    assert np.allclose(rough, 2.0 * fine)
+    assert np.all(rough[..., :2] == 2e-4)

@@ -15,8 +15,8 @@ class VelocityFilterLag(Effect):
     name = "velocity_filter_lag"
     stage = Stage.VELOCITY_SENSOR
     parameters = (
-        Parameter("time_constant", unit="s", neutral=0.0, low=0.0, high=0.2, typical=0.005, source="1-30 ms"),
-        Parameter("second", unit="s", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="as the first, or none"),
+        Parameter("time_constant", unit="s", neutral=0.0, low=0.0, high=0.5, typical=0.005, source="1-30 ms"),
+        Parameter("second", unit="s", neutral=0.0, low=0.0, high=0.5, typical=0.0, source="as the first, or none"),
     )
 
     forms = ({"time_constant": 0.005},)

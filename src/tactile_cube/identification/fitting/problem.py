@@ -14,7 +14,7 @@ from tactile_cube.identification.fitting.windows import Windows
 
 Array = NDArray[np.float64]
 START_POSITION = 1e-3  # [rad] of a finger, as all sizes here: how well a segment's start is known beforehand
-START_SPEED, START_SPEED_PER_ACCELERATION = 0.02, 0.01  # [rad/s], [s]
+START_SPEED_PER_ACCELERATION = 0.01  # [s]
 RUN_AWAY = 1.0  # [rad] as far off as this counts a simulation that ran away
 STEP = 0.2  # finite differences, in units of an unknown's scale
 
@@ -43,9 +43,10 @@ class Problem:
         raw = self.shooting.start_sensitivity(model, self.windows)
         columns = np.stack([self.windows.by_segment(column) for column in raw], axis=-1)
         acceleration = np.abs(self.windows.acceleration).reshape(len(self.weight), -1)
-        known, sure = START_SPEED * self.shooting.per_joint("rad/s"), START_POSITION * self.shooting.per_joint("rad")
+        known, sure = self.shooting.start_speed, START_POSITION * self.shooting.per_joint("rad")
         speed = known + START_SPEED_PER_ACCELERATION * self.shooting.time * acceleration
-        spread = np.concatenate([np.broadcast_to(sure, speed.shape), speed], axis=1)
+        known_to = np.concatenate([np.broadcast_to(sure, speed.shape), speed], axis=1)
+        spread = np.hypot(known_to, self.windows.start_noise.reshape(known_to.shape))
         self._starts = np.asarray(columns * self.weight[..., None] * spread[:, None])
         gram = np.swapaxes(self._starts, 1, 2) @ self._starts
         self._inverse = np.asarray(np.linalg.inv(gram + np.eye(gram.shape[-1])), dtype=np.float64)

@@ -15,7 +15,7 @@ from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import finer, spread
-from tactile_cube.identification.fitting.windows import cut, steps_per_row
+from tactile_cube.identification.fitting.windows import steps_per_row
 from tactile_cube.identification.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 
@@ -81,7 +81,7 @@ def _longer(recording: Recording, time: float, error: StepError) -> float | None
 
 def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array, times: int) -> float:
     """RMS [sensor noise] by which steps so many times as short move what constants and starts cannot follow."""
-    windows = spread(cut(recording, noise, time=shooting.time))
+    windows = spread(shooting.cut(recording, noise))
     own, fine = Problem(shooting, windows), Problem(shooting.finer(times), finer(windows, times))
     for problem in (own, fine):
         problem.linearise_starts(model)

@@ -15,9 +15,10 @@ from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION
 from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.fitting.windows import SMOOTHING, Windows, steps_per_row
+from tactile_cube.identification.fitting.windows import SMOOTHING, START_SPEED, Windows, cut, steps_per_row
 from tactile_cube.identification.joint_scales import joint_scales, rigid_body
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.jump_ratio import gaps, jump_ratio
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.read_out import free_way
@@ -55,6 +56,21 @@ class Shooting:
     def time(self) -> float:
         """What a second of a finger stands for [s]."""
         return self.scales[0].time
+
+    @property
+    def start_speed(self) -> Array:
+        """How well the speed at a segment's start is known beforehand, (n,) [rad/s]."""
+        return START_SPEED * self.per_joint("rad/s")
+
+    def cut(
+        self,
+        recording: Recording,
+        noise: Array,
+        trials: Sequence[Trial] | None = None,
+        segment: int | None = None,
+    ) -> Windows:
+        """The trials of a recording as windows of this machine's size, see `windows.cut`."""
+        return cut(recording, noise, trials, segment, self.time, self.start_speed)
 
     def per_joint(self, unit: str) -> Array:
         """How many times larger numbers of a unit are than at a finger, (n,)."""

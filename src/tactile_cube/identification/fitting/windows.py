@@ -32,6 +32,7 @@ ROWS = (
     "position",
     "speed",
     "acceleration",
+    "start_noise",
     "gains",
     "trial",
     "initialisation",
@@ -41,6 +42,7 @@ ROWS = (
 )
 """Arrays with one row a window."""
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
+START_SPEED = 0.02  # [rad/s] how well the speed at a segment's start is known beforehand
 MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
 
 
@@ -56,6 +58,7 @@ class Windows:
         position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
         speed: (S, K, n) [rad/s].
         acceleration: (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2].
+        start_noise: (S, K, 2 n) what sensor noise makes of positions [rad] and speeds [rad/s] at segments' starts.
         gains: (S, 3, n) kp, kd and torque limit of the trial over those of the recording.
         trial: (S,) index of the trial.
         initialisation: (S,) robot initialisation.
@@ -77,6 +80,7 @@ class Windows:
     position: Array
     speed: Array
     acceleration: Array
+    start_noise: Array
     gains: Array
     trial: NDArray[np.int64]
     initialisation: NDArray[np.int64]
@@ -111,7 +115,7 @@ class Windows:
             self,
             commands=self.commands[:, : (self.history + self.segment) * self.substeps],
             **{key: getattr(self, key)[:, rows] for key in ("measured", "jump", "weight")},
-            **{key: getattr(self, key)[:, :1] for key in ("position", "speed", "acceleration")},
+            **{key: getattr(self, key)[:, :1] for key in ("position", "speed", "acceleration", "start_noise")},
         )
 
     def by_segment(self, values: Array) -> Array:
@@ -125,6 +129,7 @@ def cut(
     trials: Sequence[Trial] | None = None,
     segment: int | None = None,
     time: float = 1.0,
+    speed: Array | float = np.inf,
 ) -> Windows:
     """The trials of a recording as windows.
 
@@ -134,6 +139,7 @@ def cut(
         trials: all of the recording's by default.
         segment: rows of a segment; as short as identification likes it by default.
         time: what a second of a finger stands for [s].
+        speed: (n,) as well as speeds should be known where a segment starts [rad/s].
     """
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
@@ -144,7 +150,7 @@ def cut(
     pieces = [
         piece
         for k, trial in enumerate(trials)
-        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time)
+        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time, speed)
     ]
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces = tuple(piece["force"] for piece in pieces)
@@ -168,12 +174,14 @@ def _pieces(
     history: int,
     noise: Array,
     time: float,
+    speed_known: Array | float,
 ) -> Iterator[dict[str, object]]:
     command = trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
     substeps = steps_per_row(recording, time)
     fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
     jump = _half_jump(command, recording.read)
     drive = _drive(recording, trial)
+    half = _half_width(trial.step, noise, speed_known, time)
     for first in range(0, len(trial.time), forward):
         span = np.arange(first, first + rows)
         usable = np.minimum(span, len(trial.time) - 1)
@@ -182,7 +190,7 @@ def _pieces(
         if np.count_nonzero(present) < FEWEST:
             continue
         starts = np.minimum(span[::segment], len(trial.time) - 1)
-        position, speed, acceleration = _states(trial, command, jump, drive, starts, SMOOTHING * time)
+        position, speed, acceleration, spread = _states(trial, command, jump, drive, starts, half)
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": trial.position[usable],
@@ -191,6 +199,7 @@ def _pieces(
             "position": position,
             "speed": speed,
             "acceleration": acceleration,
+            "start_noise": np.concatenate([np.broadcast_to(noise, spread.shape), spread * noise], axis=1),
             "gains": _gains(recording, trial),
             "trial": index,
             "initialisation": trial.initialisation,
@@ -267,10 +276,31 @@ def _half_jump(command: Array, reading: str) -> Array:
     return 0.5 * (after - before) if reading == "after" else 0.5 * (before - after)
 
 
+def _half_width(step: float, noise: Array, speed: Array | float, time: float) -> int:
+    """Rows on either side of a start that its speed is read from.
+
+    More than usual, and up to half a segment, where so few leave it too noisy: dry friction asks for its sign.
+    """
+    half = max(2, round(SMOOTHING * time / step))
+    while half < round(0.5 * SEGMENT * time / step):
+        basis = np.vander(step * np.arange(-half, half + 1), _terms(half), increasing=True)
+        if np.all(np.linalg.norm(np.linalg.pinv(basis)[1]) * noise <= speed):
+            break
+        half += 1
+    return half
+
+
+def _terms(half: int) -> int:
+    """Coefficients of the polynomial through so many rows on either side."""
+    return 5 if 2 * half >= MANY else 3
+
+
 def _states(
-    trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows, smoothing: float = SMOOTHING
-) -> tuple[Array, Array, Array]:
-    """Position of the sensor, speed and acceleration of the link (K, n) at some rows.
+    trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows, half: int
+) -> tuple[Array, Array, Array, Array]:
+    """Position of the sensor, speed and acceleration of the link (K, n) at some rows, and the speed's share of noise.
+
+    The last one is its standard deviation where that of a sample is one [1/s].
 
     The sensor follows every kink of the command, for the drive deflects with its torque; the link does not. So speed
     and acceleration come from a polynomial through the samples around, with the drive's deflection taken off: of
@@ -279,16 +309,18 @@ def _states(
     """
     torque = np.clip(drive.kp * (command - trial.position), -drive.limit, drive.limit)
     link = trial.position - drive.compliance * torque  # behind by compliance * kd * speed
-    half = max(2, round(smoothing / trial.step))
-    found = []
+    damping = drive.compliance * drive.kd  # [s]
+    found, spread = [], []
     for row in rows:
         near = slice(max(0, row - half), min(len(trial.time), row + half + 1))
         centred = near.start == row - half and near.stop == row + half + 1
-        terms = 5 if centred and 2 * half >= MANY else 3
+        terms = _terms(half) if centred else 3
         basis = np.vander(trial.time[near] - trial.time[row], terms, increasing=True)
         found.append(np.linalg.lstsq(basis, link[near], rcond=None)[0][1:3])
+        slope_of, bend_of = np.linalg.pinv(basis)[1:3]
+        spread.append(np.linalg.norm(slope_of + 2.0 * damping[:, None] * bend_of, axis=1))
     slope, half_curvature = np.moveaxis(np.array(found), 1, 0)
     acceleration = 2.0 * half_curvature
     soft = drive.kp * drive.compliance
     position = trial.position[rows] + soft / (1.0 + soft) * jump[rows]
-    return position, slope + drive.compliance * drive.kd * acceleration, acceleration
+    return position, slope + damping * acceleration, acceleration, np.array(spread)

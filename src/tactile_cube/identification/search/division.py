@@ -11,7 +11,7 @@ from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
 from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import Windows, cut
+from tactile_cube.identification.fitting.windows import Windows
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns
 from tactile_cube.identification.search.evidence import Judgement, judge
 from tactile_cube.identification.search.explanation import Explanation
@@ -64,7 +64,7 @@ class Division:
 
     def windows(self, recording: Recording) -> Windows:
         """Other trials cut likewise."""
-        return cut(recording, self.noise, segment=self.segment, time=self.shooting.time)
+        return self.shooting.cut(recording, self.noise, segment=self.segment)
 
     def fit_base(self) -> Explanation:
         """Refit what the model already has."""

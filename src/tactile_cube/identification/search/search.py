@@ -15,7 +15,6 @@ from tactile_cube.identification.fitting.base import every_effect, nominal_model
 from tactile_cube.identification.fitting.error_growth import steady_rows
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import cut
 from tactile_cube.identification.search.candidates import Candidate, candidates
 from tactile_cube.identification.search.division import BRIEF, LONG, SEGMENTS, Division, some
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
@@ -95,7 +94,7 @@ class Search(Division):
         start = nominal_model(fitted, known)
         effects = every_effect(effects, start)
         shooting = Shooting(fitted, effects)
-        windows = some(cut(fitted, noise, time=shooting.time), SEGMENTS)
+        windows = some(shooting.cut(fitted, noise), SEGMENTS)
         super().__init__(shooting, fitted, held_out, noise, steady_rows(shooting, start, windows), known)
         self.say, self.criteria, self.effects, self.folds = say, criteria, effects, folds
         self.candidates = candidates(shooting.sizes, effects)
