@@ -15,7 +15,7 @@ from tactile_cube.identification.search.evidence import Judgement, gain, p_value
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings
 from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
-from tactile_cube.identification.verdict import Questions, decide, unexplained_joints
+from tactile_cube.identification.verdict import Questions, at_bound, decide, unexplained_joints
 
 MODEL = Model({}, (), {})
 NOTHING = np.zeros((0, 0))
@@ -339,3 +339,14 @@ def test_a_criterion_that_is_given_decides() -> None:
     found = findings(9.0, explanation("backlash", 1.9, 9.0))
     assert decide(found).kind == "partly_explained"
     assert decide(found, criteria=Criteria(tolerated=2.0)).kind == "missing_effect"
+
+
+def test_a_drift_as_slow_as_can_be_told_is_no_implausible_law() -> None:
+    """Its longest time constant stands for all longer ones: friction that changes in proportion to the time."""
+    drift = explanation("friction_drift", 1.0)
+    slow = Term(drift.effects[0].effect, "q1", {"change": -0.7, "time_constant": 200.0, "friction": 0.0}, ())
+    for fitted, edge in ((("time_constant",), False), (("change",), True)):
+        values = slow.values | ({"change": -5.0} if edge else {})
+        term = replace(slow, values=values, fitted=fitted)
+        fit = replace(FIT, model=Model({}, (term,), {}), unknowns=tuple(term_unknowns(term, 0, {})))
+        assert at_bound(replace(drift, fit=fit)) is edge

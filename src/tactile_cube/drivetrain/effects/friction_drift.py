@@ -9,6 +9,9 @@ from tactile_cube.drivetrain.signals import FRICTION, TIME
 class FrictionDrift(Effect):
     """F += friction + change * (1 - exp(-t / time_constant)), t from the start of the trial.
 
+    The longest time constant stands for a change in proportion to the time, which trials of seconds do not tell apart;
+    so `change`, which is then the rate times that, may be far larger than the change that anybody sees.
+
     Source: Bittencourt and Axelsson, Modeling and experiment design for temperature effects of joint friction, 2014.
     """
 
@@ -16,11 +19,11 @@ class FrictionDrift(Effect):
     stage = Stage.FRICTION
     contains = ("coulomb_friction",)
     parameters = (
-        Parameter("change", unit="N m", neutral=0.0, low=-0.5, high=0.5, typical=0.02, source="-20 to -50 % over 20 K"),
+        Parameter("change", unit="N m", neutral=0.0, low=-5.0, high=5.0, typical=0.02, source="-20 to -50 % over 20 K"),
         Parameter(
             "time_constant",
             unit="s",
-            neutral=5.0,
+            neutral=200.0,
             low=0.5,
             high=200.0,
             typical=5.0,
