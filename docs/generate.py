@@ -140,8 +140,8 @@ def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object,
 
     from tactile_cube.api.job import called_job
     from tactile_cube.measurement.recordings.description import TrialEntry
-    from tactile_cube.measurement.replay.parameters import Parameters
-    from tactile_cube.measurement.replay.rig_replay import Replay
+    from tactile_cube.measurement.replay.model import Model, terms_of
+    from tactile_cube.measurement.replay.simulator import Simulator
     from tactile_cube.measurement.sources import session
     from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 
@@ -159,18 +159,15 @@ def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object,
         entry = TrialEntry(file=f"{motion}.parquet", kind=motion)
         trials.append(session._silent_trial(command, empty, entry))
     found: dict[str, list[tuple[object, object, object]]] = {}
-    still = np.zeros(len(description.joints))
+    joints = tuple(description.joints)
+    simulator, still = Simulator(empty, step=0.001), {0: np.zeros(len(joints))}
     for name, kind in catalogue().items():
         joint = ELSEWHERE.get(name, JOINT)
-        label, place = f"{name}@{joint}", description.joints.index(joint)
-        replay = Replay(empty, [label], 0.001)
+        label, place = f"{name}@{joint}", joints.index(joint)
         plain = {p.name: p.neutral for p in kind.parameters}
         typical = (kind.forms[0] if kind.forms else {}) or {p.name: p.typical for p in kind.parameters}
-        without, with_effect = (
-            replay.simulate(trials, Parameters(constants, ((label, values),), still))
-            for values in (plain, plain | typical)
-        )
-        replay.close()
+        models = [Model(constants, terms_of([(label, v)], joints), still) for v in (plain, plain | typical)]
+        without, with_effect = simulator.free_runs(models, trials)
         found[name] = [
             (trial.time, trial.command[:, place], 1e3 * (b.position - a.position)[:, place])
             for trial, a, b in zip(trials, without, with_effect, strict=True)

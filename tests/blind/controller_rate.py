@@ -14,11 +14,11 @@ from typing import Any
 
 import yaml
 
-from tactile_cube.measurement.comparing.error import residuals, summarise
+from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.replay.parameters import nominal_parameters
-from tactile_cube.measurement.replay.rig_replay import replay
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 from tactile_cube.measurement.units import milli
 
@@ -56,8 +56,8 @@ def left(rig: str, folder: Path) -> None:
         controller = plain["controller"] | ({} if rate is None else {"rate_hz": rate})
         file.write_text(yaml.safe_dump(plain | {"controller": controller}))
         recording = read_recording(folder / rig)
-        simulated = replay(recording, nominal_parameters(recording, None), "fast", 0.002)
-        errors = summarise(residuals(recording.trials, [one.position for one in simulated]), recording.joints)
+        simulated = free_run(recording, nominal_model(recording))
+        errors = free_run_error(recording, simulated)
         shown = ", ".join(f"{joint} {milli(error, recording.units[joint])}" for joint, error in errors.joints.items())
         print(f"{rig}, controller at {f'{rate:g} Hz' if rate else 'the log rate'}: {shown}", flush=True)
 

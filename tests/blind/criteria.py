@@ -25,8 +25,6 @@ from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.diagnosis import Simulations, Unexplained
 from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.search import search as searching
 from tactile_cube.identification.search.division import Division
@@ -37,6 +35,8 @@ from tactile_cube.identification.search.together import Proposal, Together
 from tactile_cube.identification.search.worth import least_gain
 from tactile_cube.identification.verdict import Verdict, decide
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
+from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part
 
 sys.path.insert(0, str(Path(__file__).parent))

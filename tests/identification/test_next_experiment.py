@@ -8,14 +8,14 @@ import polars as pl
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.diagnosis import UNPROVEN, Diagnosis, open_fits
 from tactile_cube.identification.fitting.intervals import Fitted
-from tactile_cube.identification.fitting.model import Term
-from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.next_experiment import FASTEST, Experiment, next_experiment, safe_excitations
 from tactile_cube.identification.search.division import Division
 from tactile_cube.identification.verdict import Kind, Verdict
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.replay.model import Term
 from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import Size, simulated
 from tests.identification.test_verdict import FIT, explanation, findings

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
-from tactile_cube.identification.fitting.noise import sensor_noise
-from tactile_cube.identification.joint_scales import joint_scales
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.verdict import decide
+from tactile_cube.measurement.joint_scales import joint_scales
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import EFFECTS, Size, simulated
 

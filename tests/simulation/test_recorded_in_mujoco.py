@@ -14,7 +14,7 @@ import pytest
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
-from tactile_cube.measurement.replay.parameters import nominal_parameters
+from tactile_cube.measurement.replay.nominal import nominal_model
 
 FOLDER = Path(__file__).parent / "recordings" / "mujoco_grasp"
 AS_RECORDED = Contact({"spinning_friction": {"radius": 3e-3}})
@@ -29,7 +29,7 @@ def recording() -> Recording:
 
 @pytest.fixture(scope="module", params=["bullet", "mujoco"])
 def replay(request: pytest.FixtureRequest, recording: Recording) -> HandReplay:
-    return HandReplay(recording, nominal_parameters(recording, None), engine=request.param)
+    return HandReplay(recording, nominal_model(recording), engine=request.param)
 
 
 def deviation(replay: HandReplay, recording: Recording, kind: str, contact: Contact) -> float:

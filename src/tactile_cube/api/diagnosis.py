@@ -140,7 +140,7 @@ def diagnose(
 def run_diagnosis(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
     """Diagnose free motion, grasps, or both, as the recording has them."""
     from tactile_cube.measurement.bench import has_free_motion, with_object
-    from tactile_cube.measurement.replay.parameters import require_same_joints
+    from tactile_cube.measurement.replay.nominal import require_same_joints
 
     if known is not None:
         require_same_joints(recording, known)

@@ -136,7 +136,7 @@ def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> 
     from tactile_cube.identification.identification import judge_known
     from tactile_cube.identification.search.evidence import worse
     from tactile_cube.measurement.bench import without_touches
-    from tactile_cube.measurement.replay.parameters import require_same_joints
+    from tactile_cube.measurement.replay.nominal import require_same_joints
 
     config = job.config
     then = error_over_noise(before)

@@ -15,12 +15,13 @@ from tactile_cube.benchmarking.command import run_and_watch
 from tactile_cube.benchmarking.mujoco_sysid import fit_finger
 from tactile_cube.benchmarking.peers import find_peer
 from tactile_cube.benchmarking.report import Figure, Section
-from tactile_cube.identification.fitting.noise import sensor_noise
-from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.search.search import Search
+from tactile_cube.measurement.comparing.error import free_run_error
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
+from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 from tactile_cube.measurement.split import held_out_split
 
@@ -122,7 +123,7 @@ def _ours(fitted: Recording, held_out: Recording) -> tuple[float, float]:
     base = search.fit_base()
     seconds = time.process_time() - began
     model = base.judgement.model
-    return seconds, free_run_error(held_out, free_run(held_out, model, "fast", STEP)).overall
+    return seconds, free_run_error(held_out, free_run(held_out, model, step=STEP)).overall
 
 
 def _theirs(mujoco: ModuleType, sysid: ModuleType, fitted: Recording, held_out: Recording) -> tuple[float, float]:

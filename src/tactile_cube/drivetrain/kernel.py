@@ -39,6 +39,7 @@ class Kernel:
         rollout_batch: (commands (S, L, n), which (B,), lengths (S,), H, substeps, memory (B, size), rows (R,),
             out (B, T, R, n)).
         segments_batch: as rollout_batch, started anew from measured states every `segment` rows (multiple shooting).
+        starts_batch: puts each memory where segments_batch begins.
     """
 
     def __init__(self, topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> None:
@@ -48,6 +49,7 @@ class Kernel:
         self.rollout: Callable[..., None] = self._module.rollout
         self.rollout_batch: Callable[..., None] = self._module.rollout_batch
         self.segments_batch: Callable[..., None] = self._module.segments_batch
+        self.starts_batch: Callable[..., None] = self._module.starts_batch
 
     @cached_property
     def _callback(self) -> tuple[object, int]:

@@ -11,14 +11,10 @@ import numpy as np
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
-from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.fitting.noise import sensor_noise
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
-from tactile_cube.identification.free_run import free_run, free_run_error
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import Judgement, judge
 from tactile_cube.identification.search.explanation import Explanation
@@ -26,10 +22,13 @@ from tactile_cube.identification.search.residual_shape import Shape, black_box, 
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
 from tactile_cube.identification.verdict import Questions, Verdict, decide, unexplained_joints
-from tactile_cube.measurement.comparing.error import ErrorSummary
+from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.rig_replay import Engine
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import Engine, free_run
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part
 
 SHOWN_SHAPES = 6

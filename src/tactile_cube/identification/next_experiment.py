@@ -19,12 +19,13 @@ from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
-from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import FINER, finer
+from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 FILE = "next_experiment.csv"

@@ -10,8 +10,8 @@ import numpy as np
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
 from tactile_cube.identification.fitting.intervals import Fitted, bounds
-from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term
 
 UNITS = {
     "kp": "N m/rad",

@@ -8,7 +8,7 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
-from tactile_cube.measurement.replay.parameters import nominal_parameters
+from tactile_cube.measurement.replay.nominal import nominal_model
 from tests.measurement.replay.test_hand_replay import source
 
 STATED, SLIPPERY = Contact({}), Contact({"spinning_friction": {"radius": 0.01}})
@@ -25,7 +25,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 @pytest.fixture(scope="module")
 def replay(recording: Recording) -> HandReplay:
-    return HandReplay(recording, nominal_parameters(recording, None))
+    return HandReplay(recording, nominal_model(recording))
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,9 @@
 import numpy as np
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.identification.fitting.model import Model, Unknown, put_all, read_all
+from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns
+from tactile_cube.measurement.replay.model import Model
 
 PLAIN = Model({"kd": np.array([0.2, 0.3])}, (), {0: np.zeros(2), 1: np.zeros(2)})
 

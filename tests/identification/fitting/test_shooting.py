@@ -10,15 +10,15 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.drivetrain.effects.backlash import Backlash
 from tactile_cube.drivetrain.effects.command_delay import CommandDelay
-from tactile_cube.identification.fitting.base import nominal_model
 from tactile_cube.identification.fitting.initial_states import with_initial_states
-from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import Windows, cut
-from tactile_cube.identification.free_run import free_run
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import free_run
+from tactile_cube.measurement.replay.windows import Windows, cut
 from tests.measurement.small_rig import write
 
 GAP = 0.03
@@ -40,7 +40,7 @@ def with_gap(recording: Recording) -> Model:
 
 def measured(recording: Recording, model: Model) -> Recording:
     """The recording as a fine free-running simulation would have logged it."""
-    (result,) = free_run(recording, model, "fast", 5e-4)
+    (result,) = free_run(recording, model, step=5e-4)
     return recording.with_trials((replace(recording.trials[0], position=result.position),))
 
 
@@ -59,8 +59,12 @@ def test_a_delayed_jump_is_felt_when_it_acts_and_not_at_the_row(recording: Recor
     model = replace(plain, terms=tuple(Term(CommandDelay, joint, {"delay": delay}, ("delay",)) for joint in "ab"))
     logged = measured(recording, model)
     windows = cut(logged, NOISE)
-    error = (Shooting(logged, EFFECTS).positions([model], windows)[0] - windows.measured)[windows.weight > 0.0]
-    assert np.sqrt(np.mean(error**2)) < 4e-4, "a delay that is no whole number of rows leaves no more than one that is"
+    error = Shooting(logged, EFFECTS).positions([model], windows)[0] - windows.measured
+    later = windows.weight > 0.0
+    later[:, : windows.segment] = False  # the trial begins with a speed that its first rows hardly show
+    assert np.sqrt(np.mean(error[later] ** 2)) < 2e-4, (
+        "a delay that is no whole number of rows leaves no more than one that is"
+    )
 
 
 def hidden_start(recording: Recording, place: float) -> tuple[Shooting, Model, Windows]:
@@ -108,8 +112,8 @@ def test_a_simulation_that_runs_away_swamps_no_other(recording: Recording) -> No
     class Away(Shooting):
         """Its first simulation ends nowhere, its second one far off."""
 
-        def _simulate(self, *given: Any) -> Any:
-            out = super()._simulate(*given)
+        def simulate(self, *given: Any, **more: Any) -> Any:
+            out = super().simulate(*given, **more)
             out[0], out[1] = np.nan, 1e200
             return out
 

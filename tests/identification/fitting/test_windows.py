@@ -4,10 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.identification.fitting.noise import sensor_noise
-from tactile_cube.identification.fitting.windows import Drive, _half_width, _states, cut, steps_per_row
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.windows import Drive, _half_width, _states, cut, steps_per_row
 from tests.measurement.small_rig import write
 
 

@@ -3,9 +3,9 @@
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.other_starts import other_starts
+from tactile_cube.measurement.replay.model import Model
 
 
 def fitted(name: str, joints: tuple[str, ...] = ("q2",), form: int = 0) -> tuple[Candidate, Model]:

@@ -7,12 +7,12 @@ import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.effects.scales import FINGER
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, candidates, forms
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.relatives import special_cases, with_details
 from tactile_cube.identification.search.search import Search
+from tactile_cube.measurement.replay.model import Model
 from tests.identification.test_verdict import FIT, judged
 
 KNOWN = candidates({"q2": FINGER}, list(catalogue().values()))

@@ -6,7 +6,6 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, p_value
@@ -14,6 +13,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.search import Search, pursued
 from tactile_cube.identification.search.shortlist import of_each, with_groups
+from tactile_cube.measurement.replay.model import Model
 from tests.identification.test_verdict import explanation, findings, judged
 
 FIT = SimpleNamespace(cost=0.0, model=None)  # stands for a fit: the choice goes by order alone

@@ -6,9 +6,9 @@ import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.drivetrain.effects.scales import FINGER
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.shared_offset import common_offsets, shared_offset
+from tactile_cube.measurement.replay.model import Model
 from tests.identification.test_verdict import FIT, judged
 
 SIZES = {"q1": FINGER, "q2": FINGER}

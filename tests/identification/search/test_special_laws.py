@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
-from tactile_cube.identification.fitting.model import Term
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.position_profile import PROFILE
 from tactile_cube.identification.search.special_laws import special_candidates
+from tactile_cube.measurement.replay.model import Term
 
 EFFECT = find_effect("position_torque")
 FORM = next(form for form in forms(EFFECT) if PROFILE in form)

@@ -8,13 +8,13 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, all_of
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.subsets import Columns, best_subsets, possible
 from tactile_cube.identification.search.together import Proposal, Together
+from tactile_cube.measurement.replay.model import Model, Term
 from tests.identification.test_verdict import FIT, MODEL, judged
 
 

@@ -41,7 +41,7 @@ def test_there_is_a_sentence_for_each_joint(comparison: Comparison) -> None:
     assert sorted(line[0] for line in comparison.sentences) == ["a", "b"]
 
 
-@pytest.mark.parametrize(("noise", "step", "used"), [(2e-4, None, 0.002), (1e-6, None, 0.00025), (1e-6, 0.002, 0.002)])
+@pytest.mark.parametrize(("noise", "step", "used"), [(4e-4, None, 0.002), (1e-6, None, 0.00025), (1e-6, 0.002, 0.002)])
 def test_steps_are_shorter_where_the_sensors_would_show_their_error(
     noise: float, step: float | None, used: float, tmp_path: Path
 ) -> None:

@@ -6,8 +6,8 @@ import pytest
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import nominal_parameters
-from tactile_cube.measurement.replay.rig_replay import replay
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import free_run
 from tests.measurement.small_rig import write
 
 
@@ -21,7 +21,7 @@ def recording(folder: Path, rate: float | None) -> Recording:
 
 def simulated(folder: Path, rate: float | None, step: float) -> np.ndarray:
     one = recording(folder, rate)
-    return np.concatenate([trial.position for trial in replay(one, nominal_parameters(one, None), "fast", step)])
+    return np.concatenate([trial.position for trial in free_run(one, nominal_model(one), step=step)])
 
 
 def test_the_law_runs_at_the_controllers_rate_whatever_the_simulations_step(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, contact_of
-from tactile_cube.measurement.replay.parameters import nominal_parameters
-from tactile_cube.measurement.replay.rig_replay import Replay
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.simulated_grasp import SimulatedGrasp
 
 TRUTH = Contact({"lateral_friction": {"coefficient": 0.5}})
@@ -46,7 +46,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 @pytest.fixture(scope="module")
 def replay(recording: Recording) -> HandReplay:
-    return HandReplay(recording, nominal_parameters(recording, None))
+    return HandReplay(recording, nominal_model(recording))
 
 
 def error(replay: HandReplay, recording: Recording, contact: Contact) -> float:
@@ -133,7 +133,7 @@ def test_free_motion_and_a_held_load_come_from_one_hand(tmp_path: Path) -> None:
     assert [(trial.kind, trial.load is not None) for trial in both.trials] == [("multisine", False), ("hold", True)]
     assert has_free_motion(both)
     (free,) = without_touches(both).trials
-    simulated = Replay(both).simulate([free], nominal_parameters(both, None))[0]
+    ((simulated,),) = Simulator(both).free_runs([nominal_model(both)], [free])
     error = np.sqrt(np.mean((simulated.position - free.position) ** 2, axis=0))
     ring = [both.joints.index(f"ring_q{k}") for k in (1, 2, 3)]
     assert error[ring[1]] > 8e-3, "the hidden effect"

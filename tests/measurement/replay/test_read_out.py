@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.replay.read_out import free_way, half_jumps, impulses, read_out
+from tactile_cube.measurement.replay.read_out import free_way, read_out
 
 
 def test_the_next_command_is_not_felt_yet() -> None:
@@ -33,12 +33,3 @@ def test_a_motor_follows_the_command_freely_as_far_as_the_gap_goes(lead: float, 
     assert free_way(np.array([lead]), np.array([jump]), np.array([0.02])) == pytest.approx(free)
     read, torque = read_out(np.zeros((1, 1)), np.zeros((1, 1)), jump, (0.1, 2.0), 1.0, free)  # type: ignore[arg-type]
     assert (read[0, 0], torque[0, 0]) == pytest.approx((-free - 0.1 * (jump - free), -2.0 * (jump - free)))
-
-
-@pytest.mark.parametrize("substeps", [2, 5])
-def test_the_first_step_of_a_row_takes_the_mean_of_two_commands(substeps: int) -> None:
-    command = np.array([[0.0], [1.0], [3.0]])
-    fine = impulses(command, substeps)
-    assert fine[::substeps, 0].tolist() == [0.0, 0.5, 2.0]
-    assert fine[1::substeps, 0].tolist() == [0.0, 1.0, 3.0]
-    assert half_jumps(fine, substeps)[:, 0].tolist() == [0.0, 0.5, 1.0]

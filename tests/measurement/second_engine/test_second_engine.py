@@ -1,5 +1,6 @@
 """A finger that MuJoCo moved (make.py, true constants stated) against free runs of both of the package's engines."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,8 @@ import pytest
 
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import nominal_parameters
-from tactile_cube.measurement.replay.rig_replay import Engine, replay
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import Engine, free_run
 
 BOUND = 2e-4  # [rad] RMS of each joint in each trial
 TORQUE_BOUND = 5e-3  # [N m]
@@ -21,11 +22,12 @@ def recording() -> Recording:
 
 def errors(recording: Recording, engine: Engine, step: float, **changed: float) -> np.ndarray:
     """RMS (trials, 2, joints) of position [rad] and torque [N m] with constants multiplied by factors."""
-    parameters = nominal_parameters(recording, None)
-    for name, factor in changed.items():
-        parameters.constants[name] = factor * parameters.constants[name]
+    nominal = nominal_model(recording)
+    constants = {name: changed.get(name, 1.0) * value for name, value in nominal.constants.items()}
     rows = []
-    for trial, run in zip(recording.trials, replay(recording, parameters, engine, step), strict=True):
+    for trial, run in zip(
+        recording.trials, free_run(recording, replace(nominal, constants=constants), engine, step), strict=True
+    ):
         assert trial.torque is not None
         pairs = (run.position - trial.position, run.torque - trial.torque)
         rows.append([np.sqrt(np.square(difference).mean(axis=0)) for difference in pairs])

@@ -15,7 +15,7 @@ from numba import cfunc, types
 from tactile_cube.compiled import borrowed, compiled, compiled_once
 
 from .engine_step import control
-from .free_step import free_step, roll, roll_segments
+from .free_step import free_step, roll, roll_segments, start_window
 from .plant import C, N
 
 Array = npt.NDArray[np.float64]
@@ -92,6 +92,15 @@ def segments_batch(
             rows,
             out[b],
         )
+
+
+@compiled_once
+def starts_batch(
+    commands: Array, history: int, position: Array, speed: Array, initial_state: Array, memory: Array
+) -> None:
+    """Each block where `segments_batch` begins its first segment, from `position` and `speed` (S, C n)."""
+    for b in range(len(memory)):
+        start_window(commands[b], history, position[b], speed[b], initial_state[b], borrowed(memory[b]))
 
 
 @compiled

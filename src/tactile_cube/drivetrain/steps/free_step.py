@@ -133,6 +133,18 @@ def move(by: Array, memory: Array) -> None:
 
 
 @compiled
+def start_first(
+    command: Array, position: Array, speed: Array, initial_state: Array, free: Array, trial: Array, memory: Array
+) -> None:
+    """The first start of a window, moved by its `initial_state`; the torque there is a guess at first."""
+    for _ in range(4):
+        trial[:] = memory
+        free_step(command, trial)
+        start_segment(position, speed, free, trial, memory)
+    move(initial_state, memory)
+
+
+@compiled
 def roll_segments(
     commands: Array,
     length: int,
@@ -156,16 +168,25 @@ def roll_segments(
     for k in range(history + length):
         if k >= history and (k - history) % segment == 0:
             part = (k - history) // segment
-            if part > 0:
+            if part == 0:
+                start_first(commands[k], position[0], speed[0], initial_state, free, trial, memory)
+            else:
                 look_ahead(commands[k : k + around], memory, trial, free)
-            for _ in range(4 if part == 0 else 1):  # the first start's torque is a guess at first
                 trial[:] = memory
                 free_step(commands[k], trial)
                 start_segment(position[part], speed[part], free, trial, memory)
-            if part == 0:
-                move(initial_state, memory)
             move(correction, memory)
             free[:] = 0.0
         elif (k - history) % segment >= segment - around:
             note_free(memory, free)
         row_of_steps(k, commands[k], history, substeps, memory, rows, out)
+
+
+@compiled
+def start_window(
+    commands: Array, history: int, position: Array, speed: Array, initial_state: Array, memory: Array
+) -> None:
+    """Plays the history (rows of `commands`) and puts the joints to the start of the row after it."""
+    for k in range(history):
+        advance_commands(commands[k], memory)
+    start_first(commands[history], position, speed, initial_state, np.zeros(C * n), memory.copy(), memory)

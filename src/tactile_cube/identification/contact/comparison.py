@@ -13,8 +13,8 @@ from tactile_cube.measurement.comparing.comparison import Comparison, describe
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import HandReplay, contact_of
-from tactile_cube.measurement.replay.parameters import nominal_parameters, require_same_joints
-from tactile_cube.measurement.replay.rig_replay import Simulated
+from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.simulator import Simulated
 
 
 def compare_contact(
@@ -33,7 +33,7 @@ def compare_contact(
     held = with_object(recording)
     if model is not None:
         require_same_joints(held, model)
-    replay, contact = HandReplay(held, nominal_parameters(held, model), step), contact_of(model)
+    replay, contact = HandReplay(held, nominal_model(held, model), step), contact_of(model)
     simulated = []
     try:
         for number, trial in enumerate(held.trials, start=1):

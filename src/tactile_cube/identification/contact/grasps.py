@@ -11,10 +11,10 @@ import numpy as np
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.contact.trial import SIGMA, ContactTrial
 from tactile_cube.measurement.bench import with_object
-from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, contact_of
-from tactile_cube.measurement.replay.parameters import nominal_parameters
+from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.split import held_out_split
 
 
@@ -49,7 +49,7 @@ def open_grasps(recording: Recording, model: ModelFile | None, step: float, seed
     """
     held = with_object(recording)
     fitted, held_out = held_out_split(held, seed=seed)
-    replay = HandReplay(held, nominal_parameters(held, model), step)
+    replay = HandReplay(held, nominal_model(held, model), step)
     try:
         yield Grasps(
             joints=tuple(held.joints),

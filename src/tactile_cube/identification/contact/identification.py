@@ -20,7 +20,7 @@ from tactile_cube.measurement.comparing.error import ErrorSummary, summarise
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import Contact
-from tactile_cube.measurement.replay.parameters import CONTROLLER, nominal_parameters
+from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
 
 
@@ -95,7 +95,7 @@ def contact_effects(names: Sequence[str], recording: Recording) -> list[type[Con
 
 def stated_model(recording: Recording, command: str, seed: int) -> ModelFile:
     """What recording.yaml says of the drivetrain, as a model without intervals; it is silent where the recording is."""
-    every = nominal_parameters(recording, None).constants
+    every = nominal_model(recording).constants
     constants = {key: row for key, row in every.items() if key in (*CONTROLLER, *recording.nominal)}
     values = {
         key: {

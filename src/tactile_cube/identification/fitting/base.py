@@ -1,4 +1,4 @@
-"""The model that a rig's owner already has, and how far its constants may be from what he believes."""
+"""How far a rig's constants may be from what its owner believes."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.scales import Scales
-from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
-from tactile_cube.identification.fitting.model import Model, Term, Unknown
+from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.measurement.comparing.joint_offsets import LARGEST_OFFSET
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import nominal_parameters
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 TOLERANCE = {
@@ -30,36 +28,9 @@ OFFSET, OFFSET_SPREAD = 0.05, 0.01  # [rad] of a finger
 CREEP, CREEP_SPREAD, LARGEST_CREEP = 0.05, 0.1, 1.0  # [rad/s per N m] where friction is regularised
 
 
-def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model:
-    """What the recording's owner states, or what is known since; of effects, numbers with an interval are free.
-
-    They are expected where they were found, and twice as far from there as the interval says: a machine changes between
-    two recordings. Else what was found on one would soak up what is new in another.
-    """
-    constants = nominal_parameters(recording, known).constants
-    terms = tuple(term for one in (known.drive_effects if known else ()) for term in _terms(one, recording))
-    return Model(
-        constants, terms, {trial.initialisation: np.zeros(len(recording.joints)) for trial in recording.trials}
-    )
-
-
 def every_effect(effects: Sequence[type[Effect]], start: Model) -> tuple[type[Effect], ...]:
     """The classes to compile: those to try, and those of the model to begin with."""
     return tuple(dict.fromkeys([*effects, *(term.effect for term in start.terms)]))
-
-
-def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:
-    given = {name: estimate.value for name, estimate in one.parameters.items()}
-    free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
-    expected = {name: (one.parameters[name].value, _half_width(one.parameters[name])) for name in free}
-    return [
-        Term(effect, joint, effect(joint, **given).values, free, expected)
-        for effect, joint in resolve([one.effect], recording.joints)
-    ]
-
-
-def _half_width(estimate: Estimate) -> float:
-    return 0.5 * (estimate.high - estimate.low)
 
 
 def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:

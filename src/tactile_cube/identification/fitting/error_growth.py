@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import Windows
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.windows import Windows
 
 GROWN = 3.0  # squared, an order of magnitude: from there on few unstable segments outweigh all stable ones
 MOSTLY = 0.9  # quantile over the segments: one that tips over is no reason to cut all of them

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.model import Model, Unknown, put_all, read_all
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
 from tactile_cube.measurement.comparing.joint_offsets import CORRELATED
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 DAMPING = 1e-4  # of a first step, in units of the information

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import Windows
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
 PLACES = 17  # within the gap: the time of landing depends on them

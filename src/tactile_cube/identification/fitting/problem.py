@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.initial_states import with_initial_states
-from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import Windows
+from tactile_cube.identification.fitting.unknowns import Unknown
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
 START_POSITION = 1e-3  # [rad] of a finger, as all sizes here: how well a segment's start is known beforehand

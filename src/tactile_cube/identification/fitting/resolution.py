@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.identification.fitting.base import base_unknowns, every_effect, nominal_model
-from tactile_cube.identification.fitting.model import Model
-from tactile_cube.identification.fitting.noise import sensor_noise
+from tactile_cube.identification.fitting.base import base_unknowns, every_effect
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import finer, spread
-from tactile_cube.identification.fitting.windows import steps_per_row
-from tactile_cube.identification.joint_scales import joint_scales
+from tactile_cube.measurement.joint_scales import joint_scales
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.windows import steps_per_row
 
 Array = NDArray[np.float64]
 FINEST = 8  # times as short steps at most where no rate is stated: so much longer does a diagnosis take

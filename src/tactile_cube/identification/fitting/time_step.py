@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, full_step
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.windows import Windows
+from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
 FINER = 8  # times as short are the steps that show what the model's own ones do: 0.25 ms beside 2 ms
@@ -44,7 +44,7 @@ def finer(windows: Windows, times: int) -> Windows:
     rows = windows.commands.reshape(count, -1, windows.substeps, joints)
     held = rows[:, :, -1:].copy()
     if windows.substeps == 1:
-        held[:, windows.history :, 0] += windows.jump if windows.read_after else -windows.jump
+        held[:, windows.history :, 0] += windows.jump
     fine = windows.substeps * times
     commands = np.concatenate([rows[:, :, :1], np.repeat(held, fine - 1, axis=2)], axis=2)
     return replace(windows, commands=commands.reshape(count, -1, joints), substeps=fine)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect, Parameter
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales
-from tactile_cube.identification.fitting.model import Model, Term, Unknown
+from tactile_cube.identification.fitting.unknowns import Unknown
+from tactile_cube.measurement.replay.model import Model, Term
 
 Array = NDArray[np.float64]
 EffectClass = type[Effect]

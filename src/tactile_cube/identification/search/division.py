@@ -6,16 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.identification.fitting.base import base_unknowns, nominal_model
+from tactile_cube.identification.fitting.base import base_unknowns
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
-from tactile_cube.identification.fitting.model import Model, Unknown
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.windows import Windows
+from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.identification.search.candidates import Candidate, model_unknowns
 from tactile_cube.identification.search.evidence import Judgement, judge
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
 BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before

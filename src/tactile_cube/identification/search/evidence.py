@@ -12,10 +12,10 @@ from scipy.stats import wilcoxon
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import fit
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.measurement.comparing.joint_offsets import CORRELATED
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 TRIALS = 1_000_000  # more than any part has: tells those of several parts apart

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.evidence import Judgement
+from tactile_cube.measurement.replay.model import Model
 
 NEARLY = 1.5  # the same of a fit before everything is free
 

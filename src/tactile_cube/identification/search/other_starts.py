@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import product
 
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.measurement.replay.model import Model
 
 FACTORS = {1: (0.35, 0.5, 0.7, 1.4, 2.0, 3.0), 2: (0.5, 0.7, 1.0, 1.4, 2.0), 3: (0.6, 1.0, 1.6)}
 """Of each number, by how many numbers there are."""

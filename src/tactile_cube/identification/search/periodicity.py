@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.candidates import Candidate, Sizes, forms
 from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from tactile_cube.drivetrain.effects.scales import FINGER
-from tactile_cube.identification.fitting.model import Model, Unknown
+from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.identification.search.candidates import Candidate, term_unknowns
 from tactile_cube.identification.search.explanation import first_term
+from tactile_cube.measurement.replay.model import Model
 
 
 def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, tuple[Unknown, ...]] | None:

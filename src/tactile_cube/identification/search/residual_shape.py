@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 BINS = 24

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, noise_inflation, precision
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 

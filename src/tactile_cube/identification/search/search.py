@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.base import every_effect, nominal_model
+from tactile_cube.identification.fitting.base import every_effect
 from tactile_cube.identification.fitting.error_growth import steady_rows
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.shooting import Shooting
@@ -30,6 +30,7 @@ from tactile_cube.identification.search.special_laws import special_candidates
 from tactile_cube.identification.search.together import Proposal, Together
 from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.nominal import nominal_model
 
 Array = NDArray[np.float64]
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
 from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.identification.fitting.model import Model, Term
 from tactile_cube.identification.search.candidates import Candidate, Sizes
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term
 
 Array = NDArray[np.float64]
 LEAST = 0.012  # [rad] of a finger: joint offsets below this are ordinary

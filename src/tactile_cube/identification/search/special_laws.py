@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.scales import FINGER
-from tactile_cube.identification.fitting.model import Term
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.periodicity import HARMONIC, LOWEST, waves_of
 from tactile_cube.identification.search.position_profile import PROFILE, profile_of
+from tactile_cube.measurement.replay.model import Term
 
 Array = NDArray[np.float64]
 POINTS = 120  # of the profile that are compared

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.model import Model
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.division import BRIEF, Division
 from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
@@ -17,6 +16,7 @@ from tactile_cube.identification.search.relatives import special_cases
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.simplicity import named_by
 from tactile_cube.identification.search.subsets import best_subsets, candidate_columns
+from tactile_cube.measurement.replay.model import Model
 
 if TYPE_CHECKING:
     from tactile_cube.identification.search.search import Search

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import draw_parameters
-from tactile_cube.measurement.replay.rig_replay import Replay, effect_names
+from tactile_cube.measurement.replay.nominal import draw_model
+from tactile_cube.measurement.replay.simulator import Simulator
 
 Array = NDArray[np.float64]
 COVER = 0.95  # of the simulations lie in the band
@@ -40,12 +40,12 @@ def simulate_band(
 ) -> Band:
     """Draw `simulations` sets of constants and simulate every trial with each."""
     rng = np.random.default_rng(seed)
-    simulator = Replay(recording, effect_names(model), step)
-    draws = [draw_parameters(recording, model, spread, rng) for _ in range(simulations)]
+    draws = [draw_model(recording, model, spread, rng) for _ in range(simulations)]
+    simulator = Simulator(recording, [term.effect for term in draws[0].terms], step)
     noise = 1.96 * sensor_noise(recording)
     low, high, inside = [], [], []
     for trial in recording.trials:
-        ensemble = np.stack([simulator.simulate([trial], draw)[0].position for draw in draws])
+        ensemble = np.stack([run[0].position for run in simulator.free_runs(draws, [trial])])
         bottom, top = np.quantile(ensemble, [(1 - COVER) / 2, (1 + COVER) / 2], axis=0)
         low.append(bottom - noise)
         high.append(top + noise)

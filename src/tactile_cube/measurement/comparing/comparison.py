@@ -12,13 +12,15 @@ from tactile_cube.measurement.comparing.band import Band, simulate_band
 from tactile_cube.measurement.comparing.error import ErrorSummary, residuals, summarise
 from tactile_cube.measurement.comparing.failing_intervals import FailingInterval, failing_intervals
 from tactile_cube.measurement.comparing.in_words import where_it_fails
-from tactile_cube.measurement.comparing.joint_offsets import fitted_offsets, no_offsets, replay_each
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
+from tactile_cube.measurement.comparing.joint_offsets import with_fitted_offsets
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
 from tactile_cube.measurement.comparing.regimes import Regime, regimes
 from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import nominal_parameters, require_same_joints
-from tactile_cube.measurement.replay.rig_replay import Engine, Simulated
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.simulator import Engine, Simulated, Simulator, free_run
 
 Array = NDArray[np.float64]
 AT_THE_FLOOR = 1.3  # error over floor and time step up to which a model is as good as they can tell
@@ -101,16 +103,17 @@ def compare(
     if model is not None:
         require_same_joints(recording, model)
     used = USUAL_STEP if step is None else step
-    parameters = nominal_parameters(recording, model)
 
-    def simulated_at(step: float) -> tuple[list[Simulated], dict[int, Array]]:
-        offsets = fitted_offsets(recording, parameters, step) if model is not None else no_offsets(recording)
-        return replay_each(recording, parameters, offsets, engine, step), offsets
+    def simulated_at(step: float) -> tuple[list[Simulated], Model]:
+        used = nominal_model(recording, model)
+        if model is not None:
+            used = with_fitted_offsets(Simulator(recording, [term.effect for term in used.terms], step), used)
+        return free_run(recording, used, engine, step), used
 
-    simulated, offsets = simulated_at(used)
+    simulated, fitted = simulated_at(used)
     band = simulate_band(recording, model, simulations, spread or {}, used, seed) if simulations else None
     if floor is None or step is None:
-        fine = replay_each(recording, parameters, offsets, "fast", used / FINER)
+        fine = free_run(recording, fitted, "fast", used / FINER)
         left = summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
         if step is None and engine == "fast" and _shown(recording, left):
             used, left = used / FINER, left.times(1.0 / (FINER - 1))  # errors of the step are of first order

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.simulator import Simulated
 
 Array = NDArray[np.float64]
 
@@ -53,6 +55,11 @@ def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array
         np.where(trial.valid[:, None], trial.position - positions - offsets[trial.initialisation], np.nan)
         for trial, positions in zip(trials, simulated, strict=True)
     ]
+
+
+def free_run_error(recording: Recording, simulated: Sequence[Simulated]) -> ErrorSummary:
+    """RMS error [rad] of a recording's trials simulated freely."""
+    return summarise(residuals(recording.trials, [one.position for one in simulated]), recording.joints)
 
 
 def summarise(errors: Sequence[Array], joints: Sequence[str]) -> ErrorSummary:

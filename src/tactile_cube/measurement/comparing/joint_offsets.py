@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tactile_cube.measurement.comparing.error import residuals
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.parameters import Parameters
-from tactile_cube.measurement.replay.rig_replay import Engine, Simulated, replay
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.simulator import Simulator
 
 Array = NDArray[np.float64]
 SPREAD = 0.03  # [rad] standard deviation of a joint offset. Source: Sievers et al., ICRA 2022: up to 3 deg
@@ -22,42 +22,27 @@ LARGEST_STEP = 0.02  # [rad] the simulation is far from linear where joints stic
 CORRELATED = 50.0  # samples that the error of a wrong model counts as one
 
 
-def replay_each(
-    recording: Recording, parameters: Parameters, offsets: Mapping[int, Array], engine: Engine, step: float
-) -> list[Simulated]:
-    """Every trial simulated freely, those of one initialisation with its offset (joints,) [rad]."""
-    simulated: dict[int, Simulated] = {}
-    for initialisation, offset in offsets.items():
-        chosen = [k for k, trial in enumerate(recording.trials) if trial.initialisation == initialisation]
-        if chosen:
-            part = recording.with_trials([recording.trials[k] for k in chosen])
-            simulated |= zip(chosen, replay(part, replace(parameters, offset=offset), engine, step), strict=True)
-    return [simulated[k] for k in range(len(recording.trials))]
-
-
-def no_offsets(recording: Recording) -> dict[int, Array]:
-    """No joint offset in any initialisation."""
-    return {trial.initialisation: np.zeros(len(recording.joints)) for trial in recording.trials}
-
-
-def fitted_offsets(recording: Recording, parameters: Parameters, step: float) -> dict[int, Array]:
-    """True minus measured angle (joints,) [rad] of each initialisation, by which a model follows its trials best.
+def with_fitted_offsets(simulator: Simulator, model: Model) -> Model:
+    """The model with the joint offsets of each initialisation by which it follows its trials best, from none at all.
 
     An offset does more than shift the reading: gravity and all that depends on the angle act elsewhere.
     """
-    offsets = no_offsets(recording)
+    recording = simulator.recording
+    model = replace(model, offsets={key: np.zeros_like(value) for key, value in model.offsets.items()})
     for _ in range(ITERATIONS):
-        left = _errors(recording, parameters, offsets, step)
-        columns = []
-        for joint in range(len(recording.joints)):
-            moved = {key: value + DIFFERENCE * _unit(joint, len(value)) for key, value in offsets.items()}
-            changed = _errors(recording, parameters, moved, step)
-            columns.append([(a - b) / DIFFERENCE for a, b in zip(left, changed, strict=True)])
-        tried = {key: _step(recording, key, value, left, columns) for key, value in offsets.items()}
-        changed = _errors(recording, parameters, tried, step)
-        better = {key: _size(recording, key, changed) < _size(recording, key, left) for key in offsets}
-        offsets = {key: tried[key] if better[key] else value for key, value in offsets.items()}
-    return offsets
+        moved = [_moved(model, joint) for joint in range(len(recording.joints))]
+        left, *changed = _errors(simulator, [model, *moved])
+        columns = [[(a - b) / DIFFERENCE for a, b in zip(left, one, strict=True)] for one in changed]
+        tried = {key: _step(recording, key, value, left, columns) for key, value in model.offsets.items()}
+        (after,) = _errors(simulator, [replace(model, offsets=tried)])
+        better = {key: _size(recording, key, after) < _size(recording, key, left) for key in tried}
+        model = replace(model, offsets={key: tried[key] if better[key] else model.offsets[key] for key in tried})
+    return model
+
+
+def _moved(model: Model, joint: int) -> Model:
+    unit = np.eye(len(model.constants["kp"]))[joint]
+    return replace(model, offsets={key: value + DIFFERENCE * unit for key, value in model.offsets.items()})
 
 
 def _step(
@@ -81,10 +66,9 @@ def _size(recording: Recording, initialisation: int, errors: list[Array]) -> flo
     return float(np.sum(_stacked(recording, initialisation, errors) ** 2))
 
 
-def _errors(recording: Recording, parameters: Parameters, offsets: Mapping[int, Array], step: float) -> list[Array]:
-    simulated = replay_each(recording, parameters, offsets, "fast", step)
-    return [np.nan_to_num(one) for one in residuals(recording.trials, [s.position for s in simulated])]
-
-
-def _unit(joint: int, joints: int) -> Array:
-    return np.asarray(np.eye(joints)[joint])
+def _errors(simulator: Simulator, models: Sequence[Model]) -> list[list[Array]]:
+    trials = simulator.recording.trials
+    return [
+        [np.nan_to_num(one) for one in residuals(trials, [simulated.position for simulated in runs])]
+        for runs in simulator.free_runs(models)
+    ]

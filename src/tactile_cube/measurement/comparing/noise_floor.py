@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.repeats import aligned_repeats
+from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
 
 Array = NDArray[np.float64]
 LEAST = 1e-6  # [rad] no sensor is better; keeps the ratio of error to floor finite
-SMOOTHING = 0.05  # [s] a position that changes faster than this is taken for noise where nothing was repeated
 
 
 @dataclass(frozen=True)
@@ -72,22 +71,3 @@ def _scatter(groups: list[list[Array]]) -> Array:
         total += np.nansum(deviation**2, axis=(0, 1))
         freedom += np.isfinite(deviation[0]).sum(axis=0) * (len(group) - 1)
     return np.asarray(total / freedom)
-
-
-def sensor_noise(recording: Recording) -> Array:
-    """Noise (joints,) [rad] of the position: what is too fast to be motion, at least the sensor's own steps."""
-    fast = np.concatenate([_fast_part(trial)[trial.valid] for trial in recording.trials])
-    sensors = recording.description.sensors
-    least = sensors.position_resolution**2 / 12 + sensors.position_noise**2
-    return np.asarray(np.sqrt(np.maximum(np.median(np.abs(fast), axis=0) ** 2 / 0.6745**2, least)))
-
-
-def _fast_part(trial: Trial) -> Array:
-    """Position minus a sliding parabola, scaled so that white noise keeps its variance."""
-    half = max(2, min(round(SMOOTHING / trial.step), (len(trial.time) - 1) // 2))
-    lever = np.arange(-half, half + 1, dtype=np.float64)
-    basis = np.stack([np.ones_like(lever), lever, lever**2], axis=1)
-    weights = (basis @ np.linalg.pinv(basis))[half]
-    padded = np.pad(trial.position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
-    smooth = np.stack([np.convolve(column, weights, mode="valid") for column in padded.T], axis=1)
-    return np.asarray((trial.position - smooth) / np.sqrt(1 - weights[half]))

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.hand import rigid_body
 from tactile_cube.measurement.recordings.description import Coupling, Description
 from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Gains, Trial
@@ -104,6 +105,11 @@ class Recording:
         """What the owner states of a constant of one joint, or None."""
         values = getattr(self.gains, constant, self.nominal.get(constant))
         return None if values is None else float(values[self.joints.index(joint)])
+
+    def rigid_body(self) -> rigid_body.RigidBodyTree:
+        """The mechanism."""
+        coupled = {name: rigid_body.Coupling(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
+        return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
 
     def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Recording:
         """The same rig with these trials alone."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel
@@ -16,8 +15,8 @@ from tactile_cube.hand.model import JOINTS_PER_FINGER
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Load, Trial
-from tactile_cube.measurement.replay.parameters import Parameters
-from tactile_cube.measurement.replay.rig_replay import Simulated
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 from tactile_cube.simulation.contact_effects import contact_catalogue
 from tactile_cube.simulation.options import EngineName
@@ -69,7 +68,7 @@ class HandReplay:
     def __init__(
         self,
         recording: Recording,
-        parameters: Parameters,
+        model: Model,
         step: float = 0.002,
         iterations: int = 30,
         hand: HandModel = DLR_HAND2,
@@ -79,7 +78,7 @@ class HandReplay:
 
         Args:
             recording: of the whole hand.
-            parameters: constants and effects of the drivetrain; their offset is not used.
+            model: constants and effects of the drivetrain; its joint offsets are not used.
             step: longest physics step [s].
             iterations: of the contact solver.
             hand: the hand that was recorded.
@@ -93,15 +92,10 @@ class HandReplay:
         self._order = [recording.joints.index(name) for name in hand.joint_names]
         self._back = np.argsort(self._order)
         self.finger_of = self._back // JOINTS_PER_FINGER
-        self._parameters = parameters
+        self._model = model
         substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
         options = SimulationOptions(engine, recording.step / substeps, substeps, iterations)
-        effects = [
-            cls(joint, **values)
-            for name, values in self._parameters.effects
-            for cls, joint in resolve([name], recording.joints)
-        ]
-        self._world = World(hand, options, effects)
+        self._world = World(hand, options, [term.effect(term.joint, **term.values) for term in model.terms])
         self._nominal = self._constants()
 
     def close(self) -> None:
@@ -134,7 +128,7 @@ class HandReplay:
 
     def _constants(self) -> EpisodeConstants:
         """What is known of the drivetrain, as the world names it."""
-        own = {key: value[self._order] for key, value in self._parameters.constants.items()}
+        own = {key: value[self._order] for key, value in self._model.constants.items()}
         inertia, default = own["reflected_inertia"], EpisodeConstants().reflected_inertia
         gravity = self.hand.rotation @ self.recording.gravity
         strength = float(np.linalg.norm(gravity))

@@ -3,28 +3,30 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.measurement.replay.windows import Windows
+
 Array = NDArray[np.float64]
 
 
-def impulses(command: Array, substeps: int) -> Array:
-    """Commands (T, n) held from row to row, as the simulation's steps take them, (T * substeps, n).
+def simulated_jumps(acting: Array, windows: Windows) -> Array:
+    """Simulated command at each reading less the one that the log feels (S, K segment, n).
 
-    A step acts on the speeds like an impulse at its beginning; a held command acts from there on, half a step later.
-    The mean of the commands before and after the instant makes the simulation second order in its step.
+    Known exactly unless an effect changes the command on its way; then half the change across the reading, smoothed
+    where a row is one step.
+
+    Args:
+        acting: (S, K segment substeps, n) what acted in each step [rad].
+        windows: what was simulated.
     """
-    fine = np.repeat(command, substeps, axis=0)
-    fine[substeps::substeps] = 0.5 * (command[:-1] + command[1:])
-    return fine
-
-
-def half_jumps(acting: Array, substeps: int) -> Array:
-    """Half of the command's change (T, n) at the beginning of each row, from what acted in each step (T * substeps, n).
-
-    With one step a row only the mean of two neighbouring changes is known.
-    """
-    jumps = np.zeros_like(acting)
-    jumps[1:] = np.diff(acting, axis=0) * (1.0 if substeps > 1 else 0.5)
-    return np.asarray(jumps[::substeps])
+    first, fine = windows.history * windows.substeps, windows.substeps
+    if np.array_equal(acting, windows.commands[:, first:]):
+        return windows.jump
+    jumps = np.zeros_like(acting[:, ::fine])
+    if fine == 1:
+        jumps[:, 1:-1] = 0.25 * (acting[:, 2:] - acting[:, :-2])
+    else:
+        jumps[:, 1:] = 0.5 * (acting[:, fine + 1 :: fine] - acting[:, fine - 1 : -fine : fine])
+    return jumps
 
 
 def free_way(lead: Array, jump: Array, gap: Array) -> Array:
@@ -50,15 +52,15 @@ def read_out(
     """Position [rad] and torque [N m] under the command that a log's instant feels.
 
     Args:
-        position: (T, joints) simulated motor positions at the instants of reading [rad].
-        torque: (T, joints) [N m].
-        jump: (T, joints) the simulated command less the one that the log feels [rad].
-        ratios: (joints,) jump of position [1] and of torque [N m/rad] per jump of the command, see `jump_ratio`.
-        torque_limit: (joints,) [N m]; a torque at its limit does not jump.
-        free: (T, joints) the part of the jump that the motor follows without torque [rad], see `free_way`.
+        position: (..., joints) simulated motor positions at the instants of reading [rad].
+        torque: (..., joints) [N m].
+        jump: (..., joints) the simulated command less the one that the log feels [rad].
+        ratios: (..., joints) jump of position [1] and of torque [N m/rad] per jump of the command, see `jump_ratio`.
+        torque_limit: (..., joints) [N m]; a torque at its limit does not jump.
+        free: (..., joints) the part of the jump that the motor follows without torque [rad], see `free_way`.
 
     Returns:
-        position and torque, (T, joints): without the jump in torque and in the drive's deflection.
+        position and torque, (..., joints): without the jump in torque and in the drive's deflection.
     """
     felt = np.where(np.abs(torque) < 0.999 * torque_limit, jump - free, 0.0)
     return position - free - ratios[0] * felt, torque - ratios[1] * felt

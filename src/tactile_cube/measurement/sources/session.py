@@ -16,8 +16,8 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Gains, Trial
 from tactile_cube.measurement.recordings.writing import TrialTable
-from tactile_cube.measurement.replay.parameters import Parameters
-from tactile_cube.measurement.replay.rig_replay import Replay, Simulated
+from tactile_cube.measurement.replay.model import Model, Term, terms_of
+from tactile_cube.measurement.replay.simulator import Simulated, Simulator
 
 Array = NDArray[np.float64]
 OBSTACLE = 500.0  # [N m/rad] stiffness of what a link touches
@@ -72,21 +72,22 @@ class FreeSession:
     """
 
     sensors: Sensors
-    simulator: Replay
+    simulator: Simulator
     constants: dict[str, Array]
-    effects: tuple[tuple[str, dict[str, float]], ...]
+    effects: tuple[Term, ...]
     rng: np.random.Generator
 
     def play(self, entry: TrialEntry, command: Array, offset: Array) -> TrialTable:
         """Simulate one trial, settled at its first command before, and log it."""
         settle = round(SETTLING * self.sensors.rate)
-        trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), self.simulator.recording, entry)
-        effects = self.effects if entry.touch is None else (*self.effects, _obstacle(entry.touch))
-        parameters = Parameters(self.constants, effects, -offset)
-        result = self.simulator.simulate([trial], parameters)[0]
+        recording = self.simulator.recording
+        trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), recording, entry)
+        touched = terms_of([] if entry.touch is None else [_obstacle(entry.touch)], recording.joints)
+        model = Model(self.constants, (*self.effects, *touched), {trial.initialisation: -offset})
+        ((result,),) = self.simulator.free_runs([model], [trial])
         if entry.force is not None:  # a force pulls at the posture that it leads to
             trial = replace(trial, position=result.position)
-            result = self.simulator.simulate([trial], parameters)[0]
+            ((result,),) = self.simulator.free_runs([model], [trial])
         seen = Simulated(result.position[settle:], result.torque[settle:])
         return logged(entry, command, seen, self.sensors, self.rng)
 

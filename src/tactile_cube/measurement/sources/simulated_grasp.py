@@ -27,8 +27,8 @@ from tactile_cube.measurement.recordings.rig import parse_rig
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
-from tactile_cube.measurement.replay.parameters import Parameters
-from tactile_cube.measurement.replay.rig_replay import Replay
+from tactile_cube.measurement.replay.model import Model, terms_of
+from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.session import FreeSession, free_command, logged, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
@@ -138,12 +138,12 @@ class SimulatedGrasp:
         stated = dict(self.controller) | dict(self.nominal)
         constants = true_constants(stated, joints, self.true_spread, rng)
         hidden = [parse_effect(text, find_any_effect) for text in self.hidden]
-        drive = tuple(one for one in hidden if not is_contact_effect(one[0]))
+        drive = terms_of([one for one in hidden if not is_contact_effect(one[0])], joints)
         contact = Contact({name: values for name, values in hidden if is_contact_effect(name)})
         recording = unmeasured(description, parse_rig(urdf, Path("hand.urdf")), constants)
-        free = FreeSession(self, Replay(recording, [name for name, _ in drive], self.step), constants, drive, rng)
-        known = Parameters(constants, drive, np.zeros(len(joints)))
-        simulator = HandReplay(recording, known, self.step, engine=self.engine)
+        rig = Simulator(recording, [term.effect for term in drive], self.step)
+        free = FreeSession(self, rig, constants, drive, rng)
+        simulator = HandReplay(recording, Model(constants, drive, {}), self.step, engine=self.engine)
         return _Session(self, simulator, contact, free, rng)
 
 

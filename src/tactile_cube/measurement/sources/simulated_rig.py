@@ -14,7 +14,8 @@ from tactile_cube.measurement.bench import BENCH_KINDS, Bench, bench_trials
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig, read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables
-from tactile_cube.measurement.replay.rig_replay import Engine, Replay
+from tactile_cube.measurement.replay.model import terms_of
+from tactile_cube.measurement.replay.simulator import Engine, Simulator
 from tactile_cube.measurement.sources.session import FreeSession, free_command, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
 
@@ -73,15 +74,14 @@ class SimulatedRig:
         rng = np.random.default_rng(seed)
         rig = self._rig()
         description = self._description(rig)
-        effects = tuple(parse_effect(text) for text in self.hidden)
+        effects = terms_of([parse_effect(text) for text in self.hidden], tuple(description.joints))
         stated = dict(self.controller) | dict(self.nominal)
         constants = true_constants(stated, tuple(description.joints), self.true_spread, rng)
         offsets = rng.uniform(-self.offset, self.offset, (self.initialisations, len(description.joints)))
         commands = {kind: self._command(kind, rig, description, rng) for kind in self.kinds if kind not in BENCH_KINDS}
         fresh = {kind: self._command(kind, rig, description, rng) for kind in commands}
         rig_only = unmeasured(description, rig, constants)
-        stops = [f"joint_stop@{joint}" for joint in description.joints] if "touch" in self.kinds else []
-        simulator = Replay(rig_only, [*(name for name, _ in effects), *stops], self.step, self.engine)
+        simulator = Simulator(rig_only, [term.effect for term in effects], self.step, self.engine)
         session = FreeSession(self, simulator, constants, effects, rng)
         last = self.initialisations - 1
         repeated = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.parameters import TORQUE_MODE_GAIN
+from tactile_cube.measurement.replay.nominal import TORQUE_MODE_GAIN
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -22,6 +22,7 @@ SEGMENT = (
 WINDOW = 11  # segments simulated without a break, so that effects with a memory keep it
 LEAD = 1  # segments at the beginning of a window that only wake such memories, unless a trial begins there
 HISTORY = 8.0  # [s] of commands before a window at most, for effects that remember them, such as a rate limit
+WAKING = 0.15  # [s] of the first command before a free run, for effects with a memory
 LONGEST_STEP = 0.0021  # [s] of the simulation; of a finger, as all times here
 FEWEST = 4  # samples that a window needs
 ROWS = (
@@ -70,7 +71,6 @@ class Windows:
         history: H.
         segment: rows of a segment.
         substeps: simulation steps from row to row.
-        read_after: a row is read at the end of the period in which its command acts, not at its beginning.
     """
 
     commands: Array
@@ -91,7 +91,6 @@ class Windows:
     history: int
     segment: int
     substeps: int
-    read_after: bool
 
     @property
     def segments(self) -> int:
@@ -152,6 +151,42 @@ def cut(
         for k, trial in enumerate(trials)
         for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time, speed)
     ]
+    return _stacked(pieces, history, segment, steps_per_row(recording, time))
+
+
+def whole_trials(recording: Recording, trials: Sequence[Trial], substeps: int, time: float = 1.0) -> Windows:
+    """Each trial as a window of one segment, simulated freely from its measured start.
+
+    Shorter ones stand still at their last command until the longest one has ended.
+    """
+    longest = max(len(trial.time) for trial in trials)
+    history = round(WAKING / recording.step)
+    pieces = []
+    for k, trial in enumerate(trials):
+        fine, jump = _as_simulated(recording, trial, substeps)
+        usable = np.minimum(np.arange(longest), len(trial.time) - 1)
+        present = (np.arange(longest) < len(trial.time)) & trial.valid[usable]
+        half = max(2, round(SMOOTHING * time / trial.step))
+        command, drive = _as_positions(recording, trial), _drive(recording, trial)
+        position, speed, acceleration, spread = _states(trial, command, jump, drive, np.zeros(1, dtype=np.int64), half)
+        pieces.append(
+            _constant_part(recording, trial, k)
+            | {
+                "commands": _rows(fine, -history, longest).reshape((history + longest) * substeps, -1),
+                "measured": trial.position[usable],
+                "jump": jump[usable],
+                "weight": np.repeat(present[:, None].astype(float), len(recording.joints), axis=1),
+                "position": position,
+                "speed": speed,
+                "acceleration": acceleration,
+                "start_noise": np.concatenate([np.ones_like(spread), spread], axis=1),
+                "time": 0.0,
+            }
+        )
+    return _stacked(pieces, history, longest, substeps)
+
+
+def _stacked(pieces: Sequence[Mapping[str, object]], history: int, segment: int, substeps: int) -> Windows:
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces = tuple(piece["force"] for piece in pieces)
     return Windows(
@@ -159,9 +194,20 @@ def cut(
         forces=forces,  # type: ignore[arg-type]
         history=history,
         segment=segment,
-        substeps=steps_per_row(recording, time),
-        read_after=recording.read == "after",
+        substeps=substeps,
     )
+
+
+def _constant_part(recording: Recording, trial: Trial, index: int) -> dict[str, object]:
+    """What all windows of a trial have in common."""
+    return {
+        "gains": _gains(recording, trial),
+        "trial": index,
+        "initialisation": trial.initialisation,
+        "clamped": trial.clamped,
+        "initial_state": np.zeros(2 * len(recording.joints)),
+        "force": trial.force,
+    }
 
 
 def _pieces(
@@ -176,10 +222,9 @@ def _pieces(
     time: float,
     speed_known: Array | float,
 ) -> Iterator[dict[str, object]]:
-    command = trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0)
     substeps = steps_per_row(recording, time)
-    fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
-    jump = _half_jump(command, recording.read)
+    fine, jump = _as_simulated(recording, trial, substeps)
+    command = _as_positions(recording, trial)
     drive = _drive(recording, trial)
     half = _half_width(trial.step, noise, speed_known, time)
     for first in range(0, len(trial.time), forward):
@@ -191,7 +236,7 @@ def _pieces(
             continue
         starts = np.minimum(span[::segment], len(trial.time) - 1)
         position, speed, acceleration, spread = _states(trial, command, jump, drive, starts, half)
-        yield {
+        yield _constant_part(recording, trial, index) | {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": trial.position[usable],
             "jump": np.where((span < len(trial.time))[:, None], jump[usable], 0.0),
@@ -200,14 +245,27 @@ def _pieces(
             "speed": speed,
             "acceleration": acceleration,
             "start_noise": np.concatenate([np.broadcast_to(noise, spread.shape), spread * noise], axis=1),
-            "gains": _gains(recording, trial),
-            "trial": index,
-            "initialisation": trial.initialisation,
             "time": first * trial.step,
-            "clamped": trial.clamped,
-            "initial_state": np.zeros(2 * position.shape[1]),
-            "force": trial.force,
         }
+
+
+def _as_positions(recording: Recording, trial: Trial) -> Array:
+    """A trial's commands (T, n) as positions [rad]."""
+    return np.asarray(trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0))
+
+
+def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Array, Array]:
+    """What a trial's steps take (T, substeps, n), and the mean command at each reading less the one felt (T, n)."""
+    command = _as_positions(recording, trial)
+    fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
+    before, after = _around(command, recording.read)
+    return fine, 0.5 * (after - before)
+
+
+def _soft(drive: Drive) -> Array:
+    """How far the sensor follows a jump of the command, by the drive's deflection (n,) [1]."""
+    soft = drive.kp * drive.compliance
+    return soft / (1.0 + soft)
 
 
 def _rows(fine: Array, first: int, last: int) -> Array:
@@ -264,16 +322,13 @@ def _impulses(command: Array, reading: str, substeps: int) -> Array:
 
 
 def _around(command: Array, reading: str) -> tuple[Array, Array]:
-    """Commands (T, n) in force just before and just after each row is read."""
+    """Commands (T, n) in force just before and just after each row is read.
+
+    The drive feels the one before, either way: a loop reads first and commands then.
+    """
     if reading == "after":
         return command, np.concatenate([command[1:], command[-1:]])
     return np.concatenate([command[:1], command[:-1]]), command
-
-
-def _half_jump(command: Array, reading: str) -> Array:
-    """The mean command less the one that the log feels (T, n): the drive deflects accordingly."""
-    before, after = _around(command, reading)
-    return 0.5 * (after - before) if reading == "after" else 0.5 * (before - after)
 
 
 def _half_width(step: float, noise: Array, speed: Array | float, time: float) -> int:
@@ -321,6 +376,5 @@ def _states(
         spread.append(np.linalg.norm(slope_of + 2.0 * damping[:, None] * bend_of, axis=1))
     slope, half_curvature = np.moveaxis(np.array(found), 1, 0)
     acceleration = 2.0 * half_curvature
-    soft = drive.kp * drive.compliance
-    position = trial.position[rows] + soft / (1.0 + soft) * jump[rows]
+    position = trial.position[rows] + _soft(drive) * jump[rows]
     return position, slope + damping * acceleration, acceleration, np.array(spread)

@@ -13,15 +13,16 @@ SMALLEST = 1e-6  # part of the range of motion
 
 
 def sensor_noise(recording: Recording) -> Array:
-    """White part (n,) of the position signals [rad], robust against jumps; at least that of the resolution."""
+    """White part (n,) of the position signals [rad], robust against jumps; at least what the owner states of it."""
     positions = np.concatenate([trial.position for trial in recording.trials])
     least = SMALLEST * np.ptp(positions, axis=0)
     estimates = [
         [_white(trial.position[trial.valid, j]) for j in range(len(recording.joints))] for trial in recording.trials
     ]
-    resolution = recording.description.sensors.position_resolution
+    sensors = recording.description.sensors
+    stated = np.hypot(sensors.position_resolution / np.sqrt(12.0), sensors.position_noise)
     white = np.median(np.array(estimates), axis=0)
-    return np.asarray(np.maximum(white, np.maximum(resolution / np.sqrt(12.0), least)))
+    return np.asarray(np.maximum(white, np.maximum(stated, least)))
 
 
 def _white(signal: Array) -> float:

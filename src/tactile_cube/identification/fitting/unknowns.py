@@ -1,66 +1,19 @@
-"""A model of a rig as a point in parameter space: constants, joint offsets, effects; and what of it is fitted."""
+"""The numbers of a model that are fitted."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
-EffectClass = type[Effect]
 Key = TypeVar("Key", str, int)
-
-
-def effect_path(effect: EffectClass) -> str:
-    """The name by which `find_effect` finds an effect: that of the catalogue, or the dotted path of a user's class."""
-    known = catalogue().get(effect.name) is effect
-    return effect.name if known else f"{effect.__module__}.{effect.__qualname__}"
-
-
-@dataclass(frozen=True)
-class Term:
-    """An effect at a joint with values for all its parameters.
-
-    Attributes:
-        effect: its class.
-        joint: where it acts.
-        values: of all its parameters.
-        fitted: those that a fit may change.
-        expected: of a fitted one, what is known of it beforehand: centre and standard deviation.
-    """
-
-    effect: EffectClass
-    joint: str
-    values: Mapping[str, float]
-    fitted: tuple[str, ...]
-    expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-    @property
-    def label(self) -> str:
-        """As a user writes it: `backlash@q2`, `my_rig.CableDrag@q2`."""
-        return f"{effect_path(self.effect)}@{self.joint}"
-
-
-@dataclass(frozen=True)
-class Model:
-    """Constants of the drive (key -> (n,)), effects, and the joint offsets of each robot initialisation.
-
-    Attributes:
-        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia.
-        terms: effects in force.
-        offsets: initialisation -> (n,) true minus measured angle [rad].
-    """
-
-    constants: Mapping[str, Array]
-    terms: tuple[Term, ...]
-    offsets: Mapping[int, Array]
 
 
 @dataclass(frozen=True)

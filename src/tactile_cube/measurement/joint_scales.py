@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales
-from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ SMALL = 1e-9  # part of another size that stands for nothing at all
 
 def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     """The scales of each joint of a recording."""
-    tree = rigid_body(recording)
+    tree = recording.rigid_body()
     positions = np.concatenate([trial.position for trial in recording.trials])
     low, high = np.quantile(positions, [OUTSIDE, 1.0 - OUTSIDE], axis=0)
     spans = np.maximum(high - low, SMALL * np.maximum(np.abs(high), 1.0))
@@ -56,12 +56,6 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
         )
         for j, joint in enumerate(recording.joints)
     )
-
-
-def rigid_body(recording: Recording) -> RigidBodyTree:
-    """The mechanism of a recording."""
-    coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
-    return RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
 
 
 def unit_of_time(recording: Recording, inertia: Array, spans: Array) -> float:

@@ -6,13 +6,14 @@ import pytest
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.comparing.error import residuals, summarise
+from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.known_force import force_torque
-from tactile_cube.measurement.replay.parameters import draw_parameters, nominal_parameters, require_same_joints
-from tactile_cube.measurement.replay.rig_replay import Replay, replay
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
+from tactile_cube.measurement.replay.simulator import Engine, Simulator, free_run
 from tests.measurement.small_rig import write
 
 SHARED = Path(__file__).parents[4] / "shared" / "recordings"
@@ -23,6 +24,10 @@ TRUE = {
 }
 
 
+def with_constants(model: Model, **constants: np.ndarray) -> Model:
+    return replace(model, constants={**model.constants, **constants})
+
+
 @pytest.fixture
 def recording(tmp_path: Path) -> Recording:
     return read_recording(write(tmp_path))
@@ -31,41 +36,52 @@ def recording(tmp_path: Path) -> Recording:
 @pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/recordings")
 def test_the_true_constants_follow_an_independent_engine_to_its_noise() -> None:
     recording = read_recording(SHARED / "finger_plain" / "validation")
-    parameters = nominal_parameters(recording, None)
-    parameters.constants.update(TRUE)
-    simulated = replay(recording, parameters, "fast", 2.5e-4)
-    error = summarise(residuals(recording.trials, [one.position for one in simulated]), recording.joints)
-    assert error.overall < 4.5e-4
+    simulated = free_run(recording, with_constants(nominal_model(recording), **TRUE), step=2.5e-4)
+    assert free_run_error(recording, simulated).overall < 4.5e-4
 
 
 def test_fast_and_pybullet_agree(recording: Recording) -> None:
     recording = recording.with_trials(recording.trials[:1])
-    parameters = nominal_parameters(recording, None)
-    fast, bullet = (replay(recording, parameters, engine, 0.002)[0] for engine in ("fast", "pybullet"))
+    engines: tuple[Engine, ...] = ("fast", "pybullet")
+    fast, bullet = (free_run(recording, nominal_model(recording), engine)[0] for engine in engines)
     assert np.abs(fast.position - bullet.position).max() < 1e-9
     assert np.abs(fast.torque - bullet.torque).max() < 1e-8
 
 
 def test_an_unknown_engine_is_refused(recording: Recording) -> None:
     with pytest.raises(InputError, match="engine=mujoco"):
-        Replay(recording, engine="mujoco")  # type: ignore[arg-type]
+        Simulator(recording, engine="mujoco")  # type: ignore[arg-type]
 
 
 def test_a_clamped_link_shows_the_drive_stiffness(recording: Recording) -> None:
     trial = replace(recording.trials[0], clamped=True)
-    result = Replay(recording).simulate([trial], nominal_parameters(recording, None))[0]
+    ((result,),) = Simulator(recording).free_runs([nominal_model(recording)], [trial])
     slope = np.polyfit(result.torque[:, 0], result.position[:, 0], 1)[0]
     assert slope == pytest.approx(1 / 25.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("read", "felt"), [("after", 0), ("before", 1)])
+def test_a_row_feels_the_command_that_was_in_force_until_it_was_read(tmp_path: Path, read: str, felt: int) -> None:
+    """A clamped link: the drive's deflection is the command's alone, 3 / (3 + 25) of it, and it jumps with it."""
+
+    def change(data: dict) -> None:
+        data["sensors"]["read"] = read
+
+    recording = read_recording(write(tmp_path, change))
+    command = np.random.default_rng(0).uniform(-0.1, 0.1, recording.trials[0].command.shape)
+    trial = replace(recording.trials[0], command=command, clamped=True)
+    ((result,),) = Simulator(recording).free_runs([nominal_model(recording)], [trial])
+    moved, commanded = np.diff(result.position[5:-5], axis=0), np.diff(command[5 - felt : -5 - felt], axis=0)
+    np.testing.assert_allclose(moved, 3.0 / 28.0 * commanded, atol=1e-6)
 
 
 def test_a_known_force_moves_a_static_finger_by_force_over_stiffness(recording: Recording) -> None:
     trial = recording.trials[0]
     still = replace(trial, command=np.zeros_like(trial.command), position=np.zeros_like(trial.position), torque=None)
     pushed = replace(still, force=KnownForce(joint="b", point=[0.0, 0.0, -0.05], vector=[2.0, 0.0, 0.0]))
-    parameters = nominal_parameters(recording, None)
-    parameters.constants["static_friction"] = np.zeros(2)
-    simulator = Replay(recording)
-    free, forced = simulator.simulate([still, pushed], parameters)
+    model = with_constants(nominal_model(recording), static_friction=np.zeros(2))
+    simulator = Simulator(recording)
+    ((free, forced),) = simulator.free_runs([model], [still, pushed])
     torque = force_torque(simulator.tree, pushed.force, np.zeros(2))
     assert torque == pytest.approx([-0.15 * 2.0, 0.0])
     gravity = 9.81 * (0.1 * 0.05 + 0.05 * 0.13)  # stiffness of the hanging links [N m/rad]
@@ -74,7 +90,7 @@ def test_a_known_force_moves_a_static_finger_by_force_over_stiffness(recording: 
 
 
 def test_a_force_on_an_unknown_joint_is_refused(recording: Recording) -> None:
-    tree = Replay(recording).tree
+    tree = recording.rigid_body()
     with pytest.raises(InputError, match="'thumb' is not a joint"):
         force_torque(tree, KnownForce(joint="thumb", point=[0, 0, 0], vector=[0, 0, 0]), np.zeros(2))
 
@@ -86,10 +102,9 @@ def test_a_model_file_changes_the_simulation(recording: Recording) -> None:
         values={"kd": {"a": Estimate(value=0.5, low=0.5, high=0.5)}},
         effects=[EffectEstimate(effect="command_delay@b", parameters={"delay": slow})],
     )
-    parameters = nominal_parameters(recording, model)
-    assert parameters.constants["kd"].tolist() == [0.5, 0.2]
-    with_model = replay(recording, parameters, "fast", 0.002)[0]
-    without = replay(recording, nominal_parameters(recording, None), "fast", 0.002)[0]
+    changed = nominal_model(recording, model)
+    assert changed.constants["kd"].tolist() == [0.5, 0.2]
+    with_model, without = (free_run(recording, one)[0] for one in (changed, nominal_model(recording)))
     assert np.abs(with_model.position - without.position).max(axis=0).min() > 1e-3
 
 
@@ -101,11 +116,11 @@ def test_a_model_of_another_rig_is_refused(recording: Recording) -> None:
 def test_draws_come_from_the_interval_or_the_spread(recording: Recording) -> None:
     model = ModelFile(joints=["a", "b"], values={"kd": {"a": Estimate(value=0.3, low=0.29, high=0.31)}})
     rng = np.random.default_rng(0)
-    draws = [draw_parameters(recording, model, {"kd": 0.5, "offset": 0.02}, rng) for _ in range(200)]
+    draws = [draw_model(recording, model, {"kd": 0.5, "offset": 0.02}, rng) for _ in range(200)]
     kd = np.array([draw.constants["kd"] for draw in draws])
     assert 0.29 <= kd[:, 0].min() < 0.292 < 0.308 < kd[:, 0].max() <= 0.31
     assert 0.1 <= kd[:, 1].min() < 0.12 < 0.28 < kd[:, 1].max() <= 0.3
-    assert np.abs([draw.offset for draw in draws]).max() <= 0.02
+    assert np.abs([draw.offsets[0] for draw in draws]).max() <= 0.02
 
 
 def test_commanded_torques_drive_the_joint(tmp_path: Path) -> None:
@@ -122,8 +137,8 @@ def test_commanded_torques_drive_the_joint(tmp_path: Path) -> None:
 
     recording = read_recording(write(tmp_path, change, spoil))
     trial = recording.trials[0]
-    result = Replay(recording).simulate([trial], nominal_parameters(recording, None))[0]
-    inertia = 0.01 + Replay(recording).tree.actuated_mass_matrix(np.zeros(2))[0, 0]
-    expected = 0.5 * 0.002 / inertia * (trial.time[49] + trial.step) ** 2
+    ((result,),) = Simulator(recording).free_runs([nominal_model(recording)], [trial])
+    inertia = 0.01 + recording.rigid_body().actuated_mass_matrix(np.zeros(2))[0, 0]
+    expected = 0.5 * 0.002 / inertia * trial.time[49] ** 2
     assert result.position[49, 0] == pytest.approx(expected, rel=0.02)
     assert result.torque[49, 0] == pytest.approx(0.002, rel=1e-4)

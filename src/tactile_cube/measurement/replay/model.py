@@ -1,0 +1,75 @@
+"""A model of a rig: constants of the drive, effects, and the joint offsets of each robot initialisation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.effects.catalogue import catalogue
+from tactile_cube.drivetrain.effects.effect import Effect
+
+Array = NDArray[np.float64]
+EffectClass = type[Effect]
+
+
+def effect_path(effect: EffectClass) -> str:
+    """The name by which `find_effect` finds an effect: that of the catalogue, or the dotted path of a user's class."""
+    known = catalogue().get(effect.name) is effect
+    return effect.name if known else f"{effect.__module__}.{effect.__qualname__}"
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect at a joint with values for all its parameters.
+
+    Attributes:
+        effect: its class.
+        joint: where it acts.
+        values: of all its parameters.
+        fitted: those that a fit may change.
+        expected: of a fitted one, what is known of it beforehand: centre and standard deviation.
+    """
+
+    effect: EffectClass
+    joint: str
+    values: Mapping[str, float]
+    fitted: tuple[str, ...] = ()
+    expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """As a user writes it: `backlash@q2`, `my_rig.CableDrag@q2`."""
+        return f"{effect_path(self.effect)}@{self.joint}"
+
+
+def terms_of(effects: Iterable[tuple[str, Mapping[str, float]]], joints: tuple[str, ...]) -> tuple[Term, ...]:
+    """Effects given as (`NAME@JOINT` or `NAME`, parameter -> value); what is left out is typical.
+
+    Raises:
+        InputError: an unknown effect, joint or parameter.
+    """
+    return tuple(
+        Term(effect, joint, effect(joint, **values).values)
+        for name, values in effects
+        for effect, joint in resolve([name], joints)
+    )
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a simulation of a rig needs beside its URDF.
+
+    Attributes:
+        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia and friction_creep (how fast a
+            sticking joint gives way, rad/s per N m), each (n,).
+        terms: effects in force.
+        offsets: initialisation -> (n,) true minus measured angle [rad].
+    """
+
+    constants: Mapping[str, Array]
+    terms: tuple[Term, ...]
+    offsets: Mapping[int, Array]

@@ -1,0 +1,111 @@
+"""The model that a rig's owner already has: nominal, from a model file, or drawn from its intervals."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term, terms_of
+
+Array = NDArray[np.float64]
+DEFAULTS = {"stiffness": np.inf, "static_friction": 0.0, "reflected_inertia": 0.0, "friction_creep": 0.0}
+CONTROLLER = ("kp", "kd", "torque_limit")
+TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
+
+
+def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model:
+    """What the recording's owner states, or what is known since; of effects, numbers with an interval are free.
+
+    They are expected where they were found, and twice as far from there as the interval says: a machine changes between
+    two recordings. Else what was found on one would soak up what is new in another.
+    """
+    constants = {key: np.array([one.value for one in row]) for key, row in _estimates(recording, known).items()}
+    terms = tuple(term for one in (known.drive_effects if known else ()) for term in _terms(one, recording))
+    return Model(constants, terms, no_offsets(recording))
+
+
+def no_offsets(recording: Recording) -> dict[int, Array]:
+    """No joint offset in any initialisation."""
+    return {trial.initialisation: np.zeros(len(recording.joints)) for trial in recording.trials}
+
+
+def draw_model(
+    recording: Recording, known: ModelFile | None, spread: Mapping[str, float], rng: np.random.Generator
+) -> Model:
+    """One randomised model.
+
+    Args:
+        recording: its owner's values are the centre.
+        known: values with an interval are drawn from the interval.
+        spread: relative half width for a constant without an interval; `offset` is the half width [rad] of joint
+            offsets.
+        rng: source of randomness.
+    """
+    constants = {
+        key: np.array([_drawn(one, spread.get(key, 0.0), rng) for one in row])
+        for key, row in _estimates(recording, known).items()
+    }
+    effects = [
+        (one.effect, {key: _drawn(value, 0.0, rng) for key, value in one.parameters.items()})
+        for one in (known.drive_effects if known is not None else [])
+    ]
+    offset = _offset(recording, known, spread.get("offset", 0.0), rng)
+    return Model(constants, terms_of(effects, recording.joints), dict.fromkeys(no_offsets(recording), offset))
+
+
+def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:
+    given = {name: estimate.value for name, estimate in one.parameters.items()}
+    free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
+    expected = {name: (one.parameters[name].value, _half_width(one.parameters[name])) for name in free}
+    return [
+        Term(effect, joint, effect(joint, **given).values, free, expected)
+        for effect, joint in resolve([one.effect], recording.joints)
+    ]
+
+
+def _half_width(estimate: Estimate) -> float:
+    return 0.5 * (estimate.high - estimate.low)
+
+
+def _offset(recording: Recording, known: ModelFile | None, width: float, rng: np.random.Generator) -> Array:
+    offsets = known.offsets if known is not None else {}
+    bounds = [(offsets[j].low, offsets[j].high) if j in offsets else (-width, width) for j in recording.joints]
+    return -np.array([rng.uniform(low, high) for low, high in bounds])
+
+
+def _drawn(estimate: Estimate, spread: float, rng: np.random.Generator) -> float:
+    """Uniform in the interval, or within the relative spread where there is none."""
+    if not np.isfinite(estimate.value):
+        return estimate.value
+    if estimate.high > estimate.low:
+        return float(rng.uniform(estimate.low, estimate.high))
+    return estimate.value * float(rng.uniform(1 - spread, 1 + spread))
+
+
+def _estimates(recording: Recording, known: ModelFile | None) -> dict[str, list[Estimate]]:
+    believed = {key: getattr(recording.gains, key) for key in CONTROLLER}
+    if recording.torque_controlled:
+        believed |= {"kp": np.full(len(recording.joints), TORQUE_MODE_GAIN), "kd": np.zeros(len(recording.joints))}
+    for key, value in DEFAULTS.items():
+        believed[key] = recording.nominal.get(key, np.full(len(recording.joints), value))
+    rows = {key: [Estimate(value=float(v), low=float(v), high=float(v)) for v in row] for key, row in believed.items()}
+    for key, by_joint in (known.values if known is not None else {}).items():
+        if key not in rows:
+            raise InputError(f"model: key 'values.{key}': not a constant of the drivetrain; known: {sorted(rows)}")
+        for index, joint in enumerate(recording.joints):
+            rows[key][index] = by_joint.get(joint, rows[key][index])
+    return rows
+
+
+def require_same_joints(recording: Recording, model: ModelFile) -> None:
+    """Refuse a model of another rig.
+
+    Raises:
+        InputError: the model's joints are not the recording's.
+    """
+    if set(model.joints) != set(recording.joints):
+        raise InputError(f"model: joints {model.joints} are not those of the recording, {list(recording.joints)}")

@@ -1,0 +1,274 @@
+"""A recorded rig in simulation: many models at once, in segments started anew or freely, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Self, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects.catalogue import catalogue
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION, TORQUE
+from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.jump_ratio import gaps, jump_ratio
+from tactile_cube.measurement.replay.known_force import force_torque
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.read_out import free_way, read_out, simulated_jumps
+from tactile_cube.measurement.replay.windows import SMOOTHING, Windows, whole_trials
+
+if TYPE_CHECKING:
+    from tactile_cube.simulation.rig import RigWorld
+
+Array = NDArray[np.float64]
+Engine = Literal["fast", "pybullet"]
+CLAMPED = 1e9  # [N m] brake torque of a clamped link
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Signals of one simulated trial, each (n, joints): position on the motor side [rad] and torque [N m]."""
+
+    position: Array
+    torque: Array
+
+
+def free_run(recording: Recording, model: Model, engine: Engine = "fast", step: float = 0.002) -> list[Simulated]:
+    """Every trial of a recording simulated freely from its start.
+
+    Args:
+        recording: rig and trials.
+        model: with joint offsets for each of the trials' initialisations.
+        engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
+        step: longest integration step [s].
+    """
+    simulator = Simulator(recording, [term.effect for term in model.terms], step, engine)
+    try:
+        return simulator.free_runs([model])[0]
+    finally:
+        simulator.close()
+
+
+class Simulator:
+    """The drivetrain that training uses as a recording's rig, with every effect that a model may have compiled in."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        effects: Sequence[type[Effect]] = (),
+        step: float = 0.002,
+        engine: Engine = "fast",
+        time: float = 1.0,
+    ) -> None:
+        """Build the plant; its kernel is compiled once and kept on disk.
+
+        Args:
+            recording: rig, controller and sampling step.
+            effects: a user's classes that a model may use, beside those of the catalogue.
+            step: longest integration step [s]; a whole number of steps fits between two samples.
+            engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
+            time: what a second of a finger stands for [s].
+
+        Raises:
+            InputError: an unknown engine.
+        """
+        if engine not in get_args(Engine):
+            raise InputError(f"engine={engine}: unknown; choose one of {', '.join(get_args(Engine))}")
+        self.recording = recording
+        self.time = time
+        self.tree = recording.rigid_body()
+        self.substeps = recording.substeps(step)
+        # the whole catalogue: one kernel, compiled once, for every model of this rig
+        known = tuple(dict.fromkeys([*catalogue().values(), *effects]))
+        self.plant = Plant([self.tree], recording.step / self.substeps, known, recording.joints)
+        self.workers = min(4, len(os.sched_getaffinity(0)))
+        self._world = _pybullet(self.plant) if engine == "pybullet" else None
+
+    def close(self) -> None:
+        """End the physics server, if there is one."""
+        if self._world is not None:
+            self._world.close()
+
+    def finer(self, times: int) -> Self:
+        """The same in steps so many times as short, for windows that are made finer likewise."""
+        fine = copy(self)
+        fine.plant = Plant([self.tree], self.plant.dt / times, self.plant.effects, self.recording.joints)
+        return fine
+
+    def free_runs(self, models: Sequence[Model], trials: Sequence[Trial] | None = None) -> list[list[Simulated]]:
+        """Each model through trials of the recording, all by default, from their measured starts."""
+        trials = self.recording.trials if trials is None else trials
+        windows = whole_trials(self.recording, trials, self.substeps, self.time)
+        signals = self.simulate(models, [windows] * len(models), torques=True)
+        return [
+            [Simulated(*one[k, :, : len(trial.time)]) for k, trial in enumerate(trials)]
+            for one in np.moveaxis(signals, 2, 1)
+        ]
+
+    def simulate(
+        self,
+        models: Sequence[Model],
+        windows: Sequence[Windows],
+        corrections: Array | None = None,
+        torques: bool = False,
+    ) -> Array:
+        """Each model through its windows, the start of each segment moved by the model's correction.
+
+        Args:
+            models: M of them.
+            windows: one each, of one shape (S windows of K segments).
+            corrections: (M, 2 n) added to positions [rad] and speeds [rad/s] at every start.
+            torques: whether to give torques as well.
+
+        Returns:
+            What a log would show, (M, 1 or 2, S, K segment, n): positions [rad] and torques [N m].
+        """
+        out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
+        if corrections is None:
+            corrections = np.zeros((len(models), 2 * len(self.recording.joints)))
+        whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
+        if self._world is not None:
+            whole = 0
+        with ThreadPoolExecutor(self.workers) as pool:
+            list(pool.map(self._one, models[:whole], windows[:whole], corrections, out))
+            for k in range(whole, len(models)):
+                self._one(models[k], windows[k], corrections[k], out[k], pool)
+        return out
+
+    def gaps(self, model: Model) -> Array:
+        """Width of the gap in each joint's transmission (n,) [rad]."""
+        return gaps(self.plant, self.memory(model))
+
+    def memory(self, model: Model) -> Array:
+        """Memory (size,) of the plant with a model's constants and effects."""
+        known = model.constants
+        constants = DrivetrainConstants(
+            kp=known["kp"],
+            kd=known["kd"],
+            stiffness=known["stiffness"],
+            static_friction=known["static_friction"],
+            reflected_inertia=known["reflected_inertia"],
+            torque_limit=known["torque_limit"],
+        )
+        memory: Array = self.plant.memory(constants, gravity=self.recording.gravity)
+        self.plant.view(memory, "friction_creep")[:] = known.get("friction_creep", 0.0)
+        for term in model.terms:
+            self.plant.set_effect(memory, term.effect, term.joint, term.values)
+        return memory
+
+    def _one(
+        self, model: Model, windows: Windows, correction: Array, out: Array, pool: ThreadPoolExecutor | None = None
+    ) -> None:
+        memory = self._memories(model, windows)
+        gap = gaps(self.plant, memory[0])
+        ratios = self._jump_ratios(memory, windows)
+        limit = self.plant.view(memory, "torque_limit")[:, None].copy()
+        rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, *([LEAD] if gap.any() else [])])
+        signals = np.zeros((len(windows), out.shape[2] * windows.substeps, len(rows), out.shape[3]))
+        if self._world is not None:
+            self._in_world(self._world, windows, memory, rows, signals)
+        else:
+            self._in_closed_form(windows, correction, memory, rows, signals, pool)
+        jump = simulated_jumps(signals[:, :, 2], windows)
+        shown = signals[:, :: windows.substeps]
+        free = free_way(shown[:, :, 3], jump, gap) if gap.any() else 0.0
+        position, torque = read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
+        out[0] = position
+        out[1:] = torque
+
+    def _in_closed_form(
+        self,
+        windows: Windows,
+        correction: Array,
+        memory: Array,
+        rows: NDArray[np.int64],
+        signals: Array,
+        pool: ThreadPoolExecutor | None,
+    ) -> None:
+        count, fine = len(windows), windows.substeps
+
+        def run(first: int, last: int) -> None:
+            self.plant.kernel.segments_batch(
+                windows.commands,
+                np.arange(count),
+                np.full(count, signals.shape[1]),
+                windows.history * fine,
+                1,
+                windows.segment * fine,
+                windows.position,
+                windows.speed,
+                windows.initial_state,
+                np.tile(correction, (count, 1)),
+                memory,
+                rows,
+                first,
+                last,
+                signals,
+            )
+
+        if pool is None:
+            run(0, count)
+        else:
+            parts = [count * k // self.workers for k in range(self.workers + 1)]
+            list(pool.map(run, parts[:-1], parts[1:]))
+
+    def _in_world(
+        self, world: RigWorld, windows: Windows, memory: Array, rows: NDArray[np.int64], signals: Array
+    ) -> None:
+        """Windows of one segment, which an engine cannot start anew, from the start that the closed form finds."""
+        count, history = len(windows), windows.history * windows.substeps
+        starts = windows.position[:, 0], windows.speed[:, 0], windows.initial_state
+        self.plant.kernel.starts_batch(windows.commands, history, *starts, memory)
+        lengths = np.full(count, signals.shape[1])
+        world.rollout_batch(windows.commands[:, history:], np.arange(count), lengths, 0, 1, memory, rows, signals)
+
+    def _memories(self, model: Model, windows: Windows) -> Array:
+        """One block (S, size) for each window, at rest at its start."""
+        single = self.memory(model)
+        memory = np.tile(single, (len(windows), 1))
+        offsets = np.array([model.offsets[int(k)] for k in windows.initialisation])
+        self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * offsets[:, self.tree.follow]
+        self.plant.view(memory, "angle_offset")[:] = offsets
+        self.plant.reset(memory, self._links(model, windows), windows.speed[:, 0])
+        self.plant.view(memory, "step")[:, 0] = windows.time / self.plant.dt
+        self.plant.view(memory, "unsure")[:] = SMOOTHING * self.time
+        self.plant.view(memory, "reading")[:] = 0  # a row is read as its first step begins
+        for k, key in enumerate(("kp", "kd", "torque_limit")):
+            self.plant.view(memory, key)[:] *= windows.gains[:, k]
+        self.plant.view(memory, "brake")[windows.clamped] = CLAMPED
+        for k, force in enumerate(windows.forces):
+            if force is not None:
+                resting = np.average(windows.measured[k], axis=0, weights=windows.weight[k, :, 0])
+                self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
+        return memory
+
+    def _jump_ratios(self, memory: Array, windows: Windows) -> tuple[Array, Array]:
+        """What the sensors show at once of a jump of the command, see `jump_ratio`, (S, 1, n) each."""
+        first = windows.commands[:, windows.history * windows.substeps]
+        _, chosen, which = np.unique(windows.gains, axis=0, return_index=True, return_inverse=True)
+        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])
+        position, torque = np.moveaxis(found[which.ravel()], 1, 0)[:, :, None]
+        return position, torque
+
+    def _links(self, model: Model, windows: Windows) -> Array:
+        """Link positions (S, n) near those of the first row: measured less the deflection of the plain drive."""
+        constants = model.constants
+        error = windows.commands[:, windows.history * windows.substeps] - windows.position[:, 0]
+        torque = constants["kp"] * error - constants["kd"] * windows.speed[:, 0]
+        limit = constants["torque_limit"]
+        return windows.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
+
+
+def _pybullet(plant: Plant) -> RigWorld:
+    """The PyBullet world, imported here because PyBullet greets everybody who imports it."""
+    from tactile_cube.simulation.rig import RigWorld
+
+    return RigWorld(plant)
