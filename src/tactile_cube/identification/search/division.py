@@ -45,6 +45,7 @@ class Division:
         noise: Array,
         segment: int | None = None,
         known: ModelFile | None = None,
+        segments: int = SEGMENTS,
     ) -> None:
         """Prepare the problems.
 
@@ -55,13 +56,15 @@ class Division:
             noise: (n,) of the position sensors [rad].
             segment: rows of a segment; as long as identification likes them by default.
             known: the model to begin with; None: what the recording's owner states.
+            segments: how many of them a search takes, of either part.
         """
         self.shooting, self.fitted, self.held_out = shooting, fitted, held_out
-        self.noise, self.segment, self.known = noise, segment, known
+        self.noise, self.segment, self.known, self.segments = noise, segment, known, segments
         self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
         self.all_windows = self.windows(fitted)
-        self.problem = Problem(shooting, some(self.all_windows, SEGMENTS))
-        self.validation = Problem(shooting, some(self.windows(held_out), SEGMENTS))
+        self.rows = self.all_windows.segment
+        self.problem = Problem(shooting, some(self.all_windows, segments))
+        self.validation = Problem(shooting, some(self.windows(held_out), segments))
         self.offsets = dict(self.start_held_out.offsets)
 
     def windows(self, recording: Recording) -> Windows:

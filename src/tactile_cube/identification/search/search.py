@@ -79,6 +79,7 @@ class Search(Division):
         known: ModelFile | None = None,
         criteria: Criteria = STANDARD,
         folds: Sequence[Divided] = (),
+        longer: int = 1,
     ) -> None:
         """Prepare the problems.
 
@@ -91,12 +92,16 @@ class Search(Division):
             known: the model to begin with; None: what the recording's owner states.
             criteria: what decides.
             folds: the same trials divided in other ways, for where these few held-out trials do not tell.
+            longer: times as long as usual that segments are, and as few, unless small errors grow in them.
         """
         start = nominal_model(fitted, known)
         effects = every_effect(effects, start)
         shooting = Shooting(fitted, effects)
-        windows = some(shooting.cut(fitted, noise), SEGMENTS)
-        super().__init__(shooting, fitted, held_out, noise, steady_rows(shooting, start, windows), known)
+        usual = shooting.cut(fitted, noise)
+        windows = some(usual if longer == 1 else shooting.cut(fitted, noise, segment=longer * usual.segment), SEGMENTS)
+        segment = steady_rows(shooting, start, windows)
+        segments = min(SEGMENTS, SEGMENTS * usual.segment // segment)
+        super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
         self.say, self.criteria, self.effects, self.folds = say, criteria, effects, folds
         self.candidates = candidates(shooting.sizes, effects)
         self.last_scores: list[Score] = []
@@ -112,7 +117,8 @@ class Search(Division):
         best = min(found, key=lambda e: e.error, default=base)
         surpassed: list[Explanation] = []
         if best.error > self.criteria.far:
-            folds = [Division(self.shooting, *one, self.noise, self.segment, self.known) for one in self.folds]
+            alike = self.noise, self.segment, self.known, self.segments
+            folds = [Division(self.shooting, *one, *alike) for one in self.folds]
             if sets := Together(self, base, folds).run(self.leaders, best):
                 levels, surpassed, doubtful = [sets], found, []
         if not levels and base.largest_error <= self.criteria.floor:
