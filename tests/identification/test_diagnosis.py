@@ -1,4 +1,4 @@
-"""What a decision asks is simulated, once each."""
+"""What a decision asks is simulated, once each; what leaves much is asked once more."""
 
 from types import SimpleNamespace
 
@@ -58,3 +58,28 @@ def test_a_free_run_is_compared_with_repeats_once(
     one = explanation("coulomb_friction", 1.0)
     assert ask.as_repeats(one) is ask.as_repeats(one) is answer
     assert runs == ([one.label] if source == "repeats" else [])
+
+
+@pytest.mark.parametrize(
+    ("kinds", "rows", "taken"),
+    [
+        (("adequate", "unknown_effect"), 200, 0),
+        (("partly_explained", "missing_effect"), 200, 1),
+        (("unknown_effect", "partly_explained"), 200, 1),
+        (("partly_explained", "unknown_effect"), 200, 0),
+        (("unknown_effect", "unknown_effect"), 200, 0),
+        (("unknown_effect", "missing_effect"), 50, 0),
+    ],
+    ids=["clear", "all of it", "a part", "less", "the same", "no longer segments"],
+)
+def test_what_leaves_much_is_asked_once_more_in_longer_segments(kinds: tuple[str, str], rows: int, taken: int) -> None:
+    searches, run = {1: SimpleNamespace(rows=50), diagnosis.LONGER: SimpleNamespace(rows=rows)}, []
+
+    def answered(search: SimpleNamespace, before: object = None) -> object:
+        assert before == (f"found in {run[0].rows}" if run else None)
+        run.append(search)
+        return diagnosis.Answer(search, f"found in {search.rows}", None, SimpleNamespace(kind=kinds[len(run) - 1]))  # type: ignore[arg-type]
+
+    answer = diagnosis.asked(searches.get, answered, lambda line: None)  # type: ignore[arg-type]
+    assert answer.search is run[taken]
+    assert len(run) == (1 if kinds[0] == "adequate" or rows == 50 else 2)

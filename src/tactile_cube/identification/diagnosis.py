@@ -137,15 +137,12 @@ def diagnose(
     def search_in(longer: int) -> Search:
         return Search(fitted_part, held_out, noise, effects, say, known, criteria, folds, longer)
 
-    answer = _answered(search_in(1), floor, engine, step)
-    if answer.verdict.kind in NOT_ALL:
-        longer = search_in(LONGER)
-        if longer.rows > answer.search.rows:
-            kind = answer.verdict.kind
-            say(f"{kind}; once more in segments of {longer.rows} samples instead of {answer.search.rows}")
-            again = _answered(longer, floor, engine, step)
-            answer = max(answer, again, key=lambda one: _SAYS[one.verdict.kind])
-    search, findings, simulations, verdict = answer
+    def answered(search: Search, before: Findings | None = None) -> Answer:
+        findings = search.again(before) if before else search.run()
+        simulations = Simulations(search, findings.base, floor, engine, step)
+        return Answer(search, findings, simulations, decide(findings, simulations, criteria))
+
+    search, findings, simulations, verdict = asked(search_in, answered, say)
     fitted = simulations.final(verdict.chosen)
     test = held_out if tested is None else tested
     summaries, over_noise = test_errors(
@@ -176,17 +173,31 @@ def diagnose(
     return replace(diagnosis, experiment=experiment)
 
 
-class _Answer(NamedTuple):
+class Answer(NamedTuple):
+    """A verdict and what it came from."""
+
     search: Search
     findings: Findings
     simulations: Simulations
     verdict: Verdict
 
 
-def _answered(search: Search, floor: NoiseFloor, engine: Engine, step: float) -> _Answer:
-    findings = search.run()
-    simulations = Simulations(search, findings.base, floor, engine, step)
-    return _Answer(search, findings, simulations, decide(findings, simulations, search.criteria))
+def asked(search_in: Callable[[int], Search], answered: Callable[..., Answer], say: Callable[[str], None]) -> Answer:
+    """The answer of a search in usual segments; where that leaves much, of what it found in longer ones, if it is more.
+
+    Args:
+        search_in: prepares a search in segments so many times as long as usual.
+        answered: runs it, or judges with it what another one found.
+        say: takes progress lines.
+    """
+    answer = answered(search_in(1))
+    if answer.verdict.kind not in NOT_ALL:
+        return answer
+    longer = search_in(LONGER)
+    if longer.rows <= answer.search.rows:
+        return answer
+    say(f"{answer.verdict.kind}; once more in segments of {longer.rows} samples instead of {answer.search.rows}")
+    return max(answer, answered(longer, answer.findings), key=lambda one: _SAYS[one.verdict.kind])
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:

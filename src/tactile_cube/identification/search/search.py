@@ -30,6 +30,7 @@ from tactile_cube.identification.search.special_laws import special_candidates
 from tactile_cube.identification.search.together import Proposal, Together
 from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model
 
 Array = NDArray[np.float64]
@@ -38,6 +39,7 @@ RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the 
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
 FAR_BEHIND_AT_FLOOR = 2.0  # the same where the best one explains nearly everything
 DEEPEST = 3  # effects in combination
+AGAIN = 6  # explanations of another search that are judged once more
 BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
 Divided = tuple[Recording, Recording]
 """Trials to fit and trials to judge by."""
@@ -117,8 +119,9 @@ class Search(Division):
         best = min(found, key=lambda e: e.error, default=base)
         surpassed: list[Explanation] = []
         if best.error > self.criteria.far:
-            alike = self.noise, self.segment, self.known, self.segments
-            folds = [Division(self.shooting, *one, *alike) for one in self.folds]
+            folds = [
+                Division(self.shooting, *one, self.noise, self.segment, self.known, self.segments) for one in self.folds
+            ]
             if sets := Together(self, base, folds).run(self.leaders, best):
                 levels, surpassed, doubtful = [sets], found, []
         if not levels and base.largest_error <= self.criteria.floor:
@@ -126,6 +129,19 @@ class Search(Division):
             levels = [(shared,)] if shared else []
         unproven = tuple(sorted(doubtful, key=lambda e: e.error))
         return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed))
+
+    def again(self, findings: Findings) -> Findings:
+        """What another search found, refitted and judged in the segments of this one."""
+        base = self.fit_base()
+        self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
+        nominal = self.judged(self.start)
+        every = {one.label: one for level in (*findings.levels, findings.surpassed) for one in level}
+        best = sorted(every.values(), key=lambda e: e.judgement.costs.sum())[:AGAIN]
+        found = [self.explanation(base, one.effects, one.fit.model, len(best)) for one in best]
+        found = [one for one in found if self.worthwhile(one, base, base)]
+        levels = (tuple(sorted(found, key=lambda e: e.judgement.costs.sum())),)
+        needed = found and base.largest_error > self.criteria.floor
+        return replace(findings, base=base, nominal=nominal, levels=levels if needed else (), surpassed=())
 
     def one_by_one(
         self, base: Explanation
@@ -229,11 +245,15 @@ class Search(Division):
 
     def finish(self, parent: Explanation, candidate: Candidate, refitted: Fit, judged: int) -> Explanation:
         """Fit everything and judge on the held-out trials, of which so many effects are judged."""
-        fitted, judgement = self.settled(refitted.model)
+        return self.explanation(parent, (*parent.effects, candidate), refitted.model, judged)
+
+    def explanation(
+        self, parent: Explanation, effects: tuple[Candidate, ...], model: Model, judged: int
+    ) -> Explanation:
+        """A model with these effects, everything refitted, beside what it is to be better than."""
+        fitted, judgement = self.settled(model)
         corrected = min(1.0, p_value(parent.judgement, judgement) * judged)
-        explanation = Explanation(
-            (*parent.effects, candidate), fitted, judgement, corrected, gain(parent.judgement, judgement)
-        )
+        explanation = Explanation(effects, fitted, judgement, corrected, gain(parent.judgement, judgement))
         self.say(f"  held-out error {explanation.error:.3f}  p {corrected:.1e}  {explanation.label}")
         return explanation
 
