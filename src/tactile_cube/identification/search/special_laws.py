@@ -21,7 +21,6 @@ from tactile_cube.measurement.replay.model import Term
 Array = NDArray[np.float64]
 POINTS = 120  # of the profile that are compared
 FINEST = 0.8  # highest harmonic in units of what the control torques can carry
-EXPONENT, SQUARE, DEPTH = "exponent", 2.0, "depth"  # of a stop that stiffens, where its fit starts
 EXPLAINED = 0.7  # share of the profile that a simpler law has to explain to be tried
 
 
@@ -38,18 +37,13 @@ def special_candidates(candidate: Candidate, term: Term, effects: Sequence[type[
     angles = np.linspace(term.values["first"], term.values["last"], POINTS)
     torques = profile_of(term.effect, term.values, angles)
     spacing = (angles[-1] - angles[0]) / (len(candidate.form) - 1)
-    scales = candidate.sizes.get(candidate.joints[0], FINGER)
     found = []
     for effect in effects:
-        for form in effect.forms_at(scales):
+        for form in effect.forms_at(candidate.sizes.get(candidate.joints[0], FINGER)):
             if HARMONIC in form and effect.stage is not Stage.POSITION_SENSOR:
                 starts = _ripples(angles, torques, form, FINEST * np.pi / spacing)
             elif "stiffness" in form and ("upper" in form or "lower" in form):
-                side = "upper" if "upper" in form else "lower"
-                starts = _stops(angles, torques, form, side)
-                if EXPONENT in effect.details:
-                    stiffening = {**form, EXPONENT: SQUARE}
-                    starts = [*starts, *_stops(angles, torques, stiffening, side, effect.placed_at(scales)[DEPTH])]
+                starts = _stops(angles, torques, form, "upper" if "upper" in form else "lower")
             elif tuple(form) == ("bias",):
                 starts = _levels(torques)
             else:
@@ -70,16 +64,13 @@ def _ripples(angles: Array, torques: Array, form: Mapping[str, float], finest: f
     return _best(trials)
 
 
-def _stops(
-    angles: Array, torques: Array, form: Mapping[str, float], side: str, depth: float = 1.0
-) -> list[Mapping[str, float]]:
-    """The form with the edge that explains the profile best, besides a constant; `depth` goes with its exponent."""
-    exponent = form.get(EXPONENT, 1.0)
+def _stops(angles: Array, torques: Array, form: Mapping[str, float], side: str) -> list[Mapping[str, float]]:
+    """The form with the edge that explains the profile best, besides a constant."""
     level = np.ones((len(angles), 1))
     sign = 1.0 if side == "upper" else -1.0
     trials = []
     for edge in angles[2:-2]:
-        push = -sign * depth * (np.maximum(sign * (angles - edge), 0.0) / depth) ** exponent
+        push = -sign * np.maximum(sign * (angles - edge), 0.0)
         numbers, share = _explained(np.column_stack([push, level]), torques, level)
         if numbers[0] > 0.0:
             trials.append((share, {**form, side: float(edge), "stiffness": numbers[0]}))
