@@ -60,26 +60,58 @@ def test_a_free_run_is_compared_with_repeats_once(
     assert runs == ([one.label] if source == "repeats" else [])
 
 
+class Asked:
+    """Searches in segments of 50 and more samples, and what each of them answers."""
+
+    def __init__(
+        self, kinds: tuple[str, str], bases: tuple[float, float] = (9.0, 9.0), rows: int = 200, repeats: bool = False
+    ) -> None:
+        self.run: list[tuple[int, object]] = []
+        self.kinds, self.bases, self.rows, self.repeats = kinds, bases, rows, repeats
+
+    def search_in(self, longer: int) -> SimpleNamespace:
+        rows, error = (50, self.bases[0]) if longer == 1 else (self.rows, self.bases[1])
+        return SimpleNamespace(rows=rows, criteria=STANDARD, fit_base=lambda: SimpleNamespace(largest_error=error))
+
+    def answered(self, search: SimpleNamespace, before: object = None) -> object:
+        place = len(self.run)
+        self.run.append((search.rows, before))
+        findings = SimpleNamespace(base=SimpleNamespace(largest_error=self.bases[place]), levels=((),))
+        simulations = SimpleNamespace(as_repeats=lambda one: self.repeats)
+        return diagnosis.Answer(search, findings, simulations, SimpleNamespace(kind=self.kinds[place]))  # type: ignore[arg-type]
+
+    def rows_taken(self) -> int:
+        return diagnosis.asked(self.search_in, self.answered, lambda line: None).search.rows  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("kinds", "rows", "taken"),
     [
-        (("adequate", "unknown_effect"), 200, 0),
-        (("partly_explained", "missing_effect"), 200, 1),
-        (("unknown_effect", "partly_explained"), 200, 1),
-        (("partly_explained", "unknown_effect"), 200, 0),
-        (("unknown_effect", "unknown_effect"), 200, 0),
-        (("unknown_effect", "missing_effect"), 50, 0),
+        (("partly_explained", "missing_effect"), 200, 200),
+        (("unknown_effect", "partly_explained"), 200, 200),
+        (("partly_explained", "unknown_effect"), 200, 50),
+        (("unknown_effect", "unknown_effect"), 200, 50),
+        (("unknown_effect", "missing_effect"), 50, 50),
+        (("missing_effect", "ambiguous"), 200, 50),
     ],
-    ids=["clear", "all of it", "a part", "less", "the same", "no longer segments"],
+    ids=["all of it", "a part", "less", "the same", "no longer segments", "nothing left to ask"],
 )
-def test_what_leaves_much_is_asked_once_more_in_longer_segments(kinds: tuple[str, str], rows: int, taken: int) -> None:
-    searches, run = {1: SimpleNamespace(rows=50), diagnosis.LONGER: SimpleNamespace(rows=rows)}, []
+def test_what_leaves_much_is_judged_once_more_in_longer_segments(kinds: tuple[str, str], rows: int, taken: int) -> None:
+    asked = Asked(kinds, rows=rows)
+    assert asked.rows_taken() == taken
+    again = [before for rows, before in asked.run if rows == 200]
+    assert all(again), "what the first search found is what the second one judges"
+    assert len(again) == (0 if rows == 50 or kinds[0] == "missing_effect" else 1)
 
-    def answered(search: SimpleNamespace, before: object = None) -> object:
-        assert before == (f"found in {run[0].rows}" if run else None)
-        run.append(search)
-        return diagnosis.Answer(search, f"found in {search.rows}", None, SimpleNamespace(kind=kinds[len(run) - 1]))  # type: ignore[arg-type]
 
-    answer = diagnosis.asked(searches.get, answered, lambda line: None)  # type: ignore[arg-type]
-    assert answer.search is run[taken]
-    assert len(run) == (1 if kinds[0] == "adequate" or rows == 50 else 2)
+@pytest.mark.parametrize(
+    ("bases", "repeats", "taken"),
+    [((1.0, 6.0), False, 200), ((1.0, 1.2), False, 50), ((1.0, 6.0), True, 50)],
+    ids=["slow effect", "nothing there either", "as the machine repeats itself"],
+)
+def test_what_short_segments_hide_is_searched_in_longer_ones(
+    bases: tuple[float, float], repeats: bool, taken: int
+) -> None:
+    asked = Asked(("adequate", "missing_effect"), bases, repeats=repeats)
+    assert asked.rows_taken() == taken
+    assert asked.run[1:] == ([(200, None)] if taken == 200 else []), "a search of its own"

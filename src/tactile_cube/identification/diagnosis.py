@@ -183,21 +183,30 @@ class Answer(NamedTuple):
 
 
 def asked(search_in: Callable[[int], Search], answered: Callable[..., Answer], say: Callable[[str], None]) -> Answer:
-    """The answer of a search in usual segments; where that leaves much, of what it found in longer ones, if it is more.
+    """The answer of a search in usual segments, or in longer ones, where those say more.
+
+    Where much is left, what was found is judged in them, for a misread start is a smaller part of a longer segment.
+    Where nothing is left, but free runs are further from the measurement than it is from itself, all is searched in
+    them: starts that are fitted hide what is slower than a segment.
 
     Args:
         search_in: prepares a search in segments so many times as long as usual.
         answered: runs it, or judges with it what another one found.
         say: takes progress lines.
     """
-    answer = answered(search_in(1))
-    if answer.verdict.kind not in NOT_ALL:
-        return answer
+    first = answered(search_in(1))
+    base, criteria = first.findings.base, first.search.criteria
+    nothing_left = base.largest_error <= criteria.floor
+    if first.simulations.as_repeats(base) if nothing_left else first.verdict.kind not in NOT_ALL:
+        return first
     longer = search_in(LONGER)
-    if longer.rows <= answer.search.rows:
-        return answer
-    say(f"{answer.verdict.kind}; once more in segments of {longer.rows} samples instead of {answer.search.rows}")
-    return max(answer, answered(longer, answer.findings), key=lambda one: _SAYS[one.verdict.kind])
+    if longer.rows <= first.search.rows:
+        return first
+    say(f"{first.verdict.kind}; once more in segments of {longer.rows} samples instead of {first.search.rows}")
+    if nothing_left:
+        return first if longer.fit_base().largest_error <= criteria.adequate else answered(longer)
+    second = answered(longer, first.findings if first.findings.levels else None)
+    return max(first, second, key=lambda one: _SAYS[one.verdict.kind])
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:
