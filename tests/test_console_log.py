@@ -1,11 +1,12 @@
 """The log of a run holds what its console showed."""
 
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tactile_cube.console_log import console_kept_in
+from tactile_cube.console_log import NOBODY_READS, console_kept_in
 
 
 def test_lines_errors_and_lines_in_place_are_kept_without_colours(
@@ -32,3 +33,19 @@ def test_the_next_session_appends(tmp_path: Path) -> None:
         with console_kept_in(tmp_path / "a.log"):
             print(word)
     assert [line for line in (tmp_path / "a.log").read_text().splitlines() if line[0] != "-"] == ["first", "second"]
+
+
+def test_a_reader_that_leaves_ends_the_command_without_a_word(tmp_path: Path) -> None:
+    talks = (
+        "from pathlib import Path; from tactile_cube.console_log import NOBODY_READS, console_kept_in\n"
+        f"with console_kept_in(Path({str(tmp_path / 'talk.log')!r})):\n"
+        "    for line in range(100_000): print('line', line)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", talks], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as talker:
+        assert talker.stdout is not None
+        assert talker.stderr is not None
+        assert talker.stdout.readline() == b"line 0\n"
+        talker.stdout.close()
+        assert talker.stderr.read() == b""
+    assert talker.returncode == NOBODY_READS
+    assert "line 0\n" in (tmp_path / "talk.log").read_text()
