@@ -24,7 +24,7 @@ LEAD = 1  # segments at the beginning of a window that only wake such memories, 
 HISTORY = 8.0  # [s] of commands before a window at most, for effects that remember them, such as a rate limit
 WAKING = 0.15  # [s] of the first command before a free run, for effects with a memory
 LONGEST_STEP = 0.0021  # [s] of the simulation; of a finger, as all times here
-FEWEST = 4  # samples that a window needs
+FEWEST = 4  # samples that a window after a trial's first one needs
 ROWS = (
     "commands",
     "measured",
@@ -146,12 +146,13 @@ def cut(
     rows = segment * min(WINDOW, -(-longest // segment))
     forward = max(rows - LEAD * segment, segment)  # from the start of a window to that of the next one
     history = min(round(HISTORY * time / recording.step), (longest - 1) // forward * forward)
+    substeps = steps_per_row(recording, time)
     pieces = [
         piece
         for k, trial in enumerate(trials)
-        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time, speed)
+        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time, speed, substeps)
     ]
-    return _stacked(pieces, history, segment, steps_per_row(recording, time))
+    return _stacked(pieces, history, segment, substeps)
 
 
 def whole_trials(recording: Recording, trials: Sequence[Trial], substeps: int, time: float = 1.0) -> Windows:
@@ -161,28 +162,14 @@ def whole_trials(recording: Recording, trials: Sequence[Trial], substeps: int, t
     """
     longest = max(len(trial.time) for trial in trials)
     history = round(WAKING / recording.step)
-    pieces = []
-    for k, trial in enumerate(trials):
-        fine, jump = _as_simulated(recording, trial, substeps)
-        usable = np.minimum(np.arange(longest), len(trial.time) - 1)
-        present = (np.arange(longest) < len(trial.time)) & trial.valid[usable]
-        half = max(2, round(SMOOTHING * time / trial.step))
-        command, drive = _as_positions(recording, trial), _drive(recording, trial)
-        position, speed, acceleration, spread = _states(trial, command, jump, drive, np.zeros(1, dtype=np.int64), half)
-        pieces.append(
-            _constant_part(recording, trial, k)
-            | {
-                "commands": _rows(fine, -history, longest).reshape((history + longest) * substeps, -1),
-                "measured": trial.position[usable],
-                "jump": jump[usable],
-                "weight": np.repeat(present[:, None].astype(float), len(recording.joints), axis=1),
-                "position": position,
-                "speed": speed,
-                "acceleration": acceleration,
-                "start_noise": np.concatenate([np.ones_like(spread), spread], axis=1),
-                "time": 0.0,
-            }
+    unweighted = np.ones(len(recording.joints))
+    pieces = [
+        piece
+        for k, trial in enumerate(trials)
+        for piece in _pieces(
+            recording, trial, k, longest, longest, longest, history, unweighted, time, np.inf, substeps
         )
+    ]
     return _stacked(pieces, history, longest, substeps)
 
 
@@ -198,18 +185,6 @@ def _stacked(pieces: Sequence[Mapping[str, object]], history: int, segment: int,
     )
 
 
-def _constant_part(recording: Recording, trial: Trial, index: int) -> dict[str, object]:
-    """What all windows of a trial have in common."""
-    return {
-        "gains": _gains(recording, trial),
-        "trial": index,
-        "initialisation": trial.initialisation,
-        "clamped": trial.clamped,
-        "initial_state": np.zeros(2 * len(recording.joints)),
-        "force": trial.force,
-    }
-
-
 def _pieces(
     recording: Recording,
     trial: Trial,
@@ -221,8 +196,8 @@ def _pieces(
     noise: Array,
     time: float,
     speed_known: Array | float,
+    substeps: int,
 ) -> Iterator[dict[str, object]]:
-    substeps = steps_per_row(recording, time)
     fine, jump = _as_simulated(recording, trial, substeps)
     command = _as_positions(recording, trial)
     drive = _drive(recording, trial)
@@ -232,11 +207,11 @@ def _pieces(
         usable = np.minimum(span, len(trial.time) - 1)
         counted = span >= (first + rows - forward if first > 0 else 0)
         present = (span < len(trial.time)) & trial.valid[usable] & counted
-        if np.count_nonzero(present) < FEWEST:
+        if first > 0 and np.count_nonzero(present) < FEWEST:
             continue
         starts = np.minimum(span[::segment], len(trial.time) - 1)
         position, speed, acceleration, spread = _states(trial, command, jump, drive, starts, half)
-        yield _constant_part(recording, trial, index) | {
+        yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": trial.position[usable],
             "jump": np.where((span < len(trial.time))[:, None], jump[usable], 0.0),
@@ -245,7 +220,13 @@ def _pieces(
             "speed": speed,
             "acceleration": acceleration,
             "start_noise": np.concatenate([np.broadcast_to(noise, spread.shape), spread * noise], axis=1),
+            "gains": _gains(recording, trial),
+            "trial": index,
+            "initialisation": trial.initialisation,
             "time": first * trial.step,
+            "clamped": trial.clamped,
+            "initial_state": np.zeros(2 * position.shape[1]),
+            "force": trial.force,
         }
 
 
