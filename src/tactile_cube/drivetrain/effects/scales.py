@@ -104,6 +104,6 @@ def unit_at(unit: str, slides: bool) -> str:
     """A unit as it reads at a joint: `N m s/rad` is `N s/m` at one that slides."""
     if not slides:
         return unit
-    for turning, sliding in (("kg m^2", "kg"), ("N m", "N"), ("rad", "m")):
+    for turning, sliding in (("kg m^2", "kg"), ("(N m)", "N"), ("N m", "N"), ("rad", "m")):
         unit = unit.replace(turning, sliding)
     return unit

@@ -3,6 +3,7 @@
 from math import asinh, sinh, sqrt
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.elasticity import STIFF
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DEFLECTION, TORQUE
 
@@ -46,8 +47,12 @@ class StiffeningElasticity(Effect):
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
         """Springs whose cubic part is as large as the linear one below, at about, or beyond the usual torque."""
         (form,) = cls.forms_at(scales)
-        soft = form["compliance"]
-        return [{**form, "cubic": 1.0 / (soft**3 * (part * scales.torque) ** 2)} for part in CUBIC]
+        springs = (form["compliance"], STIFF * form["compliance"])
+        return [
+            {"compliance": soft, "cubic": 1.0 / (soft**3 * (part * scales.torque) ** 2)}
+            for soft in springs
+            for part in CUBIC
+        ]
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
