@@ -67,6 +67,7 @@ class Asked:
         self, kinds: tuple[str, str], bases: tuple[float, float] = (9.0, 9.0), rows: int = 200, repeats: bool = False
     ) -> None:
         self.run: list[tuple[int, object]] = []
+        self.levels: tuple[object, ...] = ((),)
         self.kinds, self.bases, self.rows, self.repeats = kinds, bases, rows, repeats
 
     def search_in(self, longer: int) -> SimpleNamespace:
@@ -76,7 +77,8 @@ class Asked:
     def answered(self, search: SimpleNamespace, before: object = None) -> object:
         place = len(self.run)
         self.run.append((search.rows, before))
-        findings = SimpleNamespace(base=SimpleNamespace(largest_error=self.bases[place]), levels=((),))
+        error = self.bases[place]
+        findings = SimpleNamespace(base=SimpleNamespace(largest_error=error, error=error), levels=self.levels)
         simulations = SimpleNamespace(as_repeats=lambda one: self.repeats)
         return diagnosis.Answer(search, findings, simulations, SimpleNamespace(kind=self.kinds[place]))  # type: ignore[arg-type]
 
@@ -115,3 +117,13 @@ def test_what_short_segments_hide_is_searched_in_longer_ones(
     asked = Asked(("adequate", "missing_effect"), bases, repeats=repeats)
     assert asked.rows_taken() == taken
     assert asked.run[1:] == ([(200, None)] if taken == 200 else []), "a search of its own"
+
+
+@pytest.mark.parametrize(("error", "searches"), [(2.5, 2), (9.0, 1)])
+def test_where_nothing_was_found_longer_segments_are_searched_unless_short_ones_show_plenty(
+    error: float, searches: int
+) -> None:
+    asked = Asked(("unknown_effect", "unknown_effect"), bases=(error, error))
+    asked.levels = ()
+    assert asked.rows_taken() == 50
+    assert asked.run == [(50, None), (200, None)][:searches]

@@ -199,6 +199,8 @@ def asked(search_in: Callable[[int], Search], answered: Callable[..., Answer], s
     nothing_left = base.largest_error <= criteria.floor
     if first.simulations.as_repeats(base) if nothing_left else first.verdict.kind not in NOT_ALL:
         return first
+    if not first.findings.levels and base.error > criteria.far:
+        return first  # short segments show plenty of what nothing explains
     longer = search_in(LONGER)
     if longer.rows <= first.search.rows:
         return first
