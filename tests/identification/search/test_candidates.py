@@ -56,8 +56,9 @@ def test_a_stiffening_drive_starts_where_its_bend_can_be_seen(tmp_path: Path) ->
     torque = [3.0 * (t.command - t.position) - 0.2 * t.velocity() for t in recording.trials]
     usual = float(np.quantile(np.abs(np.concatenate(torque)[:, 0]), 0.9))
     bends = [c.form["cubic"] * (c.form["compliance"] * usual) ** 3 / usual for c in found]
-    beyond, at, below = 1.0, 100.0, 1e4  # where the bend is, the usual torques
-    assert sorted(bends) == pytest.approx([beyond, beyond, at, at, below, below], rel=0.01)  # from a soft and a stiff start
+    # beyond, at and below the usual torques, from a soft and a stiff start
+    expected = [1.0, 1.0, 100.0, 100.0, 1e4, 1e4]
+    assert sorted(bends) == pytest.approx(expected, rel=0.01)
 
 
 def test_where_torques_are_commanded_a_saturation_starts_among_them(tmp_path: Path) -> None:
