@@ -5,7 +5,7 @@
 Takes the draws of a round that judge.py kept (`--keep`), searches each once with the numbers of conf/criteria, then
 with one of them changed at a time; what was fitted before is not fitted again. Errors are halved and doubled in what
 they are above 1, a perfect model's error; shares above a half in what they are below 1. The search is the one in
-short segments; what it leaves is not asked again in longer ones. Adds a line to answers.jsonl for each draw, and goes on
+short segments; what it leaves is not asked again in longer ones. Adds a line to answers.jsonl for each draw; goes on
 where it stopped; criteria.md sums them up. What an answer is worth says scoring.py, with the held-out error in place of
 that on unseen trials.
 """
