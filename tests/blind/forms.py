@@ -1,9 +1,8 @@
 """Laws of the catalogue as other authors write them, at the sizes that hidden.py gives the usual forms.
 
 Each maker belongs to a family, the catalogue's names for what it is, which are right answers where it is hidden.
-`OUTSIDE` lists the forms that the catalogue's law misses in kind and not by degree: only there is `unknown_effect`
-acceptable. All of this was decided before any diagnosis of a form was run. The catalogue has
-had LuGre's form itself since.
+Names were decided before any diagnosis of a form was run, but for `BESIDE`, which came with round 440000, after an
+answer that was the same law in two words. The catalogue has had LuGre's form itself since.
 """
 
 import numpy as np
@@ -165,5 +164,6 @@ FAMILIES: dict[str, tuple[Maker, tuple[str, ...]]] = {
     )
 }
 """Each form, and the catalogue's names that are right for it."""
-OUTSIDE = ("gear_efficiency",)
-"""Friction that asks which way power flows is no friction in proportion to the load."""
+BESIDE = {"gear_efficiency": ("torque_gain",)}
+"""Names that are right beside a form's own: friction c |torque| sign(speed) with another c where the load drives is the
+mean of both and a part in proportion to the torque itself, which is a gain."""

@@ -20,7 +20,7 @@ import polars as pl
 import sizes
 import yaml
 from excitation import KINDS
-from forms import FAMILIES, OUTSIDE
+from forms import BESIDE, FAMILIES
 from numpy.typing import NDArray
 from physics import simulate
 from worlds import Bench, World, command_of, copy, draw_usual, probe
@@ -100,7 +100,7 @@ def hide(
         **visibility(world, changed, joint, noise, seed),
     }
     if family:
-        truth |= {"names": list(family), "outside": name in OUTSIDE}
+        truth |= {"names": list(family), "beside": list(BESIDE.get(name, ()))}
     return changed, truth
 
 

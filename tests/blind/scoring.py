@@ -5,19 +5,20 @@
 | nothing | `adequate` | | everything else (a false alarm) |
 | one named effect | `missing_effect`, that name and joint | `ambiguous`, truth in the set; see below | the rest |
 | two named effects | `missing_effect` with exactly both | `ambiguous`, both in the sets; see below | the rest |
-| another form | `missing_effect`, its family alone, that joint | one in the set; outside: see below | the rest |
+| another form | `missing_effect`, its family alone, that joint | one in the set | the rest |
 | outside the catalogue | `unknown_effect` | `ambiguous`, `partly_explained` | the rest |
 
 `partly_explained` counts as `ambiguous` does: it names what it found, and says that this is not all.
 
 Forms are laws of the catalogue as other authors write them; the family of each, the catalogue's names that are right
-for it, stands in forms.py. `unknown_effect` is acceptable for the one that is marked as outside, gear_efficiency:
-friction that asks which way power flows differs from friction in proportion to the load in kind. For every other form
-it is wrong: a law of the catalogue says what the effect is.
+for it, stands in forms.py, and so does what may be named beside it, because the form is a sum of both. `unknown_effect`
+is wrong for them: a law of the catalogue says what the effect is.
 
 Exceptions, each counted apart and never as right by name:
 - `absorbed`: the plain model has a constant for it (Coulomb and viscous friction, stiffness, reflected inertia, joint
   offset), so `adequate` after refitting it is acceptable when the refitted model is at the floor on unseen trials.
+- `said`: where there are two or three initialisations, an encoder's wrong zero cannot be told from their being alike by
+  chance; `adequate` is acceptable when the answer says so, with that joint among its `common_offsets`.
 - `invisible`: `adequate` for any other effect is acceptable when the recommended model is at the floor on unseen
   trials: the effect then changes nothing that this bench can measure.
 - Effects of the whole mechanism (payload, coupling) may be named at any joint.
@@ -50,8 +51,9 @@ def _label(names: list[tuple[str, list[str]]]) -> str:
     return " + ".join(f"{name}@{','.join(joints)}" for name, joints in sorted(names)) or "nothing"
 
 
-def _matches(truth: dict[str, Any], name: str, joints: list[str]) -> bool:
-    return name in truth.get("names", [truth["name"]]) and (truth["any_joint"] or set(joints) == set(truth["joints"]))
+def _matches(truth: dict[str, Any], name: str, joints: list[str], beside: bool = False) -> bool:
+    names = [*truth.get("names", [truth["name"]]), *(truth.get("beside", []) if beside else [])]
+    return name in names and (truth["any_joint"] or set(joints) == set(truth["joints"]))
 
 
 def _merged(diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
@@ -80,7 +82,7 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
     """Judge an answer where one or two catalogue effects are hidden."""
     verdict, answer = diagnosis["verdict"], _merged(diagnosis)
     found = [t for t in truths if any(_matches(t, e["name"], e["joints"]) for e in answer)]
-    only = all(any(_matches(t, e["name"], e["joints"]) for t in truths) for e in answer)
+    only = all(any(_matches(t, e["name"], e["joints"], beside=True) for t in truths) for e in answer)
     if verdict == "missing_effect":
         if only and len(found) == len(truths):
             return "right", "named"
@@ -94,11 +96,12 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
         held = [t for t in truths if _in_set(t, diagnosis)]
         return ("acceptable", "in the set") if len(held) == len(truths) else ("wrong", "not in the set")
     if verdict == "adequate":
+        offsets = {one["joint"] for one in diagnosis.get("common_offsets", [])}
+        if all(t["name"] == "position_offset" and set(t["joints"]) <= offsets for t in truths):
+            return "acceptable", "said"
         if not at_floor:
             return "wrong", "missed"
         return "acceptable", "absorbed" if all(t["absorbed"] for t in truths) else "invisible"
-    if all(t.get("outside") for t in truths):
-        return "acceptable", "outside the law's form"
     return "wrong", "called unknown"
 
 

@@ -141,9 +141,9 @@ def _truth(*effects: tuple[str, str], catalogue: bool = True) -> dict[str, Any]:
     return {"effects": made, "rig": "finger", "repeat_scatter": 3e-4, "sensor_floor": 3e-4}
 
 
-def _form(*family: str, outside: bool = False) -> dict[str, Any]:
+def _form(*family: str, beside: tuple[str, ...] = ()) -> dict[str, Any]:
     truth = _truth(("a form", "q1"))
-    truth["effects"][0] |= {"names": list(family), "outside": outside}
+    truth["effects"][0] |= {"names": list(family), "beside": list(beside)}
     return truth
 
 
@@ -152,6 +152,7 @@ def _answer(verdict: str, *effects: tuple[str, str], rivals: tuple[str, ...] = (
 
 
 PLAY, COGS, RUB = ("backlash", "q1"), ("cogging", "q2"), ("coulomb_friction", "q1")
+ZERO = ("position_offset", "q1")
 
 
 @pytest.mark.parametrize(
@@ -181,8 +182,11 @@ PLAY, COGS, RUB = ("backlash", "q1"), ("cogging", "q2"), ("coulomb_friction", "q
         (_form("backlash"), _answer("partly_explained", PLAY), 2.0, "acceptable"),
         (_form("backlash"), _answer("ambiguous", RUB, rivals=("backlash",)), 2.0, "acceptable"),
         (_form("backlash"), _answer("unknown_effect"), 2.0, "wrong"),
-        (_form("backlash", outside=True), _answer("unknown_effect"), 2.0, "acceptable"),
-        (_form("backlash", outside=True), _answer("missing_effect", RUB), 2.0, "wrong"),
+        (_form("backlash", beside=("coulomb_friction",)), _answer("missing_effect", PLAY, RUB), 2.0, "right"),
+        (_form("backlash", beside=("coulomb_friction",)), _answer("missing_effect", RUB), 2.0, "wrong"),
+        (_truth(ZERO), _answer("adequate") | {"common_offsets": [{"joint": "q1"}]}, 9.0, "acceptable"),
+        (_truth(ZERO), _answer("adequate") | {"common_offsets": [{"joint": "q2"}]}, 9.0, "wrong"),
+        (_truth(RUB), _answer("adequate") | {"common_offsets": [{"joint": "q1"}]}, 9.0, "wrong"),
         (_truth(PLAY, catalogue=False), _answer("unknown_effect"), 3.0, "right"),
         (_truth(PLAY, catalogue=False), _answer("ambiguous", COGS), 3.0, "acceptable"),
         (_truth(PLAY, catalogue=False), _answer("missing_effect", COGS), 1.0, "wrong"),

@@ -61,49 +61,66 @@ def test_a_free_run_is_compared_with_repeats_once(
 
 
 class Asked:
-    """Searches in segments of 50 and more samples, and what each of them answers."""
+    """Searches in segments of 50 and more samples, what each answers, and what the answers leave."""
 
     def __init__(
-        self, kinds: tuple[str, str], bases: tuple[float, float] = (9.0, 9.0), rows: int = 200, repeats: bool = False
+        self,
+        kinds: tuple[str, str],
+        left: tuple[float, float] = (1.0, 1.0),
+        bases: tuple[float, float] = (9.0, 9.0),
+        rows: int = 200,
+        repeats: bool = False,
     ) -> None:
-        self.run: list[tuple[int, object]] = []
+        self.run: list[int] = []
         self.levels: tuple[object, ...] = ((),)
-        self.kinds, self.bases, self.rows, self.repeats = kinds, bases, rows, repeats
+        self.kinds, self.left, self.bases, self.rows, self.repeats = kinds, left, bases, rows, repeats
 
     def search_in(self, longer: int) -> SimpleNamespace:
         rows, error = (50, self.bases[0]) if longer == 1 else (self.rows, self.bases[1])
         return SimpleNamespace(rows=rows, criteria=STANDARD, fit_base=lambda: SimpleNamespace(largest_error=error))
 
-    def answered(self, search: SimpleNamespace, before: object = None) -> object:
+    def answered(self, search: SimpleNamespace) -> object:
         place = len(self.run)
-        self.run.append((search.rows, before))
+        self.run.append(search.rows)
         error = self.bases[place]
         findings = SimpleNamespace(base=SimpleNamespace(largest_error=error, error=error), levels=self.levels)
         simulations = SimpleNamespace(as_repeats=lambda one: self.repeats)
-        return diagnosis.Answer(search, findings, simulations, SimpleNamespace(kind=self.kinds[place]))  # type: ignore[arg-type]
+        verdict = SimpleNamespace(kind=self.kinds[place], chosen=SimpleNamespace(largest_error=self.left[place]))
+        return diagnosis.Answer(search, findings, simulations, verdict)  # type: ignore[arg-type]
 
     def rows_taken(self) -> int:
         return diagnosis.asked(self.search_in, self.answered, lambda line: None).search.rows  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
-    ("kinds", "rows", "taken"),
+    ("kinds", "left", "taken"),
     [
-        (("partly_explained", "missing_effect"), 200, 200),
-        (("unknown_effect", "partly_explained"), 200, 200),
-        (("partly_explained", "unknown_effect"), 200, 50),
-        (("unknown_effect", "unknown_effect"), 200, 50),
-        (("unknown_effect", "missing_effect"), 50, 50),
-        (("missing_effect", "ambiguous"), 200, 50),
+        (("partly_explained", "missing_effect"), (5.0, 1.0), 200),
+        (("unknown_effect", "partly_explained"), (5.0, 3.0), 50),
+        (("partly_explained", "unknown_effect"), (5.0, 5.0), 50),
+        (("unknown_effect", "unknown_effect"), (5.0, 5.0), 50),
+        (("ambiguous", "missing_effect"), (1.0, 1.0), 200),
+        (("ambiguous", "ambiguous"), (1.0, 1.0), 50),
+        (("missing_effect", "missing_effect"), (1.8, 1.0), 200),
+        (("missing_effect", "ambiguous"), (1.8, 1.0), 50),
     ],
-    ids=["all of it", "a part", "less", "the same", "no longer segments", "nothing left to ask"],
+    ids=["all", "a part", "less", "the same", "one of several", "still several", "and little is left", "several"],
 )
-def test_what_leaves_much_is_judged_once_more_in_longer_segments(kinds: tuple[str, str], rows: int, taken: int) -> None:
-    asked = Asked(kinds, rows=rows)
+def test_longer_segments_answer_where_only_they_name_all(
+    kinds: tuple[str, str], left: tuple[float, float], taken: int
+) -> None:
+    asked = Asked(kinds, left)
     assert asked.rows_taken() == taken
-    again = [before for rows, before in asked.run if rows == 200]
-    assert all(again), "what the first search found is what the second one judges"
-    assert len(again) == (0 if rows == 50 or kinds[0] == "missing_effect" else 1)
+    assert asked.run == [50, 200]
+
+
+@pytest.mark.parametrize(
+    ("kind", "rows"), [("missing_effect", 200), ("unknown_effect", 50)], ids=["nothing is left", "none are longer"]
+)
+def test_longer_segments_are_not_always_asked(kind: str, rows: int) -> None:
+    asked = Asked((kind, "ambiguous"), rows=rows)
+    assert asked.rows_taken() == 50
+    assert asked.run == [50]
 
 
 @pytest.mark.parametrize(
@@ -114,16 +131,16 @@ def test_what_leaves_much_is_judged_once_more_in_longer_segments(kinds: tuple[st
 def test_what_short_segments_hide_is_searched_in_longer_ones(
     bases: tuple[float, float], repeats: bool, taken: int
 ) -> None:
-    asked = Asked(("adequate", "missing_effect"), bases, repeats=repeats)
+    asked = Asked(("adequate", "missing_effect"), bases=bases, repeats=repeats)
     assert asked.rows_taken() == taken
-    assert asked.run[1:] == ([(200, None)] if taken == 200 else []), "a search of its own"
+    assert asked.run[1:] == ([200] if taken == 200 else [])
 
 
 @pytest.mark.parametrize(("error", "searches"), [(2.5, 2), (9.0, 1)])
 def test_where_nothing_was_found_longer_segments_are_searched_unless_short_ones_show_plenty(
     error: float, searches: int
 ) -> None:
-    asked = Asked(("unknown_effect", "unknown_effect"), bases=(error, error))
+    asked = Asked(("unknown_effect", "unknown_effect"), (error, error), bases=(error, error))
     asked.levels = ()
     assert asked.rows_taken() == 50
-    assert asked.run == [(50, None), (200, None)][:searches]
+    assert asked.run == [50, 200][:searches]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -38,9 +37,10 @@ UNPROVEN = 3
 LONGER = 4
 """Times as long as usual that segments are where the usual ones leave much: what a start misread, as where a joint
 sticks within a sample, is a smaller part of them."""
-NOT_ALL = ("partly_explained", "unknown_effect")
+NOT_ALL = ("unknown_effect", "partly_explained")
 """Verdicts that say that more is missing than is named."""
-_SAYS = defaultdict(lambda: 2, unknown_effect=0, partly_explained=1)  # how much an answer says
+LESS = (*NOT_ALL, "ambiguous")
+"""Verdicts that do not say what is missing and that it is all, the one that says least first."""
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,8 @@ def diagnose(
     def search_in(longer: int) -> Search:
         return Search(fitted_part, held_out, noise, effects, say, known, criteria, folds, longer)
 
-    def answered(search: Search, before: Findings | None = None) -> Answer:
-        findings = search.again(before) if before else search.run()
+    def answered(search: Search) -> Answer:
+        findings = search.run()
         simulations = Simulations(search, findings.base, floor, engine, step)
         return Answer(search, findings, simulations, decide(findings, simulations, criteria))
 
@@ -181,23 +181,31 @@ class Answer(NamedTuple):
     simulations: Simulations
     verdict: Verdict
 
+    @property
+    def says(self) -> tuple[int, bool]:
+        """How much it says, to be compared: how nearly it names all that is missing, then whether little is left."""
+        little_left = self.verdict.chosen.largest_error <= self.search.criteria.tolerated
+        return (LESS.index(self.verdict.kind) if self.verdict.kind in LESS else len(LESS)), little_left
 
-def asked(search_in: Callable[[int], Search], answered: Callable[..., Answer], say: Callable[[str], None]) -> Answer:
-    """The answer of a search in usual segments, or in longer ones, where those say more.
 
-    Where much is left, what was found is judged in them, for a misread start is a smaller part of a longer segment.
-    Where nothing is left, but free runs are further from the measurement than it is from itself, all is searched in
-    them: starts that are fitted hide what is slower than a segment.
+def asked(
+    search_in: Callable[[int], Search], answered: Callable[[Search], Answer], say: Callable[[str], None]
+) -> Answer:
+    """The answer of a search in usual segments, or in longer ones, where only those name all that is missing.
+
+    Where much is left, or several laws do as well, a misread start is a smaller part of a longer segment, and what is
+    slower shows. Where nothing is left, but free runs are further from the measurement than it is from itself, starts
+    that are fitted hide what is slower than a segment.
 
     Args:
         search_in: prepares a search in segments so many times as long as usual.
-        answered: runs it, or judges with it what another one found.
+        answered: runs it.
         say: takes progress lines.
     """
     first = answered(search_in(1))
     base, criteria = first.findings.base, first.search.criteria
     nothing_left = base.largest_error <= criteria.floor
-    if first.simulations.as_repeats(base) if nothing_left else first.verdict.kind not in NOT_ALL:
+    if first.simulations.as_repeats(base) if nothing_left else first.says == (len(LESS), True):
         return first
     if not first.findings.levels and base.error > criteria.far:
         return first  # short segments show plenty of what nothing explains
@@ -207,8 +215,8 @@ def asked(search_in: Callable[[int], Search], answered: Callable[..., Answer], s
     say(f"{first.verdict.kind}; once more in segments of {longer.rows} samples instead of {first.search.rows}")
     if nothing_left:
         return first if longer.fit_base().largest_error <= criteria.adequate else answered(longer)
-    second = answered(longer, first.findings if first.findings.levels else None)
-    return max(first, second, key=lambda one: _SAYS[one.verdict.kind])
+    second = answered(longer)
+    return second if second.verdict.kind not in NOT_ALL and second.says > first.says else first
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:

@@ -9,7 +9,7 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales
 from tactile_cube.identification.search.candidates import Candidate, candidates
 from tactile_cube.identification.search.screening import Score
-from tactile_cube.identification.search.shortlist import resized
+from tactile_cube.identification.search.shortlist import resized, start
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -32,6 +32,18 @@ def test_several_numbers_start_with_either_sign() -> None:
 def test_a_single_number_and_a_place_have_no_other_sign() -> None:
     assert find_effect("torque_bias").starts_at(FINGER) == [{"bias": 0.005}]
     assert len(find_effect("joint_stop").starts_at(FINGER)) == 6
+
+
+@pytest.mark.parametrize(
+    ("second", "taken"),
+    [((0.96, 0.5), 1), ((0.90, 0.5), 0), ((0.96, 7.0), 0), ((0.96, -1.0), 0)],
+    ids=["nearer its size", "clearly less", "further from it", "of the other sign"],
+)
+def test_of_starts_that_look_as_good_the_one_nearest_its_size_is_refitted(
+    second: tuple[float, float], taken: int
+) -> None:
+    scores = [replace(SCORE, gain=1.0, factor=6.0), replace(SCORE, gain=second[0], factor=second[1])]
+    assert start(scores) is scores[taken]
 
 
 def test_a_single_number_starts_as_large_as_the_first_look_says() -> None:

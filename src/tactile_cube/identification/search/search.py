@@ -39,7 +39,6 @@ RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the 
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
 FAR_BEHIND_AT_FLOOR = 2.0  # the same where the best one explains nearly everything
 DEEPEST = 3  # effects in combination
-AGAIN = 6  # explanations of another search that are judged once more
 BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
 Divided = tuple[Recording, Recording]
 """Trials to fit and trials to judge by."""
@@ -129,19 +128,6 @@ class Search(Division):
             levels = [(shared,)] if shared else []
         unproven = tuple(sorted(doubtful, key=lambda e: e.error))
         return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed))
-
-    def again(self, findings: Findings) -> Findings:
-        """What another search found, refitted and judged in the segments of this one."""
-        base = self.fit_base()
-        self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
-        nominal = self.judged(self.start)
-        every = {one.label: one for level in (*findings.levels, findings.surpassed) for one in level}
-        best = sorted(every.values(), key=lambda e: e.judgement.costs.sum())[:AGAIN]
-        found = [self.explanation(base, one.effects, one.fit.model, len(best)) for one in best]
-        found = [one for one in found if self.worthwhile(one, base, base)]
-        levels = (tuple(sorted(found, key=lambda e: e.judgement.costs.sum())),)
-        needed = found and base.largest_error > self.criteria.floor
-        return replace(findings, base=base, nominal=nominal, levels=levels if needed else (), surpassed=())
 
     def one_by_one(
         self, base: Explanation

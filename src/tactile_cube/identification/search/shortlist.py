@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from tactile_cube.identification.search.screening import Score
 VARIANTS = 1  # further forms or places of these effects that come along
 RESIZED = (0.2, 6.0)  # factors of the first look that are believed
 UNDERRATED = 4.0  # times that a refit may explain more than the first look
+AS_GOOD = 0.95  # share of the best first-order gain from which on a start of the same law looks as good
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 
 
@@ -20,10 +22,11 @@ def with_groups(scores: Sequence[Score], needed: float) -> list[Candidate]:
 
     None where even the best of them is far from taking as much off the squared error as is `needed`.
     """
-    best: dict[tuple[str, tuple[str, ...], tuple[str, ...]], Score] = {}
+    starts: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[Score]] = {}
     for score in scores:
         key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
-        best.setdefault(key, score)
+        starts.setdefault(key, []).append(score)
+    best = {key: start(same) for key, same in starts.items()}
     ranked = [(score.gain, resized(score)) for score in best.values() if score.gain > 0.0]
     families: dict[tuple[str, tuple[str, ...]], list[Score]] = {}
     for (name, form, _), score in best.items():
@@ -39,6 +42,17 @@ def with_groups(scores: Sequence[Score], needed: float) -> list[Candidate]:
     if UNDERRATED * most < needed:
         return []
     return [candidate for gained, candidate in ranked if gained > PROMISING * most]
+
+
+def start(same: Sequence[Score]) -> Score:
+    """Of starts of one law, best first, the one that is nearest to its size among those that look as good as the best.
+
+    What has to become six times as large, as a small mass where a large one is meant, is extrapolated too far.
+    """
+    return min(
+        (score for score in same if score.gain >= AS_GOOD * same[0].gain),
+        key=lambda score: abs(math.log(score.factor)) if score.factor > 0.0 else math.inf,
+    )
 
 
 def resized(score: Score) -> Candidate:
