@@ -16,6 +16,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.registration_hook import register_with_gymnasium
 
 if TYPE_CHECKING:
+    from tactile_cube.api.batch import diagnose_each
     from tactile_cube.api.comparison import compare
     from tactile_cube.api.deployment import deploy
     from tactile_cube.api.diagnosis import diagnose
@@ -35,6 +36,7 @@ _PLACES = {
     "compare": "api.comparison",
     "deploy": "api.deployment",
     "diagnose": "api.diagnosis",
+    "diagnose_each": "api.batch",
     "env_config": "api.environment",
     "make_env": "api.environment",
     "evaluate": "api.evaluation",
@@ -57,6 +59,7 @@ __all__ = [
     "compare",
     "deploy",
     "diagnose",
+    "diagnose_each",
     "env_config",
     "evaluate",
     "export",

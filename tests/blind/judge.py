@@ -4,8 +4,9 @@
 
 Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped, and
 `--draws 0` only sums up what is there. identification.md, .json and .png (the confusion matrix) beside it sum the
-lines up. What counts as right stands in scoring.py. A round to be published runs on a clean commit, with seeds that no
-round before it used; its line in docs/results/rounds.md is printed at the end.
+lines up. `--address` gives the draws to the cores of a Ray cluster. What counts as right stands in scoring.py. A round
+to be published runs on a clean commit, with seeds that no round before it used; its line in docs/results/rounds.md is
+printed at the end.
 """
 
 import argparse
@@ -16,8 +17,8 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from generator import WORLDS, play, write
 from page import FIRST_SEED, GOAL, markdown, picture, round_row
 from scoring import score
+
+from tactile_cube.api.batch import each
 
 
 def commit() -> str:
@@ -58,9 +61,7 @@ def validation_error(recording: Path, model: Path, out: Path) -> float | None:
     return None if answer is None else float(answer["error"]["overall"])
 
 
-def judge(
-    seed: int, folder: Path, seconds: float | None, keep: bool, engine: str = "own", worlds: str = "usual"
-) -> dict[str, Any]:
+def judge(folder: Path, seconds: float | None, keep: bool, engine: str, worlds: str, seed: int) -> dict[str, Any]:
     """Generate, diagnose, compare and judge one seed."""
     place = folder / f"draw_{seed}"
     truth = write(seed, place, seconds, engine=engine, worlds=worlds)
@@ -142,6 +143,11 @@ def _truth_class(line: dict[str, Any]) -> str:
     return "one effect" if effects[0]["in_catalogue"] else "outside the catalogue"
 
 
+def in_words(found: dict[str, Any]) -> str:
+    """A score as a line of the terminal."""
+    return f"{found['truth']}  ->  {found['answer']}  {found['outcome']} ({found['why']})"
+
+
 def set_size(diagnosis: dict[str, Any]) -> int:
     """How many candidates an ambiguous answer leaves open."""
     return len({n for e in diagnosis["effects"] for n in [f"{e['name']}@{e['joints']}", *e.get("rivals", [])]})
@@ -204,6 +210,7 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=60)
     parser.add_argument("--out", type=Path, default=Path("outputs/blind"))
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--address", help="host:port of a Ray cluster whose nodes have this checkout, or `local`")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--seconds", type=float, help="length of every trial (default: drawn)")
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own", help="what moves the measured rigs")
@@ -221,24 +228,15 @@ def main() -> None:
     command += f" --seconds {args.seconds:g}" if args.seconds else ""
     command += f" --engine {args.engine}" * (args.engine != "own")
     command += f" --worlds {args.worlds}" * (args.worlds != "usual")
-    with ThreadPoolExecutor(args.jobs) as pool:
-        submitted = [pool.submit(judge, s, args.out, args.seconds, args.keep, args.engine, args.worlds) for s in wanted]
-        for future in as_completed(submitted):
-            line = future.result()
-            with (args.out / "verdicts.jsonl").open("a") as lines:
-                lines.write(json.dumps(line) + "\n")
-            found = judged(line)["score"]
-            print(
-                f"{line['seed']}  {found['truth']}  ->  {found['answer']}  {found['outcome']} ({found['why']})",
-                flush=True,
-            )
-            if "after_experiment" in line:
-                again = judged(line)["after_experiment"]["score"]
-                print(
-                    f"        after the next experiment: {again['answer']}  {again['outcome']} ({again['why']})",
-                    flush=True,
-                )
-            report(args.out, command)
+    work = partial(judge, args.out, args.seconds, args.keep, args.engine, args.worlds)
+    for _, line in each(work, wanted, args.jobs, args.address):
+        with (args.out / "verdicts.jsonl").open("a") as lines:
+            lines.write(json.dumps(line) + "\n")
+        print(f"{line['seed']}  {in_words(judged(line)['score'])}", flush=True)
+        if "after_experiment" in line:
+            again = judged(line)["after_experiment"]["score"]
+            print(f"        after the next experiment: {in_words(again)}", flush=True)
+        report(args.out, command)
     summary = report(args.out, command)
     print(json.dumps({k: v for k, v in summary.items() if k != "draws_judged"}, indent=1))
     print(f"line for docs/results/rounds.md:\n{round_row(summary, command)}")

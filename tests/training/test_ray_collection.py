@@ -111,7 +111,7 @@ def test_without_ray_the_error_is_one_line_that_says_how_to_get_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(InputError, match=r"^collector=ray: Ray is not installed; pip install 'tactile-cube\[ray\]'$"):
+    with pytest.raises(InputError, match=r"^Ray is not installed; pip install 'tactile-cube\[ray\]'$"):
         tiny_run(tmp_path, collector=RAY)
 
 

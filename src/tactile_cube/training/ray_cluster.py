@@ -10,8 +10,9 @@ import socket
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import TimeoutError
-from typing import Any
+from typing import Any, TypeVar
 
 from tactile_cube.errors import InputError
 from tactile_cube.training.background import Background
@@ -23,6 +24,8 @@ CONNECT = 5.0
 """Longest wait [s] for a cluster's address to accept a connection."""
 ANSWER = 60.0
 """Longest wait [s] for a cluster to answer as one: on two busy cores it took 3."""
+T = TypeVar("T")
+R = TypeVar("R")
 QUIET: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
 
 
@@ -35,18 +38,19 @@ class RayCluster:
             ends.
         workers: how many there will be, each with a core.
         seconds: how long to try to start one of its own.
+        asked: the setting that asks for it, for what is said about it.
 
     Raises:
         InputError: Ray is not installed; the address is none, or nothing or something else answers there.
         CollectionError: a cluster of its own did not start.
     """
 
-    def __init__(self, address: str | None, workers: int, seconds: float):
+    def __init__(self, address: str | None, workers: int, seconds: float, asked: str = "collector.address"):
         self._folder: str | None = None
         self._reaper: subprocess.Popen[bytes] | None = None
         ray = _ray()
         if address is not None:
-            join(ray, address)
+            join(ray, address, asked)
             return
         until = time.monotonic() + seconds
         while self._reaper is None:
@@ -85,6 +89,19 @@ class RayCluster:
         """Store a value, for calls that take it; it goes to each machine once."""
         return _ray().put(value)
 
+    def each(self, work: Callable[[T], R], over: Sequence[T]) -> Iterator[tuple[T, R]]:
+        """What `work` makes of each, a core each, in the order in which it is done; lost with a node, it runs again."""
+        ray = _ray()
+        call = ray.remote(num_cpus=1)(_applied)
+        waiting = {call.remote(work, one): one for one in over}
+        while waiting:
+            (done,), _ = ray.wait(list(waiting))
+            one = waiting.pop(done)
+            try:
+                yield one, ray.get(done)
+            except ray.exceptions.RayTaskError as error:
+                raise error.cause or error from None
+
     def close(self) -> None:
         """Leave the cluster, which ends what ran there for this process; one of its own ends."""
         _ray().shutdown()
@@ -96,7 +113,11 @@ class RayCluster:
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def join(ray: Any, address: str) -> None:
+def _applied(work: Callable[[T], R], one: T) -> R:
+    return work(one)
+
+
+def join(ray: Any, address: str, asked: str = "collector.address") -> None:
     """Connect the module `ray` to the cluster at an address.
 
     Raises:
@@ -104,22 +125,21 @@ def join(ray: Any, address: str) -> None:
     """
     host, _, port = address.rpartition(":")
     if not host or "/" in host or not port.isdigit():
-        raise InputError(f"collector.address={address}: give host:port of a Ray cluster's head, e.g. 192.168.1.2:6379")
+        raise InputError(f"{asked}={address}: give host:port of a Ray cluster's head, e.g. 192.168.1.2:6379")
     try:
         socket.create_connection((host, int(port)), timeout=CONNECT).close()
     except (OSError, OverflowError) as error:
         raise InputError(
-            f"collector.address={address}: nothing answers there ({error}); is the cluster up (ray status)?"
+            f"{asked}={address}: nothing answers there ({error}); is the cluster up (ray status)?"
         ) from None
     thread = Background()  # Ray tries for minutes
     try:
         thread.submit(lambda: ray.init(address=address, **QUIET)).result(timeout=ANSWER)
     except TimeoutError:
-        raise InputError(f"collector.address={address}: no Ray cluster answered within {ANSWER:g} s") from None
+        raise InputError(f"{asked}={address}: no Ray cluster answered within {ANSWER:g} s") from None
     except Exception as error:
         raise InputError(
-            f"collector.address={address}: {_line(error)}; this machine must be a node of it "
-            f"(ray start --address={address})"
+            f"{asked}={address}: {_line(error)}; this machine must be a node of it (ray start --address={address})"
         ) from None
     finally:
         thread.close()
@@ -129,7 +149,7 @@ def _ray() -> Any:
     try:
         import ray
     except ImportError:
-        raise InputError("collector=ray: Ray is not installed; pip install 'tactile-cube[ray]'") from None
+        raise InputError("Ray is not installed; pip install 'tactile-cube[ray]'") from None
     from ray._private import auto_init_hook
 
     auto_init_hook.enable_auto_connect = False  # a call that comes late must not start a cluster or find another

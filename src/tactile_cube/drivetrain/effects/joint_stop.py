@@ -56,8 +56,11 @@ class JointStop(Effect):
 
     @classmethod
     def placed_at(cls, scales: Scales) -> dict[str, float]:
-        """The stiffness is that of a push as deep as the nearest start lies within the range."""
-        return {"depth": SHARES[0] * scales.span}
+        """The stiffness is that of a push as deep as the middle start lies within the range.
+
+        Far from where the pushes are, every exponent has a stiffness of its own, and a fit of both hardly moves.
+        """
+        return {"depth": SHARES[1] * scales.span}
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:

@@ -93,7 +93,8 @@ class Search(Division):
             known: the model to begin with; None: what the recording's owner states.
             criteria: what decides.
             folds: the same trials divided in other ways, for where these few held-out trials do not tell.
-            longer: times as long as usual that segments are, and as few, unless small errors grow in them.
+            longer: times as long as usual that segments are, and as few, unless small errors grow in them; more than
+                once, no sets of effects are looked for, which takes minutes and has been done in the usual ones.
         """
         start = nominal_model(fitted, known)
         effects = every_effect(effects, start)
@@ -104,6 +105,7 @@ class Search(Division):
         segments = min(SEGMENTS, SEGMENTS * usual.segment // segment)
         super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
         self.say, self.criteria, self.effects, self.folds = say, criteria, effects, folds
+        self.sets = longer == 1
         self.candidates = candidates(shooting.sizes, effects)
         self.last_scores: list[Score] = []
         self.leaders: list[Proposal] = []
@@ -117,7 +119,7 @@ class Search(Division):
         found = [e for level in levels for e in level]
         best = min(found, key=lambda e: e.error, default=base)
         surpassed: list[Explanation] = []
-        if best.error > self.criteria.far:
+        if self.sets and best.error > self.criteria.far:
             folds = [
                 Division(self.shooting, *one, self.noise, self.segment, self.known, self.segments) for one in self.folds
             ]

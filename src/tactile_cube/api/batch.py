@@ -1,0 +1,130 @@
+"""Many calls at once: in processes of this machine, or on the cores of a Ray cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from tactile_cube.api.comparison import opened
+from tactile_cube.api.job import PathLike
+from tactile_cube.errors import InputError
+from tactile_cube.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from tactile_cube.measurement.recordings.recording import Recording
+
+T = TypeVar("T")
+R = TypeVar("R")
+LOCAL = "local"
+"""The address of a Ray cluster of one's own."""
+START = 120.0
+"""Longest wait [s] for a cluster of one's own: a node has 30 s, which a busy machine may not keep."""
+
+
+def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1, address: str | None = None) -> Iterator[tuple[T, R]]:
+    """What `work` makes of each, in the order in which it is done.
+
+    Args:
+        work: runs in other processes, so it and what it takes and gives can be pickled. On a cluster it runs again
+            where its node is lost.
+        over: what it is given, one each.
+        jobs: processes of this machine, or cores of a cluster of one's own.
+        address: host:port of a Ray cluster that this machine is a node of, `local` for one of one's own, which ends
+            with the call; None: processes of this machine.
+
+    Raises:
+        InputError: no such cluster; what `work` raises.
+    """
+    if address is None:
+        with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+            futures = {pool.submit(work, one): one for one in over}
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        return
+    from tactile_cube.training.ray_cluster import RayCluster
+
+    cluster = RayCluster(None if address == LOCAL else address, jobs, START, "address")
+    try:
+        yield from cluster.each(work, over)
+    finally:
+        cluster.close()
+
+
+class Answered(NamedTuple):
+    """What `diagnose` answered, away from what it was made of.
+
+    Attributes:
+        text: the answer in plain words.
+        data: the content of diagnosis.json.
+    """
+
+    text: str
+    data: dict[str, Any]
+
+
+def diagnose_each(
+    recordings: Sequence[PathLike], *settings: str, out: PathLike, jobs: int = 1, address: str | None = None
+) -> Iterator[tuple[Path, Answered | InputError]]:
+    """Diagnose many recordings at once; the files of each go to a folder of its name in `out`.
+
+    Recordings are read and answers written here, so that the nodes of a cluster need neither.
+
+    Args:
+        recordings: folders, each with a name of its own.
+        settings: of every diagnosis, as on the command line.
+        out: folder of the answers.
+        jobs: see `each`.
+        address: see `each`.
+
+    Yields:
+        Folder and answer, or what is wrong with the recording, in the order in which they are done.
+
+    Raises:
+        InputError: two recordings with one name; no such cluster.
+
+    Example:
+        >>> for folder, answer in tactile_cube.diagnose_each(["monday", "friday"], out="outputs/week", jobs=2):
+        ...     print(folder, answer)
+    """
+    folders = {Path(folder).resolve().name: Path(folder) for folder in recordings}
+    if len(folders) < len(recordings):
+        raise InputError(f"recordings={[str(one) for one in recordings]}: give folders that differ in their last name")
+    sound: list[tuple[str, Recording]] = []
+    for name, folder in folders.items():
+        try:
+            sound.append((name, opened(folder)))
+        except InputError as error:
+            yield folder, error
+    for (name, _), found in each(partial(_diagnosed, settings, Path(out)), sound, jobs, address):
+        if isinstance(found, InputError):
+            yield folders[name], found
+            continue
+        (Path(out) / name).mkdir(parents=True, exist_ok=True)
+        for file, content in found.files.items():
+            write_whole(Path(out) / name / file, content)
+        yield folders[name], found.answer
+
+
+class _Found(NamedTuple):
+    answer: Answered
+    files: dict[str, bytes]
+
+
+def _diagnosed(settings: Sequence[str], out: Path, named: tuple[str, Recording]) -> _Found | InputError:
+    from tactile_cube.api.diagnosis import diagnose
+
+    name, recording = named
+    try:
+        found = diagnose(recording, *settings, say=lambda line: None)
+    except InputError as error:
+        return error
+    with tempfile.TemporaryDirectory() as place:
+        found.write(place)
+        files = {path.name: path.read_bytes() for path in Path(place).iterdir()}
+        told = {file: content.replace(place.encode(), str(out / name).encode()) for file, content in files.items()}
+    return _Found(Answered(found.text, found.data), told)

@@ -1,0 +1,63 @@
+"""Many calls at once, in processes and on a Ray cluster."""
+
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+import tactile_cube
+from tactile_cube import InputError
+from tactile_cube.api import batch
+from tests.api.test_measuring import RIG
+from tests.measurement.small_rig import URDF
+
+
+def refused(word: str) -> None:
+    raise InputError(f"{word}: refused")
+
+
+def one_after_the_other(work: Callable, over: Sequence, jobs: int, address: str | None) -> Iterator[tuple]:
+    """In place of `each`."""
+    yield from ((one, work(one)) for one in over)
+
+
+@pytest.mark.parametrize("address", [None, "local"], ids=["processes", "Ray"])
+def test_each_is_done_once_and_an_error_comes_through(address: str | None) -> None:
+    if address:
+        pytest.importorskip("ray", reason="needs Ray: pip install '.[ray]'")
+    numbers = [1.0, 4.0, 9.0, 16.0]
+    assert sorted(batch.each(math.sqrt, numbers, 2, address)) == [(x, math.sqrt(x)) for x in numbers]
+    with pytest.raises(InputError, match="this one: refused"):
+        list(batch.each(refused, ["this one"], 1, address))
+
+
+def test_an_address_that_is_none_is_refused() -> None:
+    pytest.importorskip("ray", reason="needs Ray: pip install '.[ray]'")
+    with pytest.raises(InputError, match=r"^address=nonsense: give host:port"):
+        list(batch.each(math.sqrt, [1.0], 1, "nonsense"))
+
+
+def test_recordings_are_diagnosed_into_folders_of_their_names_and_one_that_cannot_be_read_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "two.urdf").write_text(URDF)
+    hidden = 'source.hidden=["torque_bias@b: bias=0.05"]'
+    sound = tmp_path / "sound"
+    tactile_cube.record(sound, *RIG, f"source.urdf={tmp_path}/two.urdf", hidden, "source.validation=false")
+    monkeypatch.setattr(batch, "each", one_after_the_other)
+    found = dict(tactile_cube.diagnose_each([sound, tmp_path / "gone"], "engine=fast", out=tmp_path / "out"))
+    assert isinstance(found[tmp_path / "gone"], InputError)
+    answer = found[sound]
+    assert answer.data["verdict"] == "missing_effect"
+    assert "torque_bias" in answer.text
+    made = tmp_path / "out" / "sound"
+    assert json.loads((made / "diagnosis.json").read_text())["verdict"] == "missing_effect"
+    assert str(made / "model.yaml") in (made / "report.html").read_text(), "commands of the report name the file"
+    assert tactile_cube.read_model(made / "model.yaml").effects[0].effect == "torque_bias@b"
+
+
+def test_recordings_of_one_name_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="give folders that differ in their last name"):
+        list(tactile_cube.diagnose_each([tmp_path / "a" / "log", tmp_path / "b" / "log"], out=tmp_path))
