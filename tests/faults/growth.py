@@ -21,6 +21,10 @@ import psutil
 EVERY = 10.0
 """Seconds between two rows."""
 COLUMNS = ("seconds", "resident_mb", "private_mb", "open_files", "threads", "log_kb", "steps")
+SHOWN = {
+    "private_mb": "memory [MB]", "open_files": "open files", "threads": "threads", "log_kb": "logs [kB]",
+    "steps": "steps",
+}  # fmt: skip
 BENCH = ("source.joints=[q3]", "source.duration=3", "source.hidden=[]", "source.validation=false")
 """One joint and trials of 3 s: a diagnosis is short."""
 TRAINING = ("+experiment=smoke", "training.steps=100000000", "training.replay_size=20000", "name=growth")
@@ -99,15 +103,14 @@ def diagnose_often(number: int, out: Path) -> list[dict[str, float]]:
     return rows
 
 
-def draw(rows: list[dict[str, float]], path: Path) -> None:
-    """Draw each column over time."""
+def draw(rows: list[dict[str, float]], path: Path, shown: dict[str, str]) -> None:
+    """Draw columns over time; `shown`: column -> label."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7, 7), layout="constrained")
-    shown = ("private_mb", "open_files", "log_kb", "steps")
-    for axis, name in zip(figure.subplots(len(shown), 1, sharex=True), shown, strict=True):
+    figure = Figure(figsize=(7, 1.6 * len(shown)), layout="constrained")
+    for axis, (name, label) in zip(figure.subplots(len(shown), 1, sharex=True), shown.items(), strict=True):
         axis.plot([row["seconds"] / 60 for row in rows], [row[name] for row in rows])
-        axis.set(ylabel=name, ylim=(0, None))
+        axis.set(ylabel=label, ylim=(0, None))
         axis.grid(alpha=0.3)
     axis.set_xlabel("minutes")
     figure.savefig(path, dpi=100)
@@ -123,7 +126,9 @@ def main() -> None:
     words.add_argument("--diagnoses", type=int)
     given = words.parse_args()
     if given.diagnoses is not None:
-        draw(diagnose_often(given.diagnoses, given.out), given.out / "diagnoses.png")
+        rows = diagnose_often(given.diagnoses, given.out)
+        shown = {name: label for name, label in SHOWN.items() if name != "log_kb"} | {"steps": "diagnoses"}
+        draw(rows, given.out / "diagnoses.png", shown)
         return
     if given.pid is not None:
         rows = watch(psutil.Process(given.pid), given.folder, given.minutes, given.out)
@@ -134,7 +139,7 @@ def main() -> None:
             rows = watch(psutil.Process(run.pid), Path(place), given.minutes, given.out)
             run.terminate()
             run.wait(60)
-    draw(rows, given.out / "growth.png")
+    draw(rows, given.out / "growth.png", SHOWN)
 
 
 if __name__ == "__main__":
