@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tactile_cube.benchmarking.report import Figure, Section
@@ -13,20 +15,25 @@ OPTIONS = {
     "fast, 20 iterations": SimulationOptions(solver_iterations=20),
     "fast, 50 iterations": SimulationOptions(solver_iterations=50),
     "faithful": SimulationOptions.faithful(),
+    "engine=mujoco, fast": SimulationOptions.fast("mujoco"),
+    "engine=mujoco, faithful": SimulationOptions.faithful("mujoco"),
 }
 REFERENCE_NAME = "reference: 0.5 ms, 500 iterations"
 
 
 def accuracy(options: dict[str, SimulationOptions] | None = None, reference: SimulationOptions = REFERENCE) -> Section:
-    """Speed of each option, and how far a held and twisted cube is from the converged reference."""
-    title = "a cube held for 10 s and twisted by 0.5 rad, against a converged simulation"
+    """Speed of each option, and how far a held and twisted cube is from its engine's converged reference."""
+    title = "a cube held for 10 s and twisted by 0.5 rad, against the same engine converged"
     section = Section("accuracy", title, REFERENCE_NAME)
-    converged = measure_accuracy(reference)
-    found = {name: measure_accuracy(option) for name, option in (options or OPTIONS).items()}
-    for name, one in {**found, REFERENCE_NAME: converged}.items():
-        speed = one.steps_per_second
-        ratio = speed / converged.steps_per_second
-        section.figures.append(Figure(name, speed, speed, speed, "steps/s", ratio, _deviation(one, converged)))
+    options = options or OPTIONS
+    converged = {e: measure_accuracy(replace(reference, engine=e)) for e in {o.engine for o in options.values()}}
+    yardstick = converged[reference.engine].steps_per_second
+    references = {REFERENCE_NAME if e == reference.engine else f"engine={e}, {REFERENCE_NAME}": e for e in converged}
+    found = {name: (measure_accuracy(option), option.engine) for name, option in options.items()}
+    found |= {name: (converged[engine], engine) for name, engine in references.items()}
+    for name, (one, engine) in found.items():
+        speed, note = one.steps_per_second, _deviation(one, converged[engine])
+        section.figures.append(Figure(name, speed, speed, speed, "steps/s", speed / yardstick, note))
     return section
 
 

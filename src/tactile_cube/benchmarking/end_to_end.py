@@ -50,15 +50,16 @@ def end_to_end(
     frames = worlds * steps
     title = f"table task, {frames} environment steps and {updates} updates of batch 256 an iteration"
     section = Section("end_to_end", title, YARDSTICK)
-    environment = table_environment()
-    agents: dict[str, Callable[..., Agent]] = {
-        "tactile_cube, sac_fast bf16": partial(FastSac, precision="bf16"),
-        "tactile_cube, SACLoss": Sac,
+    bullet, fast = table_environment(), partial(FastSac, precision="bf16")
+    learners: dict[str, tuple[Environment, Callable[..., Agent]]] = {
+        "tactile_cube, sac_fast bf16": (bullet, fast),
+        "tactile_cube, sac_fast bf16, engine=mujoco": (table_environment("mujoco"), fast),
+        "tactile_cube, SACLoss": (bullet, Sac),
     }
     with ExitStack() as stack:
         cases: dict[str, Callable[[], object]] = {}
         workers: dict[str, Callable[[], float]] = {}
-        for name, make in agents.items():
+        for name, (environment, make) in learners.items():
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
             run = _run(environment, partial(make, hidden=(hidden, hidden)), folder, worlds, steps, updates)
             stack.callback(run.close)

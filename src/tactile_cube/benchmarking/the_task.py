@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from tactile_cube.simulation.options import EngineName
 from tactile_cube.training.environment import Environment, rotation_environment
 from tactile_cube.transforms import EnvConfig
 
@@ -20,6 +23,7 @@ def table_config() -> EnvConfig:
     return config
 
 
-def table_environment() -> Environment:
+def table_environment(engine: EngineName = "bullet") -> Environment:
     """The same, as training takes it."""
-    return rotation_environment(table_config())
+    config = table_config()
+    return rotation_environment(replace(config, simulation=replace(config.simulation, engine=engine)))
