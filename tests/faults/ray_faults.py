@@ -1,5 +1,7 @@
 """`+experiment=smoke` in workers of Ray: has it the bits of multi_sync, also when a worker, a node or main is lost?
 
+And is a batch done to the last one when a node is lost?
+
     python -m tests.faults.ray_faults --out docs/results/reliability
 
 The run is a fifth of smoke's. Each fault strikes once it is an iteration past its second barrier. After it the same
@@ -15,7 +17,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,11 +27,13 @@ import psutil
 import torch
 
 from tactile_cube.agent.policy_file import current_commit
+from tactile_cube.api.batch import each
 from tests.faults.campaign import SHORT, results
 
 SMOKE = ["+experiment=smoke", "collector.processes=2", "collector.timeout=60", *SHORT, "training.steps=600"]
 STRIKE_AT = 5
 """Rows of metrics.csv, one an iteration, at which a fault strikes; a barrier comes every two, the end after 15."""
+BATCH = 8
 LIMIT = 900.0
 """Seconds after which a run counts as hung."""
 MARK = "TACTILE_CUBE_TRIAL"
@@ -151,27 +156,50 @@ def load() -> str:
     return f"{os.getloadavg()[1]:.0f}"
 
 
-def without_a_node(place: Path) -> list[str]:
-    """A run in a cluster of two nodes on this machine, one of which is taken away meanwhile."""
+@contextmanager
+def two_nodes(cores: int) -> Iterator[tuple[str, Callable[[], None]]]:
+    """A cluster of two nodes on this machine: its address, and what takes the second one away."""
     from ray.cluster_utils import Cluster
 
-    small = {"num_cpus": 2, "object_store_memory": 128 * 2**20}
+    small = {"num_cpus": cores, "object_store_memory": 128 * 2**20}
     cluster = Cluster(initialize_head=True, head_node_args=small | {"include_dashboard": False})
     try:
         second = cluster.add_node(**small)
-        words = ["collector=ray", f"collector.address={cluster.address}"]
-        remove: Fault = lambda trial: cluster.remove_node(second, allow_graceful=False)  # noqa: E731
-        return run("ray, two nodes, one removed", place / "removed", words, remove)
+        yield cluster.address, lambda: cluster.remove_node(second, allow_graceful=False)
     finally:
         cluster.shutdown()
 
 
-def table(rows: list[list[str]]) -> str:
+def without_a_node(place: Path) -> list[str]:
+    """A run in a cluster of two nodes, one of which is taken away meanwhile."""
+    with two_nodes(cores=2) as (address, remove):
+        words = ["collector=ray", f"collector.address={address}"]
+        return run("ray, two nodes, one removed", place / "removed", words, lambda trial: remove())
+
+
+def batch_without_a_node() -> list[int]:
+    """What comes of a batch on two nodes, one of which is taken away after the second answer."""
+    done: list[int] = []
+    with two_nodes(cores=1) as (address, remove):
+        for number, square in each(slow_square, range(BATCH), address=address):
+            done += [number] if square == number**2 else []
+            if len(done) == BATCH // 4:
+                remove()
+    return sorted(done)
+
+
+def slow_square(number: int) -> int:
+    """Takes as long as a short diagnosis."""
+    time.sleep(3.0)
+    return number**2
+
+
+def table(rows: list[list[str]], batch: str = "") -> str:
     """What the page shows."""
     head = ["collector, fault", "load of two cores", "seconds from the fault (or start) to the end", "times replaced"]
     head += ["given again", "orphans", "digest of networks, optimisers, replay, metrics and policy"]
     lines = "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---"] * len(head), *rows])
-    return f"`python -m tests.faults.ray_faults`, commit {current_commit()}\n\n{lines}\n"
+    return f"`python -m tests.faults.ray_faults`, commit {current_commit()}\n\n{lines}\n{batch}"
 
 
 def main() -> None:
@@ -199,7 +227,12 @@ def main() -> None:
         print(rows[-1], flush=True)
         if given.out is not None:
             (given.out / "ray.md").write_text(table(rows))
-    same = {row[-1] for row in rows} == {rows[0][-1]}
+    batch = batch_without_a_node()
+    said = f"\nA batch of {BATCH} on two nodes, one removed after the second answer: {len(batch)} answers, each once.\n"
+    print(said)
+    if given.out is not None:
+        (given.out / "ray.md").write_text(table(rows, said))
+    same = {row[-1] for row in rows} == {rows[0][-1]} and batch == list(range(BATCH))
     shutil.rmtree(place)
     raise SystemExit(0 if same and all(row[-2] == "0" for row in rows) else 1)
 

@@ -90,7 +90,11 @@ class RayCluster:
         return _ray().put(value)
 
     def each(self, work: Callable[[T], R], over: Sequence[T]) -> Iterator[tuple[T, R]]:
-        """What `work` makes of each, a core each, in the order in which it is done; lost with a node, it runs again."""
+        """What `work` makes of each, a core each, in the order in which it is done; lost with a node, it runs again.
+
+        Raises:
+            CollectionError: one that was lost again and again; what `work` raises is raised as it is.
+        """
         ray = _ray()
         call = ray.remote(num_cpus=1)(_applied)
         waiting = {call.remote(work, one): one for one in over}
@@ -98,9 +102,12 @@ class RayCluster:
             (done,), _ = ray.wait(list(waiting))
             one = waiting.pop(done)
             try:
-                yield one, ray.get(done)
+                made = ray.get(done)
             except ray.exceptions.RayTaskError as error:
                 raise error.cause or error from None
+            except ray.exceptions.RayError as error:
+                raise CollectionError(f"a worker of Ray was lost again and again: {_line(error)}") from error
+            yield one, made
 
     def close(self) -> None:
         """Leave the cluster, which ends what ran there for this process; one of its own ends."""
