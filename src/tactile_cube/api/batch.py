@@ -126,5 +126,6 @@ def _diagnosed(settings: Sequence[str], out: Path, named: tuple[str, Recording])
     with tempfile.TemporaryDirectory() as place:
         found.write(place)
         files = {path.name: path.read_bytes() for path in Path(place).iterdir()}
-        told = {file: content.replace(place.encode(), str(out / name).encode()) for file, content in files.items()}
-    return _Found(Answered(found.text, found.data), told)
+    # its commands name the model where it will be
+    files["report.html"] = files["report.html"].replace(place.encode(), str(out / name).encode())
+    return _Found(Answered(found.text, found.data), files)
