@@ -91,8 +91,8 @@ class Stubbed(Search):
         self.say = self.said.append
 
     def settled(self, model: Model) -> tuple[object, object]:  # type: ignore[override]
-        names = "+".join(term.effect.name for term in model.terms)
-        return replace(FIT, model=model), judged(self.errors.get(names, 9.0))
+        names, joints = "+".join(t.effect.name for t in model.terms), "+".join(t.joint for t in model.terms)
+        return replace(FIT, model=model), judged(self.errors.get(names, self.errors.get(joints, 9.0)))
 
 
 @pytest.mark.parametrize(("error", "kept"), [(1.0, "torque_gain"), (1.6, "torque_curve")])
@@ -102,6 +102,19 @@ def test_of_two_laws_in_a_set_the_simpler_is_kept_if_it_does(error: float, kept:
     pruned = Stubbed({"torque_gain+command_dead_zone": error}).pruned(found)
     assert [one.effect.name for one in pruned.effects] == [kept, "command_dead_zone"]
     assert [term.effect.name for term in pruned.fit.model.terms] == [kept, "command_dead_zone"]
+
+
+@pytest.mark.parametrize(
+    ("errors", "kept"),
+    [({"q2+q3": 1.0, "q3": 1.0}, ("q3",)), ({"q2+q3": 1.0, "q3": 1.6}, ("q2", "q3")), ({}, ("q1", "q2", "q3"))],
+    ids=["one needs it", "two", "all"],
+)
+def test_an_effect_stays_at_the_joints_that_need_it(errors: dict[str, float], kept: tuple[str, ...]) -> None:
+    (delay,), model = fitted("command_delay", joints=("q1", "q2", "q3"))
+    found = Explanation((delay,), replace(FIT, model=model), judged(1.0), 1e-9, 0.5)
+    pruned = Stubbed(errors).pruned(found)
+    assert pruned.effects[0].joints == kept
+    assert tuple(term.joint for term in pruned.fit.model.terms) == kept
 
 
 @pytest.mark.parametrize(("cost", "tried"), [(50.0, 2), (99.0, 1)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from tactile_cube.identification.fitting.gauss_newton import Fit
@@ -71,3 +71,14 @@ def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Mo
     """A fitted model, whose last terms are those of `effects`, without one of them."""
     first = first_term(model, effects, place)
     return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))
+
+
+def fewer_joints(
+    model: Model, effects: Sequence[Candidate], place: int
+) -> Iterator[tuple[tuple[Candidate, ...], Model]]:
+    """Where one of `effects` acts at several joints: the effects and the fitted model without it at one of them."""
+    candidate, first = effects[place], first_term(model, effects, place)
+    for k, joint in enumerate(candidate.joints if len(candidate.joints) > 1 else ()):
+        left = replace(candidate, joints=tuple(other for other in candidate.joints if other != joint))
+        terms = (*model.terms[: first + k], *model.terms[first + k + 1 :])
+        yield (*effects[:place], left, *effects[place + 1 :]), replace(model, terms=terms)

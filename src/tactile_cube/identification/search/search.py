@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.candidates import Candidate, candidates
 from tactile_cube.identification.search.division import BRIEF, LONG, SEGMENTS, Division, some
 from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
-from tactile_cube.identification.search.explanation import NEARLY, Explanation, without_effect
+from tactile_cube.identification.search.explanation import NEARLY, Explanation, fewer_joints, without_effect
 from tactile_cube.identification.search.other_starts import other_starts
 from tactile_cube.identification.search.relatives import special_cases, with_details
 from tactile_cube.identification.search.residual_starts import residual_candidates
@@ -246,25 +246,28 @@ class Search(Division):
         return explanation
 
     def pruned(self, explanation: Explanation) -> Explanation:
-        """Without the effects that it does not need, and none richer than it has to be.
+        """Without the effects that it does not need, none richer or at more joints than it has to be.
 
         A later one may have done an earlier one's work, or what an earlier one's law was bent to.
         """
-        for place in range(len(explanation.effects) if len(explanation.effects) > 1 else 0):
-            model = without_effect(explanation.fit.model, explanation.effects, place)
+        for said, effects, model in self.simpler(explanation):
             fitted, judgement = self.settled(model)
             if not worse(judgement, explanation.judgement, self.criteria):
-                left = explanation.effects[:place] + explanation.effects[place + 1 :]
-                self.say(f"  {explanation.effects[place].label} is not needed")
-                return self.pruned(replace(explanation, effects=left, fit=fitted, judgement=judgement))
-            for effects, model in special_cases(
-                explanation.fit.model, explanation.effects, place, self.new(self.candidates)
-            ):
-                fitted, judgement = self.settled(model)
-                if not worse(judgement, explanation.judgement, self.criteria):
-                    self.say(f"  {effects[place].label} does for {explanation.effects[place].label}")
-                    return self.pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement))
+                self.say(f"  {said}")
+                return self.pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement))
         return explanation
+
+    def simpler(self, explanation: Explanation) -> Iterator[tuple[str, tuple[Candidate, ...], Model]]:
+        """What may do for an explanation: in words, the effects, and the fitted model with them."""
+        model, effects = explanation.fit.model, explanation.effects
+        for place, effect in enumerate(effects):
+            for fewer, changed in fewer_joints(model, effects, place):
+                yield f"{fewer[place].label} does for {effect.label}", fewer, changed
+            if len(effects) > 1:
+                left = effects[:place] + effects[place + 1 :]
+                yield f"{effect.label} is not needed", left, without_effect(model, effects, place)
+                for other, changed in special_cases(model, effects, place, self.new(self.candidates)):
+                    yield f"{other[place].label} does for {effect.label}", other, changed
 
 
 def pursued(better: Sequence[Explanation], criteria: Criteria = STANDARD) -> list[Explanation]:
