@@ -161,6 +161,15 @@ def test_an_effect_that_leaves_twice_the_noise_is_the_whole_only_if_it_explains_
     assert decide(findings(90.0, explanation("backlash", left, 90.0))).kind == "missing_effect"
 
 
+def test_of_two_effects_that_leave_twice_the_noise_one_may_follow_a_detail_of_the_other() -> None:
+    one = explanation("torque_saturation", 4.5, 90.0)
+    for left, kind in ((1.5, "missing_effect"), (3.3, "partly_explained")):
+        both = explanation("torque_gain", left, 90.0)
+        both = replace(both, effects=(*one.effects, *both.effects))
+        assert decide(findings(90.0, one, both)).kind == kind
+        assert decide(findings(90.0, one, both), Answers(repeats=True)).kind == "missing_effect"
+
+
 def test_an_effect_that_leaves_no_more_than_repeats_differ_is_named_if_it_explains_nearly_all() -> None:
     tipping = findings(100.0, explanation("torque_saturation", 4.5, 100.0))
     assert decide(tipping).kind == "partly_explained"
@@ -194,6 +203,13 @@ def test_a_further_effect_needs_a_real_part_of_the_error() -> None:
     completing = replace(explanation("torque_bias", 1.05), gain=0.7)
     assert not worthwhile(tiny, first, base, JOINTS)
     assert worthwhile(completing, first, base, JOINTS)
+
+
+def test_what_is_next_to_nothing_beside_the_whole_is_a_detail_of_the_first_effect() -> None:
+    first, second = explanation("friction_drift", 1.11), replace(explanation("viscous_friction", 1.0), gain=0.18)
+    for base, real in ((9.0, False), (5.0, True)):
+        start = Explanation((), FIT, judged(base), 1.0, 0.0)
+        assert worthwhile(second, first, start, JOINTS) is real
 
 
 def test_a_large_share_needs_less_significance_than_a_small_one() -> None:

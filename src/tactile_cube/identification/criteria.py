@@ -13,7 +13,7 @@ class Criteria:
         floor: error at which nothing is left to explain, if it is no more at any joint.
         adequate: error that a model may have, at each joint too, to which nothing significant can be added.
         tolerated: error up to which an explanation is complete.
-        far: error of what is no explanation by itself, and that a near miss may have.
+        far: error of what is no explanation by itself, and that a near miss by one effect may have.
         least_gain: share that an effect has to explain at least.
         large_gain: share that no chance explains; also the part of its own error in which a law may differ in detail.
         completing: share of what is left that a further effect has to explain.
@@ -43,7 +43,7 @@ class Criteria:
     most: float = 0.9
     nearly_whole: float = 0.98
     detail: float = 0.002
-    small_part: float = 0.001
+    small_part: float = 0.005
     significant: float = 2e-4
     significant_if_large: float = 1e-3
     significant_if_most: float = 1e-2

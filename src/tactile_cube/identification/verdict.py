@@ -83,13 +83,18 @@ def _but_for_the_implausible(
 
 
 def _explains(chosen: Explanation, base: Explanation, ask: Questions, criteria: Criteria) -> bool:
-    """Whether an explanation is the whole of it."""
+    """Whether an explanation is the whole of it.
+
+    One effect may leave more than is tolerated: real laws differ in detail from those of the catalogue. Where several
+    leave it, the last of them may follow such a detail of the first.
+    """
     share = chosen.explained(base)
     if chosen.error > criteria.adequate and share < criteria.most:
         return False
     if chosen.error <= criteria.tolerated:
         return True
-    return share > criteria.nearly_whole and (chosen.error < criteria.far or ask.as_repeats(chosen))
+    detail = chosen.error < criteria.far and len({effect for effect, _ in named(chosen)}) == 1
+    return share > criteria.nearly_whole and (detail or ask.as_repeats(chosen))
 
 
 def at_bound(one: Explanation) -> bool:
