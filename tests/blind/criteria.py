@@ -24,7 +24,6 @@ from typing import Any, TypeVar
 import tactile_cube
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.diagnosis import Simulations, Unexplained
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.search import search as searching
@@ -34,6 +33,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.together import Proposal, Together
 from tactile_cube.identification.search.worth import least_gain
+from tactile_cube.identification.simulations import Simulations, Unexplained
 from tactile_cube.identification.verdict import Verdict, decide
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.noise import sensor_noise

@@ -9,9 +9,10 @@ and never inside it, FOLDER/truth.json. Nothing here comes from the package unde
 import argparse
 import dataclasses
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import hidden
@@ -244,6 +245,36 @@ def _offsets(world: World, bench: Bench, rng: np.random.Generator) -> Array:
     return np.asarray(offsets * world.plant.angle_unit * world.homing)
 
 
+def draw_pushes(seed: int, count: int, world: World, bench: Bench) -> dict[tuple[int, str], dict[str, Any]]:
+    """Which trials, (initialisation, kind), somebody pushes in, each once: joint, start and length [s], torque [N m].
+
+    As hard as it takes to hold a joint 3 to 11 degrees of a finger away against its controller, for 0.3 to 1 s.
+    """
+    rng = np.random.default_rng([seed, 13])
+    trials = [(init, kind) for init in range(bench.initialisations) for kind in bench.kinds]
+    found = {}
+    for place in rng.permutation(len(trials))[:count]:
+        joint = int(rng.integers(len(world.rig.actuated)))
+        angle = rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.2) * world.plant.angle_unit[joint]
+        found[trials[int(place)]] = {
+            "joint": world.rig.actuated[joint],
+            "start": float(rng.uniform(0.1, 0.7) * bench.seconds),
+            "seconds": float(rng.uniform(0.3, 1.0) * world.time_unit),
+            "torque": float(angle * world.plant.kp[joint]),
+        }
+    return found
+
+
+def _pushed(world: World, push: dict[str, Any] | None) -> World:
+    """The world with a push at its joint, or as it is."""
+    if push is None:
+        return world
+    there, joint = copy(world), world.rig.actuated.index(push["joint"])
+    there.plant.push[joint], there.plant.push_start[joint] = push["torque"], push["start"]
+    there.plant.push_seconds[joint] = push["seconds"]
+    return there
+
+
 def _record(
     world: World, bench: Bench, offset: Array, command: Array, rng: np.random.Generator, engine: str
 ) -> pl.DataFrame:
@@ -255,21 +286,28 @@ def _record(
     return _table(there, bench, command, command[0] - there.plant.offset + start_error, rng, engine)
 
 
-def perform(seed: int, world: World, bench: Bench, engine: str = "own") -> tuple[Tables, Tables]:
-    """The trials, file -> (initialisation, kind, table), and unseen ones of the last initialisation."""
+def perform(
+    seed: int,
+    world: World,
+    bench: Bench,
+    engine: str = "own",
+    pushes: Mapping[tuple[int, str], dict[str, Any]] = MappingProxyType({}),
+) -> tuple[Tables, Tables]:
+    """The trials, file -> (initialisation, kind, table), and unseen ones of the last initialisation, never pushed."""
     rng = np.random.default_rng([seed, 7])
     samples = int(bench.seconds * bench.rate)
     offsets = _offsets(world, bench, rng)
     commands = {kind: command_of(world, kind, rng, samples, bench.rate) for kind in bench.kinds}
     fresh = {kind: command_of(world, kind, rng, samples, bench.rate) for kind in KINDS}
 
-    def record(init: int, command: Array) -> pl.DataFrame:
-        return _record(world, bench, offsets[init], command, rng, engine)
+    def record(init: int, command: Array, push: dict[str, Any] | None = None) -> pl.DataFrame:
+        return _record(_pushed(world, push), bench, offsets[init], command, rng, engine)
 
     tables = {}
     for init in range(bench.initialisations):
         for kind_of, command in commands.items():
-            tables[f"trials/{kind_of}_{init}.parquet"] = (init, kind_of, record(init, command))
+            table = record(init, command, pushes.get((init, kind_of)))
+            tables[f"trials/{kind_of}_{init}.parquet"] = (init, kind_of, table)
     last = bench.initialisations - 1
     unseen = {f"{kind_of}.parquet": (last, kind_of, record(last, command)) for kind_of, command in fresh.items()}
     return tables, unseen
@@ -283,13 +321,15 @@ def write(
     kind: str | None = None,
     engine: str = "own",
     worlds: str = "usual",
+    pushes: int = 0,
 ) -> dict[str, Any]:
-    """Draw the seed and write `out`/recording and `out`/truth.json; returns the truth."""
+    """Draw the seed and write `out`/recording and `out`/truth.json; returns the truth. `pushes` trials are pushed."""
     if engine != "own" and worlds != "usual":
         raise ValueError(f"--engine {engine} moves the usual worlds only, got --worlds {worlds}; leave --engine out")
     for redrawn in range(ATTEMPTS):
         world, bench, truth = draw(seed, seconds, names, kind, redrawn, worlds)
-        tables, unseen = perform(seed, world, bench, engine)
+        pushed = draw_pushes(seed, pushes, world, bench)
+        tables, unseen = perform(seed, world, bench, engine, pushed)
         if all(np.isfinite(table.to_numpy()).all() for _, _, table in (*tables.values(), *unseen.values())):
             break
     else:
@@ -297,7 +337,9 @@ def write(
     _save(out / "recording", world, bench, tables)
     _save(out / "recording" / "validation", world, bench, unseen)
     truth["redrawn"] = redrawn
-    truth["repeat_scatter"] = repeat_scatter(tables, world.rig.actuated)
+    left_alone = perform(seed, world, bench, engine)[0] if pushed else tables
+    truth["repeat_scatter"] = repeat_scatter(left_alone, world.rig.actuated)
+    truth["pushes"] = [{"trial": f"{kind_of}_{init}", **push} for (init, kind_of), push in pushed.items()]
     (out / "truth.json").write_text(json.dumps(truth, indent=1))
     return truth
 

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from generator import WORLDS, play, write
 from page import FIRST_SEED, GOAL, markdown, picture, round_row
-from scoring import score
+from scoring import pushes_found, score
 
 from tactile_cube.api.batch import each
 
@@ -61,10 +61,12 @@ def validation_error(recording: Path, model: Path, out: Path) -> float | None:
     return None if answer is None else float(answer["error"]["overall"])
 
 
-def judge(folder: Path, seconds: float | None, keep: bool, engine: str, worlds: str, seed: int) -> dict[str, Any]:
+def judge(
+    folder: Path, seconds: float | None, keep: bool, engine: str, worlds: str, pushes: int, seed: int
+) -> dict[str, Any]:
     """Generate, diagnose, compare and judge one seed."""
     place = folder / f"draw_{seed}"
-    truth = write(seed, place, seconds, engine=engine, worlds=worlds)
+    truth = write(seed, place, seconds, engine=engine, worlds=worlds, pushes=pushes)
     started = time.perf_counter()
     diagnosis = run_command(
         "diagnose", place / "diagnose", f"recording={place / 'recording'}", "engine=fast", "rerun=false"
@@ -160,6 +162,7 @@ def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
     known = [x for x in lines if x["truth"]["effects"] and all(e["in_catalogue"] for e in x["truth"]["effects"])]
     sets = sorted(set_size(x["diagnosis"]) for x in lines if x["score"]["answer"].startswith("ambiguous"))
     played = [x for x in lines if "after_experiment" in x]
+    pushes = [pushes_found(x["truth"].get("pushes", []), x["diagnosis"] or {}) for x in lines]
     matrix: dict[str, Counter[str]] = {}
     for line in lines:
         matrix.setdefault(_truth_class(line), Counter())[_answer_class(line)] += 1
@@ -175,6 +178,7 @@ def summarise(lines: list[dict[str, Any]]) -> dict[str, Any]:
         "after_experiment": dict(
             Counter(f"{x['score']['outcome']}, then {x['after_experiment']['score']['outcome']}" for x in played)
         ),
+        "pushes": [sum(column) for column in zip(*pushes, strict=True)] if pushes else [0, 0, 0],
         "commits": sorted({x.get("commit", "not recorded") for x in lines}),
         "drawn_again": sum(x["truth"].get("drawn", 1) > 1 for x in lines),
         "below_visible": sum(not x["truth"].get("visible", True) for x in lines),
@@ -215,6 +219,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, help="length of every trial (default: drawn)")
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own", help="what moves the measured rigs")
     parser.add_argument("--worlds", choices=tuple(WORLDS), default="usual", help="what is measured")
+    parser.add_argument("--pushes", type=int, default=0, help="trials of each draw that somebody pushes in")
     parser.add_argument("--keep", action="store_true", help="keep recordings and answers")
     args = parser.parse_args()
     if args.engine != "own" and args.worlds != "usual":
@@ -228,7 +233,8 @@ def main() -> None:
     command += f" --seconds {args.seconds:g}" if args.seconds else ""
     command += f" --engine {args.engine}" * (args.engine != "own")
     command += f" --worlds {args.worlds}" * (args.worlds != "usual")
-    work = partial(judge, args.out, args.seconds, args.keep, args.engine, args.worlds)
+    command += f" --pushes {args.pushes}" * (args.pushes > 0)
+    work = partial(judge, args.out, args.seconds, args.keep, args.engine, args.worlds, args.pushes)
     for _, line in each(work, wanted, args.jobs, args.address):
         with (args.out / "verdicts.jsonl").open("a") as lines:
             lines.write(json.dumps(line) + "\n")

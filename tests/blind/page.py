@@ -95,6 +95,16 @@ def _played(summary: dict[str, Any]) -> str:
     return f"- answers after the recommended experiment was played on the hidden rig and its trial added: {turns}"
 
 
+def _pushes(summary: dict[str, Any]) -> list[str]:
+    """How many of the pushes were found; nothing where nobody pushed and nothing was left out."""
+    played, found, besides = summary["pushes"]
+    if not played and not besides:
+        return []
+    return [
+        f"- trials that somebody pushed in: {played}; pushes left out: {found}; other stretches left out: {besides}"
+    ]
+
+
 def _worlds(command: str) -> str:
     """The worlds that a judge's command names."""
     words = command.split()
@@ -116,6 +126,7 @@ def markdown(lines: list[dict[str, Any]], s: dict[str, Any], command: str) -> st
         *(_sentence(s, key, words) for key, words in FLOORS.items()),
         _left_open(s),
         _played(s),
+        *_pushes(s),
         _drawn(s),
         f"- median time of a diagnosis: {s['median_seconds']} s",
         "",

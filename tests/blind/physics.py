@@ -125,6 +125,9 @@ def _joint_torques(p, m, i, t, q, v, relay):
         6.283185307179586 * p[at.DISTURBANCE_FREQUENCY, i] * t + p[at.DISTURBANCE_PHASE, i]
     )
     torque += p[at.RELAY, i] * relay[i]
+    pushed = t - p[at.PUSH_START, i]
+    if 0.0 <= pushed < p[at.PUSH_SECONDS, i]:
+        torque += p[at.PUSH, i] * np.sin(3.141592653589793 * pushed / p[at.PUSH_SECONDS, i]) ** 2
     give = 0.002 * p[at.TIME_UNIT, i] * p[at.STOP_STIFFNESS, i]
     if q[i] > p[at.STOP_UPPER, i]:
         torque -= p[at.STOP_STIFFNESS, i] * (q[i] - p[at.STOP_UPPER, i]) + max(give * v[i], 0.0)

@@ -102,6 +102,10 @@ class Plant(NamedTuple):
     knee_stiffness: Array
     drift_rate: Array
     cubic_drag: Array
+    # somebody's hand
+    push: Array
+    push_start: Array
+    push_seconds: Array
 
 
 MATRICES = ("crosstalk", "viscous_coupling", "dry_coupling", "neighbour_friction")
@@ -125,7 +129,7 @@ VECTORS = tuple(name for name in Plant._fields if name not in MATRICES)
     ANGLE_UNIT, SPEED_UNIT, TIME_UNIT, SMOOTH_BACKLASH, SMOOTH_TORQUE, DAMPED_BACKLASH, GAP_DAMPING, BRISTLES,
     MICRO_DAMPING, BOUC_WEN_SHAPE, STRIBECK_EXPONENT, JITTER, COGGING_2, COGGING_PHASE_2, COGGING_3,
     COGGING_PHASE_3, SOFT_LIMIT, TORQUE_BEND, VISCOUS_DIFFERENCE, BACKDRIVEN_FRICTION, VELOCITY_LAG_2, STOP_GROWTH,
-    KNEE, KNEE_STIFFNESS, DRIFT_RATE, CUBIC_DRAG,
+    KNEE, KNEE_STIFFNESS, DRIFT_RATE, CUBIC_DRAG, PUSH, PUSH_START, PUSH_SECONDS,
 ) = range(len(VECTORS))  # fmt: skip
 CROSSTALK, VISCOUS_COUPLING, DRY_COUPLING, NEIGHBOUR_FRICTION = range(len(MATRICES))
 

@@ -105,6 +105,18 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
     return "wrong", "called unknown"
 
 
+def pushes_found(pushes: list[dict[str, Any]], diagnosis: dict[str, Any]) -> tuple[int, int, int]:
+    """How many pushes there were, how many of them were left out, and how many stretches were left out besides."""
+    left_out = diagnosis.get("left_out", [])
+
+    def same(push: dict[str, Any], one: dict[str, Any]) -> bool:
+        end = push["start"] + push["seconds"]
+        return bool(one["trial"] == push["trial"] and one["start"] < end and push["start"] < one["end"])
+
+    found = sum(any(same(push, one) for one in left_out) for push in pushes)
+    return len(pushes), found, sum(not any(same(push, one) for push in pushes) for one in left_out)
+
+
 def score(truth: dict[str, Any], diagnosis: dict[str, Any], ratio: float | None) -> Score:
     """Judge a diagnosis; `ratio` is the recommended model's error on unseen trials over the sensor noise."""
     verdict, effects = diagnosis["verdict"], truth["effects"]

@@ -23,7 +23,7 @@ from dynamics import mass_and_bias
 from physics import simulate
 from plant import neutral
 from rig import RIGS
-from scoring import score
+from scoring import pushes_found, score
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
 
@@ -125,6 +125,27 @@ def test_the_same_seed_writes_the_same_recording(folder: Path, tmp_path: Path) -
     files = sorted(p.relative_to(folder) for p in folder.rglob("*.parquet"))
     assert files
     assert all(pl.read_parquet(folder / f).equals(pl.read_parquet(tmp_path / f)) for f in files)
+
+
+def test_a_push_moves_its_trial_while_it_lasts_and_no_other(folder: Path, tmp_path: Path) -> None:
+    (push,) = generator.write(2, tmp_path, QUICK, ["command_delay"], "pendulum", pushes=1)["pushes"]
+    moved = {}
+    for file in sorted(p.relative_to(folder) for p in folder.rglob("*.parquet")):
+        left, other = (pl.read_parquet(one / file) for one in (folder, tmp_path))
+        column = f"{push['joint']}.position"
+        moved[file.stem, file.parent.name] = (left["time"], (left[column] - other[column]).abs())
+    time, change = moved.pop((push["trial"], "trials"))
+    assert change.filter(time < push["start"] - 0.01).max() < 1e-9  # type: ignore[operator]
+    assert change.filter((time > push["start"]) & (time < push["start"] + push["seconds"])).max() > 0.01  # type: ignore[operator]
+    assert all(others.max() < 1e-9 for _, others in moved.values())  # type: ignore[operator]
+
+
+def test_a_push_is_found_where_a_stretch_of_its_trial_was_left_out() -> None:
+    pushes = [{"trial": "holds_0", "start": 1.0, "seconds": 0.5}, {"trial": "ramps_1", "start": 2.0, "seconds": 0.5}]
+    stretches = [("holds_0", 0.8, 1.6), ("holds_0", 3.0, 3.5), ("ramps_1", 2.6, 3.0)]
+    left_out = [{"trial": trial, "start": start, "end": end} for trial, start, end in stretches]
+    assert pushes_found(pushes, {"left_out": left_out}) == (2, 1, 2)
+    assert pushes_found([], {}) == (0, 0, 0)
 
 
 def test_a_world_that_runs_away_is_drawn_again(tmp_path: Path) -> None:
@@ -230,6 +251,10 @@ def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
     assert "ambiguous answers: 1; candidates that each leaves open: 2" in text
     sized = page.markdown(judged, judge.summarise(judged), f"{command} --worlds sizes")
     assert sized.startswith("# Blind diagnosis of hidden effects: machines of other sizes\n")
+    assert "somebody pushed in" not in text
+    pushed = judge.judged({**line, "truth": truth | {"pushes": [{"trial": "t", "start": 1.0, "seconds": 1.0}]}})
+    said = page.markdown([pushed], judge.summarise([pushed]), command)
+    assert "- trials that somebody pushed in: 1; pushes left out: 0; other stretches left out: 0" in said
     row = page.round_row(judge.summarise(judged), command)
     assert row == "| 7, 1 | `abc` | 0, 1, 0 (0) | 0 of 0 | 2 | ... |"
 
@@ -242,7 +267,7 @@ def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
         (out / "model.yaml").write_text("")
         return {**_answer("adequate"), "error": {"overall": 3e-4}}
 
-    def written(seed: int, out: Path, seconds: float | None, engine: str, worlds: str) -> dict[str, Any]:
+    def written(seed: int, out: Path, seconds: float | None, **_: object) -> dict[str, Any]:
         judged.append(seed)
         (out / "recording").mkdir(parents=True)
         return {"seed": seed, **_truth()}

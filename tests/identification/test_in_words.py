@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from tactile_cube.identification.in_words import OPENING, UNRELATED, headline, left_over, sets_in_words
+from tactile_cube.identification.in_words import OPENING, UNRELATED, disturbed, headline, left_over, sets_in_words
 
 
 def result(verdict: str, with_effects: float = 4.3e-3, black_box: float = 0.0) -> dict[str, Any]:
@@ -26,3 +26,15 @@ def test_what_is_left_stands_in_the_headline() -> None:
 @pytest.mark.parametrize(("share", "said"), [(0.0, UNRELATED), (0.4, OPENING["unknown_effect"])])
 def test_an_unknown_effect_is_claimed_only_where_signals_show_one(share: float, said: str) -> None:
     assert headline(result("unknown_effect", black_box=share)) == said
+
+
+def test_what_follows_no_model_is_told_with_the_line_that_leaves_it_out() -> None:
+    one = {"trial": "holds_0", "start": 0.8, "end": 2.8, "joint": "q1", "error": 111.2, "usual": 1.62, "repeats": 2}
+    (left_out,) = disturbed({"left_out": [one]})
+    assert left_out.startswith(
+        "Left out: holds_0 from 0.80 to 2.80 s follows no model, other runs of its command do (2)"
+    )
+    assert "`exclude: [[0.80, 2.80]]`" in left_out
+    (suspected,) = disturbed({"suspected": [one | {"repeats": 0}]})
+    assert suspected.startswith("Not left out: holds_0")
+    assert "nothing repeats it" in suspected

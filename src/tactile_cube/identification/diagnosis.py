@@ -3,59 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
-
-import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
+from tactile_cube.identification.disturbances import Disturbance
 from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.fitting.intervals import Fitted, final_fit
+from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
+from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.evidence import Judgement, judge
+from tactile_cube.identification.search.evidence import judge
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
-from tactile_cube.identification.verdict import Questions, Verdict, decide, unexplained_joints
+from tactile_cube.identification.simulations import Unexplained, with_offsets
+from tactile_cube.identification.verdict import Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
-from tactile_cube.measurement.split import held_out_split, turned, with_test_part
 
 SHOWN_SHAPES = 6
 UNPROVEN = 3
-LONGER = 4
-"""Times as long as usual that segments are where the usual ones leave much: what a start misread, as where a joint
-sticks within a sample, is a smaller part of them."""
-NOT_ALL = ("unknown_effect", "partly_explained")
-"""Verdicts that say that more is missing than is named."""
-LESS = (*NOT_ALL, "ambiguous")
-"""Verdicts that do not say what is missing and that it is all, the one that says least first."""
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """What is left at a joint.
-
-    Attributes:
-        joint: its name.
-        shapes: the missing torque over signals, most telling first.
-        black_box: share that a black box could still explain beside the recommended model.
-    """
-
-    joint: str
-    shapes: list[Shape] = field(repr=False)
-    black_box: float
 
 
 @dataclass(frozen=True)
@@ -76,6 +51,8 @@ class Diagnosis:
         tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
         known: effects of the model that it began with, NAME@JOINT.
         common: joint offsets that may be the encoder's or the initialisations'.
+        left_out: stretches that follow no model, and that count in nothing above.
+        suspected: stretches that may be such ones, and count.
     """
 
     verdict: Verdict
@@ -91,6 +68,8 @@ class Diagnosis:
     tested: list[str]
     known: tuple[str, ...] = ()
     common: tuple[CommonOffset, ...] = ()
+    left_out: tuple[Disturbance, ...] = ()
+    suspected: tuple[Disturbance, ...] = ()
 
     @property
     def unproven(self) -> tuple[Explanation, ...]:
@@ -128,21 +107,11 @@ def diagnose(
         criteria: what decides.
     """
     recording = resolved(recording, effects, say, known)
-    fitted_part, held_out = held_out_split(recording, seed=seed)
-    fitted_part, tested = with_test_part(fitted_part, len(recording.trials), seed)
-    noise = sensor_noise(recording)
-    folds = turned(fitted_part, held_out)
-    floor = noise_floor(recording)
-
-    def search_in(longer: int) -> Search:
-        return Search(fitted_part, held_out, noise, effects, say, known, criteria, folds, longer)
-
-    def answered(search: Search) -> Answer:
-        findings = search.run()
-        simulations = Simulations(search, findings.base, floor, engine, step)
-        return Answer(search, findings, simulations, decide(findings, simulations, criteria))
-
-    search, findings, simulations, verdict = asked(search_in, answered, say)
+    inquiry, left_out, suspected = beside_disturbances(
+        Inquiry(recording, effects, engine, step, seed, say, known, criteria)
+    )
+    search, findings, simulations, verdict = inquiry.answer
+    _, held_out, tested = inquiry.parts
     fitted = simulations.final(verdict.chosen)
     test = held_out if tested is None else tested
     summaries, over_noise = test_errors(
@@ -157,66 +126,22 @@ def diagnose(
         rivals=rivals,
         stages=summaries,
         over_noise=over_noise,
-        floor=floor,
+        floor=simulations.floor,
         unexplained=simulations.unexplained(verdict.chosen, beside_base=verdict.kind == "unknown_effect"),
         experiment=None,
         held_out=[trial.name for trial in held_out.trials],
         tested=[trial.name for trial in tested.trials] if tested else [],
         known=tuple(term.label for term in search.start.terms),
         common=common_offsets(findings.base, search.shooting.sizes) if verdict.kind == "adequate" else (),
+        left_out=left_out,
+        suspected=suspected,
     )
     fits = open_fits(diagnosis)
     if len(fits) == 1:
         return diagnosis
     extended = not diagnosis.rivals
-    experiment = next_experiment(search.shooting, recording, fits, noise, seed, criteria, extended)
+    experiment = next_experiment(search.shooting, inquiry.recording, fits, search.noise, seed, criteria, extended)
     return replace(diagnosis, experiment=experiment)
-
-
-class Answer(NamedTuple):
-    """A verdict and what it came from."""
-
-    search: Search
-    findings: Findings
-    simulations: Simulations
-    verdict: Verdict
-
-    @property
-    def says(self) -> tuple[int, bool]:
-        """How much it says, to be compared: how nearly it names all that is missing, then whether little is left."""
-        little_left = self.verdict.chosen.largest_error <= self.search.criteria.tolerated
-        return (LESS.index(self.verdict.kind) if self.verdict.kind in LESS else len(LESS)), little_left
-
-
-def asked(
-    search_in: Callable[[int], Search], answered: Callable[[Search], Answer], say: Callable[[str], None]
-) -> Answer:
-    """The answer of a search in usual segments, or in longer ones, where only those name all that is missing.
-
-    Where much is left, or several laws do as well, a misread start is a smaller part of a longer segment, and what is
-    slower shows. Where nothing is left, but free runs are further from the measurement than it is from itself, starts
-    that are fitted hide what is slower than a segment.
-
-    Args:
-        search_in: prepares a search in segments so many times as long as usual.
-        answered: runs it.
-        say: takes progress lines.
-    """
-    first = answered(search_in(1))
-    base, criteria = first.findings.base, first.search.criteria
-    nothing_left = base.largest_error <= criteria.floor
-    if first.simulations.as_repeats(base) if nothing_left else first.says == (len(LESS), True):
-        return first
-    if not first.findings.levels and base.error > criteria.far:
-        return first  # short segments show plenty of what nothing explains
-    longer = search_in(LONGER)
-    if longer.rows <= first.search.rows:
-        return first
-    say(f"{first.verdict.kind}; once more in segments of {longer.rows} samples instead of {first.search.rows}")
-    if nothing_left:
-        return first if longer.fit_base().largest_error <= criteria.adequate else answered(longer)
-    second = answered(longer)
-    return second if second.verdict.kind not in NOT_ALL and second.says > first.says else first
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:
@@ -252,85 +177,6 @@ def test_errors(
         seen = with_offsets(model, judged.model)
         summaries[stage] = free_run_error(test, free_run(test, seen, engine, step))
     return summaries, over_noise
-
-
-class Simulations(Questions):
-    """Answers what a decision asks of an explanation, each question once."""
-
-    def __init__(self, search: Search, base: Explanation, floor: NoiseFloor, engine: Engine, step: float) -> None:
-        self.search, self.base, self.floor, self.engine, self.step = search, base, floor, engine, step
-        self.problem = Problem(search.shooting, search.all_windows)
-        self._final: dict[str, Fitted] = {}
-        self._errors: dict[str, ErrorSummary] = {}
-
-    def as_repeats(self, one: Explanation) -> bool:
-        """See `Questions`."""
-        most = self.search.criteria.adequate * self.floor.overall
-        return self.floor.source == "repeats" and self.free_error(one).overall <= most
-
-    def follows_signals(self, one: Explanation) -> bool:
-        """See `Questions`."""
-        return follows_signals(self.unexplained(one), self.search.criteria)
-
-    def alike(self, one: Explanation, other: Explanation) -> bool:
-        """See `Questions`."""
-        validation = self.search.validation
-        first, second = validation.predictions([one.judgement.model, other.judgement.model])
-        difference = validation.limited(first - second) * validation.weight
-        return bool(np.mean(difference[validation.weight > 0.0] ** 2) < self.search.criteria.alike**2)
-
-    def final(self, one: Explanation) -> Fitted:
-        """An explanation refitted on all fitted trials, with intervals."""
-        if one.label not in self._final:
-            self._final[one.label] = final_fit(self.problem, one.fit.model, self.search.unknowns(one.fit.model))
-        return self._final[one.label]
-
-    def free_error(self, one: Explanation) -> ErrorSummary:
-        """Error of its free run on the held-out trials [rad]."""
-        if one.label not in self._errors:
-            self._errors[one.label] = self.simulated_error(one)
-        return self._errors[one.label]
-
-    def simulated_error(self, one: Explanation) -> ErrorSummary:
-        """The same, simulated anew."""
-        model = with_offsets(self.final(one).model, one.judgement.model)
-        return free_run_error(self.search.held_out, free_run(self.search.held_out, model, self.engine, self.step))
-
-    def unexplained(self, one: Explanation, beside_base: bool = False) -> list[Unexplained]:
-        """What is left at each joint that is not explained; `beside_base`, also beside the base model.
-
-        Effects that help and are not the cause blur the shape of what is missing.
-        """
-        search = self.search
-        joints = unexplained_joints(one, search.fitted.joints, search.criteria)
-        judgements = {"the recommended model": one.judgement}
-        judgements |= {"the model with refitted constants": self.base.judgement} if beside_base else {}
-        return _unexplained(search, joints, judgements) if joints else []
-
-
-def follows_signals(unexplained: Sequence[Unexplained], criteria: Criteria = STANDARD) -> bool:
-    """Whether what is left is a function of the signals, and so no noise: what was named is not the whole of it."""
-    return any(one.black_box > criteria.large_gain for one in unexplained)
-
-
-def with_offsets(model: Model, judged: Model) -> Model:
-    """The final model with the joint offsets that were found for the held-out initialisations."""
-    return Model(model.constants, model.terms, {**judged.offsets, **model.offsets})
-
-
-def _unexplained(search: Search, joints: Sequence[str], beside: Mapping[str, Judgement]) -> list[Unexplained]:
-    missing = {
-        name: missing_torques(search.validation, search.held_out, judged.model, judged.residual)
-        for name, judged in beside.items()
-    }
-    found = []
-    for j, joint in enumerate(search.fitted.joints):
-        if joint in joints:
-            curves = [[replace(one, beside=name) for one in shapes(torques[j])] for name, torques in missing.items()]
-            clearest = max(curves, key=lambda shown: shown[0].explained)
-            left = black_box(missing["the recommended model"][j])
-            found.append(Unexplained(joint, clearest[:SHOWN_SHAPES], left))
-    return found
 
 
 def write_experiment(diagnosis: Diagnosis, folder: Path) -> Path | None:

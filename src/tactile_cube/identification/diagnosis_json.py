@@ -46,6 +46,8 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "unproven_effects": _unproven(diagnosis),
         "known_effects": list(diagnosis.known),
         "common_offsets": [asdict(one) for one in diagnosis.common],
+        "left_out": [asdict(one) for one in diagnosis.left_out],
+        "suspected": [asdict(one) for one in diagnosis.suspected],
         "next_experiment": FILE if experiment and experiment.decides else None,
         "inseparable": [list(pair) for pair in experiment.inseparable] if experiment else [],
         "held_out": diagnosis.held_out,

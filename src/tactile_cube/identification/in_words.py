@@ -47,6 +47,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     lines += [f"  {line}" for line in unproven_effects(unproven)] if unproven else []
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     lines += [f"  {common_offset(entry, units)}" for entry in result.get("common_offsets", [])]
+    lines += [f"  {line}" for line in disturbed(result)]
     error, unit = result["error"], common_unit(units.values())
     refitted = f"{milli(error['refitted'], unit)} with constants refitted, " if not grasps else ""
     lines.append(
@@ -147,6 +148,21 @@ def common_offset(entry: Mapping[str, Any], units: Mapping[str, str]) -> str:
         f"{entry['joint']} reads about {offset} too much in each of {entry['initialisations']} "
         "initialisations: by chance, or its encoder's zero is wrong (position_offset); more initialisations will tell."
     )
+
+
+def disturbed(result: Mapping[str, Any]) -> list[str]:
+    """The stretches that follow no model, left out or suspected, and what to do about them."""
+    lines = []
+    for key, opening in (("left_out", "Left out"), ("suspected", "Not left out")):
+        for one in result.get(key, []):
+            beside = f"other runs of its command do ({one['repeats']})" if one["repeats"] else "nothing repeats it"
+            lines.append(
+                f"{opening}: {one['trial']} from {one['start']:.2f} to {one['end']:.2f} s follows no model, "
+                f"{beside}: {one['joint']} is {short(one['error'], 2)} x its sensor noise off there, elsewhere "
+                f"{short(one['usual'], 2)}. If somebody pushed, or something was in the way, write `exclude: "
+                f"[[{one['start']:.2f}, {one['end']:.2f}]]` below it in recording.yaml, for every other verb too."
+            )
+    return lines
 
 
 def staircase(stages: Mapping[str, float], model: ModelFile, units: Mapping[str, str]) -> str:

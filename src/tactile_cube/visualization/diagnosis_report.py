@@ -8,6 +8,7 @@ from tactile_cube.identification.in_words import (
     UNPROVEN,
     UNRELATED,
     common_offset,
+    disturbed,
     headline,
     left_over,
     sets_in_words,
@@ -153,6 +154,7 @@ def _verdict_section(diagnosis: Mapping[str, Any], units: Mapping[str, str]) -> 
     if unproven := diagnosis.get("unproven_effects"):
         lines += unproven_effects(unproven)
     lines += [common_offset(entry, units) for entry in diagnosis.get("common_offsets", [])]
+    lines += disturbed(diagnosis)
     for joint in diagnosis["unexplained_joints"]:
         lines.append(f"not explained: {joint}{_ceiling(diagnosis, joint)}")
     return Section("The answer", (), [Listing(lines or ["no effect has to be added"])])

@@ -84,10 +84,21 @@ def all_of(judgements: Sequence[Judgement]) -> Judgement:
 
 def _joint_errors(problem: Problem, residual: Array) -> Array:
     """RMS (n,) of each joint's residual with the starts of segments taken out."""
-    joints = problem.windows.measured.shape[2]
-    products = (residual * problem.free(residual)).reshape(-1, joints)
-    present = np.count_nonzero(problem.weight.reshape(-1, joints), axis=0)
-    return np.asarray(np.sqrt(np.maximum(products.sum(axis=0), 0.0) / np.maximum(present, 1)))
+    squares, present = _joint_squares(problem, residual)
+    return np.asarray(np.sqrt(np.maximum(squares.sum(axis=0), 0.0) / np.maximum(present.sum(axis=0), 1)))
+
+
+def segment_errors(problem: Problem, residual: Array) -> Array:
+    """The same of each segment, (G, n); nan where nothing was measured."""
+    squares, present = _joint_squares(problem, residual)
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0) / np.where(present > 0, present, np.nan)))
+
+
+def _joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Squared residuals (G, n) with the starts taken out, and how many numbers were measured."""
+    shape = (len(residual), -1, problem.windows.measured.shape[2])
+    present = np.count_nonzero(problem.weight.reshape(shape), axis=1)
+    return (residual * problem.free(residual)).reshape(shape).sum(axis=1), present
 
 
 def gain(before: Judgement, after: Judgement) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,9 +111,14 @@ class Search(Division):
         self.last_scores: list[Score] = []
         self.leaders: list[Proposal] = []
 
+    @cached_property
+    def base(self) -> Explanation:
+        """Refitted constants alone."""
+        return self.fit_base()
+
     def run(self) -> Findings:
         """The whole search."""
-        base = self.fit_base()
+        base = self.base
         self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
         nominal = self.judged(self.start)
         levels, scores, doubtful = self.one_by_one(base)

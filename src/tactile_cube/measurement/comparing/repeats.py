@@ -37,6 +37,17 @@ def aligned_repeats(trials: Sequence[Trial]) -> list[list[Array]]:
     return groups
 
 
+def repeats_of(trials: Sequence[Trial], index: int) -> list[tuple[int, int]]:
+    """Trials that play the command of one again: their places, and by how many samples each starts later in it."""
+    first = trials[index]
+    lags = {
+        place: lag_between(first.command, other.command, first.step)
+        for place, other in enumerate(trials)
+        if place != index and _comparable(first, other)
+    }
+    return [(place, lag) for place, lag in lags.items() if lag is not None]
+
+
 def _comparable(first: Trial, other: Trial) -> bool:
     same_gains = all(np.array_equal(getattr(first.gains, k), getattr(other.gains, k)) for k in ("kp", "kd"))
     return first.kind == other.kind and same_gains and first.clamped == other.clamped and first.force == other.force

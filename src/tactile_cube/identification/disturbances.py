@@ -1,0 +1,137 @@
+"""Stretches of a recording that follow no model, as when somebody pushes the arm: found, and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.search.division import Division
+from tactile_cube.identification.search.evidence import judge, segment_errors
+from tactile_cube.measurement.comparing.repeats import repeats_of
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import nominal_model
+
+Array = NDArray[np.float64]
+STANDS_OUT = (
+    5.0  # times the error of a joint elsewhere: less hardly moves a fit, and where a joint sticks chance does it
+)
+USUAL = 0.9  # of a joint's segments are no worse than usual: what disturbs more of a recording belongs to the machine
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A stretch of one trial in which a model fails that holds elsewhere.
+
+    Attributes:
+        trial: its name.
+        start: where it begins, with a segment to spare [s].
+        end: where it ends, likewise.
+        joint: where the error is largest.
+        error: RMS of that joint there, in units of the sensor noise.
+        usual: the error that nine tenths of all segments of that joint do not exceed.
+        repeats: other runs of the same command, none of which shows it at that time.
+    """
+
+    trial: str
+    start: float
+    end: float
+    joint: str
+    error: float
+    usual: float
+    repeats: int
+
+
+def disturbances(division: Division, recording: Recording, model: Model) -> list[Disturbance]:
+    """Stretches of all trials in which the model fails although it holds elsewhere, and where its command is repeated.
+
+    Args:
+        division: cuts trials into segments and simulates them.
+        recording: every trial, of both parts and those that test.
+        model: fitted; joint offsets that it lacks are fitted here.
+    """
+    problem = Problem(division.shooting, division.windows(recording))
+    offsets = {**nominal_model(recording, division.known).offsets, **model.offsets}
+    found = replace(model, offsets=offsets)
+    problem.linearise_starts(found)
+    errors = segment_errors(problem, judge(problem, recording, found).residual)
+    usual = np.maximum(np.nanquantile(errors, USUAL, axis=0), 1.0)
+    by_trial = _by_trial(problem, errors, len(recording.trials))
+    found_in = []
+    for index, own in enumerate(by_trial):
+        failing = np.flatnonzero((own > STANDS_OUT * usual).any(axis=1))
+        others = [(by_trial[k], lag) for k, lag in repeats_of(recording.trials, index)] if len(failing) else []
+        failing = np.array([k for k in failing if not _shared(own, int(k), others, problem.windows.segment)], dtype=int)
+        found_in += [
+            _described(recording, index, stretch, own, usual, problem.windows.segment, len(others))
+            for stretch in _stretches(failing)
+        ]
+    return found_in
+
+
+def undisturbed(recording: Recording, found: Iterable[Disturbance]) -> Recording:
+    """The recording with these stretches counting in no error, as dropped samples do not."""
+    left_out = {trial.name: trial.valid.copy() for trial in recording.trials}
+    times = {trial.name: trial.time for trial in recording.trials}
+    for one in found:
+        left_out[one.trial] &= (times[one.trial] < one.start) | (times[one.trial] >= one.end)
+    return recording.with_trials([replace(trial, valid=left_out[trial.name]) for trial in recording.trials])
+
+
+def _by_trial(problem: Problem, errors: Array, trials: int) -> list[Array]:
+    """Errors (segments, n) of each trial in the order of time, one row for each segment from its beginning on."""
+    windows = problem.windows
+    rows = windows.segment
+    found = []
+    for trial in range(trials):
+        mine = np.flatnonzero(windows.trial == trial)
+        first = np.round(windows.time[mine] / (rows * problem.shooting.recording.step)).astype(int)
+        count = int(first.max()) + windows.segments if len(mine) else 0
+        own = np.full((count, errors.shape[1]), np.nan)
+        for window, begin in zip(mine, first, strict=True):
+            piece = errors[window * windows.segments : (window + 1) * windows.segments]
+            there = own[begin : begin + windows.segments]
+            own[begin : begin + windows.segments] = np.where(np.isnan(piece), there, piece)
+        found.append(own)
+    return found
+
+
+def _shared(own: Array, place: int, others: Sequence[tuple[Array, int]], rows: int) -> bool:
+    """Whether another run of the same command fails about then too, at the joint that fails most."""
+    joint = int(np.nanargmax(own[place]))
+    for errors, lag in others:
+        there = place - round(lag / rows)
+        near = errors[max(there - 1, 0) : there + 2, joint]
+        if np.any(STANDS_OUT * near > own[place, joint]):
+            return True
+    return False
+
+
+def _stretches(failing: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """First and last segments of runs of failing ones; what lies between two close ones belongs to them."""
+    if not len(failing):
+        return []
+    edges = np.flatnonzero(np.diff(failing) > 2)
+    return [(int(part[0]), int(part[-1])) for part in np.split(failing, edges + 1)]
+
+
+def _described(
+    recording: Recording, index: int, stretch: tuple[int, int], own: Array, usual: Array, rows: int, repeats: int
+) -> Disturbance:
+    trial = recording.trials[index]
+    errors = np.sqrt(np.nanmean(own[stretch[0] : stretch[1] + 1] ** 2, axis=0))
+    joint = int(np.nanargmax(errors / usual))
+    start, end = (stretch[0] - 1) * rows * trial.step, (stretch[1] + 2) * rows * trial.step
+    return Disturbance(
+        trial.name,
+        max(start, 0.0),
+        min(end, trial.duration + trial.step),
+        recording.joints[joint],
+        float(errors[joint]),
+        float(usual[joint]),
+        repeats,
+    )

@@ -1,0 +1,78 @@
+"""A push stands out where the same command, played again, shows nothing of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.identification.disturbances import Disturbance, disturbances, undisturbed
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.search.division import Division
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import free_run
+from tests.measurement.small_rig import write
+
+NOISE = np.full(2, 1e-4)
+START, END = 3.1, 3.6  # [s]
+EFFECTS = tuple(catalogue().values())  # one kernel is compiled for all tests
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Three runs of one command of 6 s by the model as stated, each with noise of its own."""
+    whole = read_recording(write(tmp_path_factory.mktemp("plain")))
+    time = np.arange(600) / 100.0
+    command = np.stack([0.3 * np.sin(2.0 * np.pi * 0.8 * time), 0.4 * np.sin(2.0 * np.pi * 0.5 * time)], axis=1)
+    longer = replace(whole.trials[0], time=time, command=command, position=command, torque=None, valid=time >= 0.0)
+    (result,) = free_run(whole.with_trials([longer]), nominal_model(whole), step=5e-4)
+    rng = np.random.default_rng(0)
+    runs = [result.position + NOISE * rng.normal(size=(600, 2)) for _ in range(3)]
+    return whole.with_trials([replace(longer, name=f"run_{k}", position=one) for k, one in enumerate(runs)])
+
+
+def pushed(plain: Recording, *numbers: int) -> Recording:
+    """The same with joint b moved by 50 mrad for half a second in some of the runs."""
+    time = plain.trials[0].time
+    bump = 0.05 * np.sin(np.pi * np.clip((time - START) / (END - START), 0.0, 1.0)) ** 2
+    trials = list(plain.trials)
+    for number in numbers:
+        position = trials[number].position + bump[:, None] * np.array([0.0, 1.0])
+        trials[number] = replace(trials[number], position=position)
+    return plain.with_trials(trials)
+
+
+def found(recording: Recording) -> list[Disturbance]:
+    division = Division(Shooting(recording, EFFECTS), recording, recording, NOISE)
+    return disturbances(division, recording, nominal_model(recording))
+
+
+def test_a_push_is_found_with_its_trial_joint_and_time(plain: Recording) -> None:
+    (one,) = found(pushed(plain, 1))
+    assert (one.trial, one.joint, one.repeats) == ("run_1", "b", 2)
+    assert START - 1.0 < one.start < START < END < one.end < END + 1.0
+    assert one.error > 5.0 * one.usual
+
+
+def test_what_other_runs_of_the_command_show_too_is_no_push(plain: Recording) -> None:
+    assert found(plain) == []
+    assert found(pushed(plain, 0, 1, 2)) == []
+
+
+def test_what_nothing_repeats_is_found_and_said_to_be_alone(plain: Recording) -> None:
+    only = plain.with_trials(pushed(plain, 0).trials[:1])
+    assert [(one.trial, one.repeats) for one in found(only)] == [("run_0", 0)]
+
+
+def test_a_push_counts_in_no_error_once_it_is_left_out(plain: Recording) -> None:
+    recording = pushed(plain, 1)
+    left = undisturbed(recording, found(recording))
+    out = ~left.trials[1].valid
+    time = recording.trials[1].time
+    assert out[(time >= START) & (time < END)].all()
+    assert 0.0 < out.mean() < 0.4
+    assert left.trials[0].valid.all()
+    assert left.trials[2].valid.all()
+    assert found(left) == []
