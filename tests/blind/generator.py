@@ -207,7 +207,7 @@ def _describe(world: World, bench: Bench, trials: list[dict[str, Any]]) -> dict[
     }
 
 
-def _save(folder: Path, world: World, bench: Bench, tables: dict[str, tuple[int, str, pl.DataFrame]]) -> None:
+def save(folder: Path, world: World, bench: Bench, tables: dict[str, tuple[int, str, pl.DataFrame]]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, (_, _, table) in tables.items():
         (folder / name).parent.mkdir(exist_ok=True)
@@ -334,8 +334,8 @@ def write(
             break
     else:
         raise RuntimeError(f"seed {seed}: no finite recording in {ATTEMPTS} attempts")
-    _save(out / "recording", world, bench, tables)
-    _save(out / "recording" / "validation", world, bench, unseen)
+    save(out / "recording", world, bench, tables)
+    save(out / "recording" / "validation", world, bench, unseen)
     truth["redrawn"] = redrawn
     left_alone = perform(seed, world, bench, engine)[0] if pushed else tables
     truth["repeat_scatter"] = repeat_scatter(left_alone, world.rig.actuated)

@@ -1,0 +1,77 @@
+"""The blind circle's hand is the package's own, but for what is hidden in it; its table counts what it says."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import circle
+from generator import perform, save
+
+from tactile_cube.drivetrain.effects import parse_effect
+from tactile_cube.hand import DLR_HAND2, finger_urdf
+from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.measurement.comparing.error import free_run_error
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.replay.model import terms_of
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import free_run
+
+QUIET = replace(circle.BENCH, seconds=2.0, initialisations=1, kinds=("multisine",), noise=1e-9, resolution=1e-9)
+
+
+def test_the_finger_has_the_masses_of_the_hand() -> None:
+    ours, theirs = (
+        RigidBodyTree.from_urdf(urdf, ("q1", "q2", "q3"), {"q4": Coupling("q3", 1.0, 0.0)})
+        for urdf in (circle.finger().urdf(), finger_urdf(DLR_HAND2))
+    )
+    for angles in np.random.default_rng(0).uniform(-0.1, 1.0, (3, 3)):
+        matrices = [one.actuated_mass_matrix(angles) for one in (ours, theirs)]
+        assert matrices[0] == pytest.approx(matrices[1], rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["torque_bias", "torque_gain", "coulomb_friction", "command_delay"])
+def test_what_is_hidden_on_the_bench_is_what_the_hand_has(tmp_path: Path, name: str) -> None:
+    key, low, high, _, put = circle.EFFECTS[name]
+    size, plant = 0.5 * (low + high), circle.healthy()
+    put(plant, 1, size)
+    world = circle.measured(plant)
+    world.homing = 0.0
+    save(tmp_path, world, QUIET, perform(3, world, QUIET)[0])
+    recording = read_recording(tmp_path)
+    plain = nominal_model(recording)
+    hidden = replace(plain, terms=tuple(terms_of([parse_effect(f"{name}@q2: {key}={size}")], recording.joints)))
+    without, beside = (free_run_error(recording, free_run(recording, m, step=1e-3)).overall for m in (plain, hidden))
+    assert beside < 2e-3 < 4e-3 < without
+
+
+def test_a_draw_is_the_same_each_time_and_each_attempt_another() -> None:
+    (first, again), other = (circle.draw(7, 0) for _ in range(2)), circle.draw(7, 1)
+    assert first["words"] == again["words"] != other["words"]
+    assert first["tip_friction"] == other["tip_friction"]
+
+
+def test_the_table_counts_what_was_lost_and_what_came_back() -> None:
+    def of(successes: int) -> dict[str, Any]:
+        return {"successes": successes, "episodes": 10, "kept": 9, "mean_angle": 12.34}
+
+    line = {"commit": "abc", "tip_friction": 0.9, "tip_spinning_friction": 3e-3, "words": ["torque_bias@q2: bias=0.2"]}
+    line |= {"verdict": "missing_effect", "named": ["torque_bias@q2"], "judged": "right", "plain": of(10)}
+    lines = [
+        line | {"seed": 2, "before": of(5), "after": of(8), "control": of(7)},
+        line | {"seed": 1, "before": of(0), "control": of(0), "verdict": "adequate", "named": []},
+        line | {"seed": 3, "before": of(6), "after": of(10), "control": of(10)},
+    ]
+    text = circle.page(lines, "python tests/blind/circle.py")
+    assert (
+        "Of 2 hands on which success was lost (at most 5 of 10) it came back (at least 8) on 1 with the model" in text
+    )
+    assert "and on 0 without" in text
+    row = "| 2 | 0.9, 3.0 | torque_bias@q2: bias=0.2 | `missing_effect`: torque_bias@q2 | right | 10 of 10, 9 kept, 12.3 rad"
+    assert row in text
+    assert "`adequate`: nothing named" in text
