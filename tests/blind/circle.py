@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
 from generator import perform, save
-from judge import commit, read_lines
+from judge import commit, read_lines, validation_error
 from plant import Plant, neutral
 from rig import Link, Rig
 from scoring import score
@@ -34,7 +34,7 @@ EPISODES, SECONDS = 10, 20
 LOST, RESTORED = 5, 8
 """Successful episodes of ten: at most so many and success is lost, at least so many and it is back."""
 ATTEMPTS = 8
-"""Drives that a draw may try until one makes the policy fail."""
+"""Drives that a draw may try, graver and graver, until one makes the policy fail."""
 LEARN = (
     "+experiment=wide", "training.init_replay=false", "training.learning_starts=4000", "training.actor_frozen=3000",
     "agent.alpha_init=0.02", "collector.processes=1",
@@ -60,8 +60,8 @@ def _more_friction(plant: Plant, joint: int, size: float) -> None:
 
 EFFECTS: dict[str, tuple[str, float, float, bool, Put]] = {
     "torque_bias": ("bias", 0.1, 0.4, True, _put("bias")),
-    "torque_gain": ("error", -0.7, -0.3, False, _put("gain", lambda x: 1.0 + x)),
-    "torque_saturation": ("limit", 0.08, 0.3, False, _put("saturation")),
+    "torque_gain": ("error", -0.3, -0.7, False, _put("gain", lambda x: 1.0 + x)),
+    "torque_saturation": ("limit", 0.3, 0.08, False, _put("saturation")),
     "backlash": ("gap", 0.05, 0.15, False, _put("backlash")),
     "coulomb_friction": ("friction", 0.1, 0.4, False, _more_friction),
     "viscous_friction": ("damping", 0.3, 1.0, False, _put("viscous")),
@@ -69,7 +69,7 @@ EFFECTS: dict[str, tuple[str, float, float, bool, Put]] = {
     "actuator_lag": ("time_constant", 0.02, 0.1, False, _put("lag")),
     "load_dependent_friction": ("coefficient", 0.3, 0.8, False, _put("load_friction")),
 }
-"""Effect -> its parameter in the package, least and largest size, either sign or not, what it is in the blind physics.
+"""Effect -> its parameter in the package, from mild to grave, either sign or not, what it is in the blind physics.
 
 Sizes that a policy feels, several times those of a good drive.
 """
@@ -118,9 +118,10 @@ def draw(seed: int, attempt: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, 2, attempt])
     plant, effects, words = healthy(), [], []
     for name in rng.permutation(list(EFFECTS))[: 1 + int(rng.uniform() < 0.4)].tolist():
-        key, low, high, either, put = EFFECTS[name]
+        key, mild, grave, either, put = EFFECTS[name]
         joint = int(rng.integers(3))
-        size = round(float(rng.uniform(low, high) * (rng.choice([-1.0, 1.0]) if either else 1.0)), 4)
+        share = rng.uniform(attempt / ATTEMPTS, 1.0)
+        size = round(float((mild + share * (grave - mild)) * (rng.choice([-1.0, 1.0]) if either else 1.0)), 4)
         put(plant, joint, size)
         absorbed = name in ("coulomb_friction", "viscous_friction")
         truth = {"name": name, "joints": [f"q{joint + 1}"], "parameters": {key: size}, "absorbed": absorbed}
@@ -184,7 +185,10 @@ def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
     plain = tried(place / "plain", policy, hand, [])
     bench = place / "bench"
     if not (bench / "recording.yaml").is_file():
-        save(bench, measured(hand["plant"]), BENCH, perform(seed, measured(hand["plant"]), BENCH, "mujoco")[0])
+        world = measured(hand["plant"])
+        trials, unseen = perform(seed, world, BENCH, "mujoco")
+        save(bench / "validation", world, BENCH, unseen)
+        save(bench, world, BENCH, trials)
     words = (f"recording={bench}", "engine=fast", "rerun=false")
     diagnosis = json.loads(run("diagnose", place / "diagnose", "diagnosis.json", *words).read_text())
     found = [*diagnosis["effects"], *diagnosis["partial_effects"]]
@@ -193,7 +197,9 @@ def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
     line = {"seed": seed, "commit": commit(), "policy": policy, "steps": steps, "attempt": attempt + 1}
     line |= {key: hand[key] for key in ("tip_friction", "tip_spinning_friction", "words")}
     line |= {"verdict": diagnosis["verdict"], "named": named, "plain": plain, "before": before}
-    line["judged"] = score({"effects": hand["effects"]}, diagnosis, None).outcome
+    error = validation_error(bench, place / "diagnose" / "model.yaml", place / "unseen")
+    floor = float(np.hypot(BENCH.noise, BENCH.resolution / np.sqrt(12.0)))
+    line["judged"] = score({"effects": hand["effects"]}, diagnosis, None if error is None else error / floor).outcome
     model = None
     if named:
         effects = ",".join(f'"{one}"' for one in named)
@@ -215,8 +221,9 @@ def page(lines: list[dict[str, Any]], command: str) -> str:
         "",
         f"Command: `{command}`; commit: {', '.join(sorted({line['commit'] for line in lines}))}. Ten episodes of "
         f"{SECONDS} s on a hand of MuJoCo's with another contact and hidden effects of the drive; learning in PyBullet, "
-        f"with the model that was found and, as a control, without. Of {len(of)} hands on which success was lost (at "
-        f"most {LOST} of {EPISODES}) it came back (at least {RESTORED}) on {back} with the model and on {alone} without.",
+        f"with the model that was found and, as a control, without. Success was lost (at most {LOST} of {EPISODES}) on "
+        f"{len(of)} of {len(lines)} hands, and came back (at least {RESTORED}) on {back} of them with the model, on "
+        f"{alone} without.",
         "",
         "| seed | tips: friction, spinning [mm] | hidden | answer | judged | nothing hidden | lost "
         "| after, with the model | after, without |",
@@ -246,7 +253,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=6)
     parser.add_argument("--first-seed", type=int, required=True)
-    parser.add_argument("--steps", type=int, default=100_000, help="of learning, with the model and without")
+    parser.add_argument("--steps", type=int, default=80_000, help="of learning, with the model and without")
     parser.add_argument("--policy", default="default", help="that comes with the package")
     parser.add_argument("--out", type=Path, default=Path("outputs/blind_circle"))
     args = parser.parse_args()
