@@ -220,10 +220,10 @@ def page(lines: list[dict[str, Any]], command: str) -> str:
         "# The sim-to-real circle, blind",
         "",
         f"Command: `{command}`; commit: {', '.join(sorted({line['commit'] for line in lines}))}. Ten episodes of "
-        f"{SECONDS} s on a hand of MuJoCo's with another contact and hidden effects of the drive; learning in PyBullet, "
-        f"with the model that was found and, as a control, without. Success was lost (at most {LOST} of {EPISODES}) on "
-        f"{len(of)} of {len(lines)} hands, and came back (at least {RESTORED}) on {back} of them with the model, on "
-        f"{alone} without.",
+        f"{SECONDS} s on a hand of MuJoCo's with another contact and hidden effects of the drive; learning in "
+        "PyBullet, with the model that was found and, as a control, without. "
+        f"Success was lost (at most {LOST} of {EPISODES}) on {len(of)} of {len(lines)} hands, "
+        f"and came back (at least {RESTORED}) on {back} of them with the model, on {alone} without.",
         "",
         "| seed | tips: friction, spinning [mm] | hidden | answer | judged | nothing hidden | lost "
         "| after, with the model | after, without |",
