@@ -32,9 +32,9 @@ def test_what_follows_no_model_is_told_with_the_line_that_leaves_it_out() -> Non
     one = {"trial": "holds_0", "start": 0.8, "end": 2.8, "joint": "q1", "error": 111.2, "usual": 1.62, "repeats": 2}
     (left_out,) = disturbed({"left_out": [one]})
     assert left_out.startswith(
-        "Left out: holds_0 from 0.80 to 2.80 s follows no model, other runs of its command do (2)"
+        "Left out: holds_0 from 0.80 to 2.80 s follows no model, though 2 other runs of its command do: q1"
     )
     assert "`exclude: [[0.80, 2.80]]`" in left_out
     (suspected,) = disturbed({"suspected": [one | {"repeats": 0}]})
     assert suspected.startswith("Not left out: holds_0")
-    assert "nothing repeats it" in suspected
+    assert "and nothing repeats it" in suspected

@@ -155,7 +155,9 @@ def disturbed(result: Mapping[str, Any]) -> list[str]:
     lines = []
     for key, opening in (("left_out", "Left out"), ("suspected", "Not left out")):
         for one in result.get(key, []):
-            beside = f"other runs of its command do ({one['repeats']})" if one["repeats"] else "nothing repeats it"
+            other = one["repeats"]
+            runs = f"{other} other runs of its command do" if other > 1 else "the other run of it does"
+            beside = f"though {runs}" if other else "and nothing repeats it"
             lines.append(
                 f"{opening}: {one['trial']} from {one['start']:.2f} to {one['end']:.2f} s follows no model, "
                 f"{beside}: {one['joint']} is {short(one['error'], 2)} x its sensor noise off there, elsewhere "
