@@ -3,7 +3,7 @@
     python tests/blind/circle.py --draws 6 --first-seed 500000 --out outputs/blind_circle
 
 The "real" hand of a draw is MuJoCo's, with a tip friction, a spinning friction and one or two effects of the drive
-drawn by chance, as large as it takes for the shipped policy to fail. A finger of it is measured on a bench whose
+drawn by chance, grown until the shipped policy fails. A finger of it is measured on a bench whose
 physics shares no code with the package (physics.py, moved by MuJoCo). The package is given that recording alone: it is
 diagnosed, what is named is fitted, the policy goes on learning in PyBullet in the world of that model, and returns to
 the real hand. The control learns as long in PyBullet without the model. Every stage is a command of the package; one
@@ -33,13 +33,8 @@ EPISODES, SECONDS = 10, 20
 """Of every evaluation."""
 LOST, RESTORED = 5, 8
 """Successful episodes of ten: at most so many and success is lost, at least so many and it is back."""
-ATTEMPTS = 8
-"""Drives that a draw may try, graver and graver, until one makes the policy fail."""
-LEARN = (
-    "+experiment=wide", "training.init_replay=false", "training.learning_starts=4000", "training.actor_frozen=3000",
-    "agent.alpha_init=0.02", "collector.processes=1",
-)  # fmt: skip
-"""How a shipped policy goes on learning: a replay begins with 4000 steps, and critics learn for 3000 updates alone."""
+SETS, SIZES = 4, 4
+"""Sets of effects that a draw may try, each in so many sizes, mild to grave, until one makes the policy fail."""
 STATED = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0, "stiffness": 25.0, "static_friction": 0.02}
 INERTIA = 0.0015
 """Rotors' inertia of the simulated hand [kg m^2]."""
@@ -113,15 +108,17 @@ def healthy() -> Plant:
 
 
 def draw(seed: int, attempt: int) -> dict[str, Any]:
-    """Contact and effects of one attempt of a seed; contact is the seed's own."""
+    """Contact and effects of one attempt of a seed; contact is the seed's own, and a set stays while its sizes grow."""
     contact = np.random.default_rng([seed, 1])
-    rng = np.random.default_rng([seed, 2, attempt])
+    rng = np.random.default_rng([seed, 2, attempt // SIZES])
+    sizes = np.random.default_rng([seed, 3, attempt])
     plant, effects, words = healthy(), [], []
     for name in rng.permutation(list(EFFECTS))[: 1 + int(rng.uniform() < 0.4)].tolist():
         key, mild, grave, either, put = EFFECTS[name]
         joint = int(rng.integers(3))
-        share = rng.uniform(attempt / ATTEMPTS, 1.0)
-        size = round(float((mild + share * (grave - mild)) * (rng.choice([-1.0, 1.0]) if either else 1.0)), 4)
+        sign = rng.choice([-1.0, 1.0]) if either else 1.0
+        share = (attempt % SIZES + sizes.uniform()) / SIZES
+        size = round(float(sign * (mild + share * (grave - mild))), 4)
         put(plant, joint, size)
         absorbed = name in ("coulomb_friction", "viscous_friction")
         truth = {"name": name, "joints": [f"q{joint + 1}"], "parameters": {key: size}, "absorbed": absorbed}
@@ -163,7 +160,7 @@ def tried(folder: Path, policy: str, hand: dict[str, Any], effects: list[str]) -
 
 def unhappy(place: Path, seed: int, policy: str) -> tuple[int, dict[str, Any], dict[str, Any]]:
     """The first attempt whose hand the policy fails on, or the last one."""
-    for attempt in range(ATTEMPTS):
+    for attempt in range(SETS * SIZES):
         hand = draw(seed, attempt)
         before = tried(place / f"before_{attempt}", policy, hand, hand["words"])
         if before["successes"] <= LOST:
@@ -174,8 +171,8 @@ def unhappy(place: Path, seed: int, policy: str) -> tuple[int, dict[str, Any], d
 def learned(folder: Path, policy: str, steps: int, model: Path | None) -> Path:
     """The policy after so many steps more in PyBullet, in the world of a model or the stated one."""
     world = [f"model={model}"] if model else []
-    words = [*LEARN, f"training.init_from={policy}", f"training.steps={steps}", *world]
-    return run("train", folder, "policy.safetensors", *words)
+    words = ["+experiment=adapt", "collector.processes=1", f"training.init_from={policy}", f"training.steps={steps}"]
+    return run("train", folder, "policy.safetensors", *words, *world)
 
 
 def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
@@ -253,7 +250,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=6)
     parser.add_argument("--first-seed", type=int, required=True)
-    parser.add_argument("--steps", type=int, default=80_000, help="of learning, with the model and without")
+    parser.add_argument("--steps", type=int, default=60_000, help="of learning, with the model and without")
     parser.add_argument("--policy", default="default", help="that comes with the package")
     parser.add_argument("--out", type=Path, default=Path("outputs/blind_circle"))
     args = parser.parse_args()

@@ -50,10 +50,20 @@ def test_what_is_hidden_on_the_bench_is_what_the_hand_has(tmp_path: Path, name: 
     assert beside < 2e-3 < 4e-3 < without
 
 
-def test_a_draw_is_the_same_each_time_and_each_attempt_another() -> None:
-    (first, again), other = (circle.draw(7, 0) for _ in range(2)), circle.draw(7, 1)
-    assert first["words"] == again["words"] != other["words"]
-    assert first["tip_friction"] == other["tip_friction"]
+def test_a_draw_is_the_same_each_time_and_its_effects_grow_before_others_are_tried() -> None:
+    assert circle.draw(7, 0)["words"] == circle.draw(7, 0)["words"]
+    for seed in range(20):
+        hands = [circle.draw(seed, attempt) for attempt in range(2 * circle.SIZES)]
+        assert len({hand["tip_friction"] for hand in hands}) == 1
+        first, second = (hands[at : at + circle.SIZES] for at in (0, circle.SIZES))
+        for one in (first, second):
+            assert len({tuple((e["name"], *e["joints"]) for e in hand["effects"]) for hand in one}) == 1
+            for effect in range(len(one[0]["effects"])):
+                name, sizes = one[0]["effects"][effect]["name"], []
+                for hand in one:
+                    sizes += [abs(size) for size in hand["effects"][effect]["parameters"].values()]
+                assert sizes == sorted(sizes, reverse=name == "torque_saturation")
+    assert circle.draw(7, 0)["words"] != circle.draw(7, circle.SIZES)["words"]
 
 
 def test_the_table_counts_what_was_lost_and_what_came_back() -> None:

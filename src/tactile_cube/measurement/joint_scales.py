@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 OFTEN, USUAL, SELDOM = 0.5, 0.9, 0.999  # quantiles of the torques that a recording asks for
 OUTSIDE = 0.002  # share of the positions beyond either end of the range
 FAST = 0.995  # quantile of the speeds
-CROSSING = 0.2  # [s] in which the usual torque moves a finger's joint through its range
+CROSSING = 0.11  # [s] in which the usual torque moves a finger's joint through its range
 COARSE, FASTER = 10, 3.0  # rows between which a motion is no noise; its usual speed over the mean one
 VELOCITY_WINDOW = 0.03  # [s] of a finger
 SMALL = 1e-9  # part of another size that stands for nothing at all
@@ -62,7 +62,8 @@ def unit_of_time(recording: Recording, inertia: Array, spans: Array) -> float:
     """What a second of a finger stands for [s], a whole decade.
 
     It goes by the time in which the fastest joint would cross its range, pushed by its usual torque or as fast as it
-    mostly moves.
+    mostly moves. CROSSING is the centre (in its logarithm) of what blind rigs of a finger's size have, 0.06 to 0.2 s,
+    so that all of them, and a finger whose drive is several times weaker or stronger, lie within one decade.
     """
     moved = np.concatenate([np.abs(np.diff(trial.position[::COARSE], axis=0)) for trial in recording.trials])
     coasting = spans / np.maximum(FASTER * moved.mean(axis=0) / (COARSE * recording.step), SMALL * spans)
