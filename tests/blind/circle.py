@@ -2,13 +2,13 @@
 
     python tests/blind/circle.py --draws 6 --first-seed 500000 --out outputs/blind_circle
 
-The "real" hand of a draw is MuJoCo's, with a tip friction, a spinning friction and one or two effects of the drive
-drawn by chance, grown until the shipped policy fails. A finger of it is measured on a bench whose
-physics shares no code with the package (physics.py, moved by MuJoCo). The package is given that recording alone: it is
-diagnosed, what is named is fitted, the policy goes on learning in PyBullet in the world of that model, and returns to
-the real hand. The control learns as long in PyBullet without the model. Every stage is a command of the package; one
-that is done is left out, so the same call goes on after an interruption. circle.jsonl has a line for each draw,
-circle.md the table.
+The "real" hand of a draw is MuJoCo's, with soft tips, their friction and one or two effects of the drive drawn by
+chance; the effects grow until the shipped policy fails. A finger of it is measured on a bench whose physics shares no
+code with the package (physics.py, moved by MuJoCo). The package is given that recording alone: it is diagnosed, what
+is named is fitted, the policy goes on learning in PyBullet in the world of that model (`+experiment=adapt`), and
+returns to the real hand. The control learns as long in PyBullet without the model. Every stage is a command of the
+package; one that is done is left out, so the same call goes on after an interruption. circle.jsonl has a line for each
+draw, circle.md the table.
 """
 
 import argparse
@@ -33,6 +33,8 @@ EPISODES, SECONDS = 10, 20
 """Of every evaluation."""
 LOST, RESTORED = 5, 8
 """Successful episodes of ten: at most so many and success is lost, at least so many and it is back."""
+CONTACT = "tip_friction", "tip_spinning_friction", "tip_compliance"
+"""Of the real hand; no training of the package ever saw soft tips."""
 SETS, SIZES = 4, 4
 """Sets of effects that a draw may try, each in so many sizes, mild to grave, until one makes the policy fail."""
 STATED = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0, "stiffness": 25.0, "static_friction": 0.02}
@@ -127,6 +129,7 @@ def draw(seed: int, attempt: int) -> dict[str, Any]:
     return {
         "tip_friction": round(float(contact.uniform(0.6, 1.1)), 3),
         "tip_spinning_friction": round(float(np.exp(contact.uniform(np.log(1e-3), np.log(1e-2)))), 5),
+        "tip_compliance": round(float(np.exp(contact.uniform(np.log(5e-5), np.log(1e-3)))), 6),
         "effects": effects,
         "words": words,
         "plant": plant,
@@ -153,7 +156,7 @@ def tried(folder: Path, policy: str, hand: dict[str, Any], effects: list[str]) -
     quoted = ",".join(f'"{one}"' for one in effects)
     words = [f"policy={policy}", "engine=mujoco", "randomization=one_hand", "seed=1", "film=false"]
     words += [f"effects=[{quoted}]", f"protocol.episodes={EPISODES}", f"protocol.seconds={SECONDS}"]
-    words += [f"+env.constants.{key}={hand[key]}" for key in ("tip_friction", "tip_spinning_friction")]
+    words += [f"+env.constants.{key}={hand[key]}" for key in CONTACT]
     summary = json.loads(run("evaluate", folder, "results.json", *words).read_text())["variants"][0]["summary"]
     return {key: summary[key] for key in ("mean_angle", "successes", "kept", "episodes")}
 
@@ -222,14 +225,14 @@ def page(lines: list[dict[str, Any]], command: str) -> str:
         f"Success was lost (at most {LOST} of {EPISODES}) on {len(of)} of {len(lines)} hands, "
         f"and came back (at least {RESTORED}) on {back} of them with the model, on {alone} without.",
         "",
-        "| seed | tips: friction, spinning [mm] | hidden | answer | judged | nothing hidden | lost "
+        "| seed | tips: friction, spinning [mm], softness [mm/N] | hidden | answer | judged | nothing hidden | lost "
         "| after, with the model | after, without |",
         "|---" * 9 + "|",
     ]
     for line in sorted(lines, key=lambda one: one["seed"]):
         cells = [
             line["seed"],
-            f"{line['tip_friction']:g}, {1e3 * line['tip_spinning_friction']:.1f}",
+            f"{line['tip_friction']:g}, {1e3 * line['tip_spinning_friction']:.1f}, {1e3 * line['tip_compliance']:.2f}",
             "; ".join(line["words"]),
             f"`{line['verdict']}`: {', '.join(line['named']) or 'nothing named'}",
             line["judged"],

@@ -54,7 +54,7 @@ def test_a_draw_is_the_same_each_time_and_its_effects_grow_before_others_are_tri
     assert circle.draw(7, 0)["words"] == circle.draw(7, 0)["words"]
     for seed in range(20):
         hands = [circle.draw(seed, attempt) for attempt in range(2 * circle.SIZES)]
-        assert len({hand["tip_friction"] for hand in hands}) == 1
+        assert len({tuple(hand[key] for key in circle.CONTACT) for hand in hands}) == 1
         first, second = (hands[at : at + circle.SIZES] for at in (0, circle.SIZES))
         for one in (first, second):
             assert len({tuple((e["name"], *e["joints"]) for e in hand["effects"]) for hand in one}) == 1
@@ -70,7 +70,13 @@ def test_the_table_counts_what_was_lost_and_what_came_back() -> None:
     def of(successes: int) -> dict[str, Any]:
         return {"successes": successes, "episodes": 10, "kept": 9, "mean_angle": 12.34}
 
-    line = {"commit": "abc", "tip_friction": 0.9, "tip_spinning_friction": 3e-3, "words": ["torque_bias@q2: bias=0.2"]}
+    line = {
+        "commit": "abc",
+        "tip_friction": 0.9,
+        "tip_spinning_friction": 3e-3,
+        "tip_compliance": 2e-4,
+        "words": ["torque_bias@q2: bias=0.2"],
+    }
     line |= {"verdict": "missing_effect", "named": ["torque_bias@q2"], "judged": "right", "plain": of(10)}
     lines = [
         line | {"seed": 2, "before": of(5), "after": of(8), "control": of(7)},
@@ -80,6 +86,6 @@ def test_the_table_counts_what_was_lost_and_what_came_back() -> None:
     text = circle.page(lines, "python tests/blind/circle.py")
     assert "lost (at most 5 of 10) on 2 of 3 hands, and came back (at least 8) on 1 of them with the model" in text
     assert "on 0 without." in text
-    row = "| 2 | 0.9, 3.0 | torque_bias@q2: bias=0.2 | `missing_effect`: torque_bias@q2 | right | 10 of 10, 9 kept, "
+    row = "| 2 | 0.9, 3.0, 0.20 | torque_bias@q2: bias=0.2 | `missing_effect`: torque_bias@q2 | right | 10 of 10, "
     assert row in text
     assert "`adequate`: nothing named" in text
