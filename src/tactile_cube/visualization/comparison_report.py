@@ -82,7 +82,7 @@ def next_section(comparison: Comparison, model_path: str | None) -> Section:
         said = (
             "Nothing is missing at this noise. Check the same model on a recording of other motions, or train with it:"
         )
-        command = f"python -m tactile_cube.train +experiment=finetune{model or ' model=MODEL.yaml'}"
+        command = f"python -m tactile_cube.train +experiment=adapt{model or ' model=MODEL.yaml'}"
     else:
         said = "Constants may be off, or an effect missing: diagnose refits the first, then searches for the second."
         command = f"python -m tactile_cube.diagnose recording={folder}{model}"

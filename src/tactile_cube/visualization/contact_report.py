@@ -75,7 +75,7 @@ def _ranked(row: Mapping[str, Any]) -> dict[str, Any]:
 def _next_section(result: Mapping[str, Any], recording: str, model_path: str) -> Section:
     """What to type or to record after a diagnosis."""
     names = ",".join(one["name"] for one in result["effects"])
-    train = f"python -m tactile_cube.train +experiment=finetune model={model_path}"
+    train = f"python -m tactile_cube.train +experiment=adapt model={model_path}"
     fit = f"python -m tactile_cube.identify recording={recording} effects=[{names}]"
     said, lines = {
         "adequate": ("Train in the world as it is stated:", [train]),
@@ -89,7 +89,7 @@ def _next_section(result: Mapping[str, Any], recording: str, model_path: str) ->
 def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:
     """The page of an identification of contact effects alone."""
     before, after = found.stages["nominal"].overall, found.stages["with_effects"].overall
-    train = Listing([f"python -m tactile_cube.train +experiment=finetune model={model_path}"], code=True)
+    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
     follow = Section(
         "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
     )

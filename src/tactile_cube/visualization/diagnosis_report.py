@@ -121,7 +121,7 @@ def identification_report(
     found = [{"name": e.name, "joints": [e.joint or "object"], "parameters": e.parameters} for e in effects]
     units = after.recording.units
     unit = common_unit(units.values())
-    train = Listing([f"python -m tactile_cube.train +experiment=finetune model={model_path}"], code=True)
+    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
     return Report(
         title=f"Identified: {after.recording.name}",
         answer=f"The error on trials that the fit never saw fell from {milli(steps[0], unit)} to "

@@ -147,7 +147,7 @@ def next_section(
     names = [*diagnosis.get("known_effects", []), *found]
     unexplained = (diagnosis["unexplained_joints"] or ["JOINT"])[0]
     identify = f"python -m tactile_cube.identify recording={folder} effects"
-    train = f"python -m tactile_cube.train +experiment=finetune model={model}"
+    train = f"python -m tactile_cube.train +experiment=adapt model={model}"
     if diagnosis["verdict"] == "adequate":
         said, lines = "Train with the refitted constants:", [train]
     elif diagnosis["verdict"] == "missing_effect":
