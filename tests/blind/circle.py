@@ -195,7 +195,7 @@ def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
     every = [f"{one['name']}@{joint}" for one in found for joint in one["joints"]]
     named = diagnosis["sets"][0] if diagnosis["sets"] else every  # of what is ambiguous, what is recommended
     line = {"seed": seed, "commit": commit(), "policy": policy, "steps": steps, "attempt": attempt + 1}
-    line |= {key: hand[key] for key in ("tip_friction", "tip_spinning_friction", "words")}
+    line |= {key: hand[key] for key in (*CONTACT, "words")}
     line |= {"verdict": diagnosis["verdict"], "named": named, "plain": plain, "before": before}
     error = validation_error(bench, place / "diagnose" / "model.yaml", place / "unseen")
     floor = float(np.hypot(BENCH.noise, BENCH.resolution / np.sqrt(12.0)))
