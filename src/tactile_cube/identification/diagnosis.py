@@ -21,6 +21,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
 from tactile_cube.identification.simulations import Unexplained, with_offsets
+from tactile_cube.identification.unseen import Unseen, unseen
 from tactile_cube.identification.verdict import Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
@@ -53,6 +54,7 @@ class Diagnosis:
         common: joint offsets that may be the encoder's or the initialisations'.
         left_out: stretches that follow no model, and that count in nothing above.
         suspected: stretches that may be such ones, and count.
+        unseen: effects that no trial could show.
     """
 
     verdict: Verdict
@@ -70,6 +72,7 @@ class Diagnosis:
     common: tuple[CommonOffset, ...] = ()
     left_out: tuple[Disturbance, ...] = ()
     suspected: tuple[Disturbance, ...] = ()
+    unseen: tuple[Unseen, ...] = ()
 
     @property
     def unproven(self) -> tuple[Explanation, ...]:
@@ -135,6 +138,7 @@ def diagnose(
         common=common_offsets(findings.base, search.shooting.sizes) if verdict.kind == "adequate" else (),
         left_out=left_out,
         suspected=suspected,
+        unseen=unseen(effects, search.shooting.sizes, [term.label for term in fitted.model.terms]),
     )
     fits = open_fits(diagnosis)
     if len(fits) == 1:

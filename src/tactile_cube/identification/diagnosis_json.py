@@ -48,6 +48,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "left_out": [asdict(one) for one in diagnosis.left_out],
         "suspected": [asdict(one) for one in diagnosis.suspected],
+        "unseen": [one._asdict() for one in diagnosis.unseen],
         "next_experiment": FILE if experiment and experiment.decides else None,
         "inseparable": [list(pair) for pair in experiment.inseparable] if experiment else [],
         "held_out": diagnosis.held_out,

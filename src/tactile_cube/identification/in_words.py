@@ -47,7 +47,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     lines += [f"  {line}" for line in unproven_effects(unproven)] if unproven else []
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     lines += [f"  {common_offset(entry, units)}" for entry in result.get("common_offsets", [])]
-    lines += [f"  {line}" for line in disturbed(result)]
+    lines += [f"  {line}" for line in (*disturbed(result), *unseen_effects(result))]
     error, unit = result["error"], common_unit(units.values())
     refitted = f"{milli(error['refitted'], unit)} with constants refitted, " if not grasps else ""
     lines.append(
@@ -165,6 +165,14 @@ def disturbed(result: Mapping[str, Any]) -> list[str]:
                 f"[[{one['start']:.2f}, {one['end']:.2f}]]` below it in recording.yaml, for every other verb too."
             )
     return lines
+
+
+def unseen_effects(result: Mapping[str, Any]) -> list[str]:
+    """What no trial could show, an effect a line."""
+    joints: dict[str, list[str]] = {}
+    for one in result.get("unseen", []):
+        joints.setdefault(one["effect"], []).append(f"{one['joint']} ({one['why']})")
+    return [f"Not to be seen in these trials, there or not: {name} at {', '.join(at)}." for name, at in joints.items()]
 
 
 def staircase(stages: Mapping[str, float], model: ModelFile, units: Mapping[str, str]) -> str:

@@ -36,7 +36,9 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     commanded = [np.abs(np.diff(trial.command, axis=0)) / trial.step for trial in recording.trials]
     command_speed = speeds if recording.torque_controlled else _quantile(commanded, FAST)
     masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.coupled.values()}
-    slides = tree.prismatic[[tree.dof_names.index(name) for name in tree.joint_names]]
+    own = [tree.dof_names.index(name) for name in tree.joint_names]
+    slides = tree.prismatic[own]
+    limits = np.full(len(own), np.inf) if recording.torque_controlled else recording.gains.torque_limit
     return tuple(
         Scales(
             torque=float(max(usual[j], SMALL * accelerating[j])),
@@ -53,6 +55,9 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
             slides=bool(slides[j]),
             neighbours=len(spans) - 1,
             leads=joint in leaders,
+            torque_limit=float(limits[j]),
+            lower=float(tree.lower[own[j]]),
+            upper=float(tree.upper[own[j]]),
         )
         for j, joint in enumerate(recording.joints)
     )

@@ -13,6 +13,7 @@ from tactile_cube.identification.in_words import (
     left_over,
     sets_in_words,
     unproven_effects,
+    unseen_effects,
 )
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
@@ -157,7 +158,7 @@ def _verdict_section(diagnosis: Mapping[str, Any], units: Mapping[str, str]) -> 
     lines += disturbed(diagnosis)
     for joint in diagnosis["unexplained_joints"]:
         lines.append(f"not explained: {joint}{_ceiling(diagnosis, joint)}")
-    return Section("The answer", (), [Listing(lines or ["no effect has to be added"])])
+    return Section("The answer", (), [Listing([*(lines or ["no effect has to be added"]), *unseen_effects(diagnosis)])])
 
 
 def _in_a_line(effect: Mapping[str, Any], units: Mapping[str, str]) -> str:

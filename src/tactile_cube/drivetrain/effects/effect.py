@@ -195,6 +195,11 @@ class Effect:
         return True
 
     @classmethod
+    def unseen_at(cls, scales: Scales) -> str | None:
+        """What a recording of the joint lacks to show the effect, were it there; None: nothing."""
+        return None
+
+    @classmethod
     def state_size(cls, dt: float) -> int:
         """How many numbers the law remembers between steps of `dt` [s]; they are zero after a reset."""
         return 0

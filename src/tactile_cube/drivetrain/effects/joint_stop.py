@@ -1,11 +1,17 @@
 """An end stop inside the range of motion."""
 
+from math import isfinite
+
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.scales import Scales, unit_at
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, VELOCITY
 
 SHARES = (0.03, 0.12, 0.3)
 """Of the range of motion by which a stop lies within it, where a search starts."""
+
+
+NEAR = 0.1
+"""An end of the joint this near to the motion, as a part of its range, is visited: less play no user has."""
 
 
 class JointStop(Effect):
@@ -53,6 +59,14 @@ class JointStop(Effect):
     )
 
     details = ("exponent",)
+
+    @classmethod
+    def unseen_at(cls, scales: Scales) -> str | None:
+        """The ends of the range: a stop beyond the motion touches nothing."""
+        if scales.low - scales.lower < NEAR * scales.span and scales.upper - scales.high < NEAR * scales.span:
+            return None
+        ends = f" of {scales.lower:.3g} to {scales.upper:.3g}" if isfinite(scales.upper - scales.lower) else ""
+        return f"moved from {scales.low:.3g} to {scales.high:.3g}{ends} {unit_at('rad', scales.slides)}"
 
     @classmethod
     def placed_at(cls, scales: Scales) -> dict[str, float]:

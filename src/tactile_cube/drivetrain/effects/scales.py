@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from math import inf
 
 UNITS = re.compile(r"(N m|N|rad|kg|m|s|Hz)(?:\^(\d))?")
 MORE_PERIODS = 3.0  # of screws and magnets in the range of a joint that slides than of gears in that of one that turns
@@ -29,6 +30,9 @@ class Scales:
         slides: a prismatic joint.
         neighbours: other joints of the rig.
         leads: another joint is coupled to this one.
+        torque_limit: of the controller, as stated [N m]; infinite where none is.
+        lower: end of the joint as stated [rad]; infinite where none is.
+        upper: the other one [rad].
     """
 
     torque: float
@@ -45,6 +49,9 @@ class Scales:
     slides: bool = False
     neighbours: int = 0
     leads: bool = False
+    torque_limit: float = inf
+    lower: float = -inf
+    upper: float = inf
 
     @property
     def span(self) -> float:

@@ -1,13 +1,18 @@
 """A torque limit below the stated one."""
 
+from math import isfinite
+
 import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
-from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.effects.scales import Scales, unit_at
 from tactile_cube.drivetrain.signals import DAMPING, TORQUE
 
 LEVELS = 9
 """Between the torque exceeded in half of the samples and the largest ones, by equal factors."""
+
+REACHED = 0.9
+"""Of the stated limit: drives vary by a tenth anyhow."""
 
 HARD = 0.02
 """A softness below this is none: within 1.4 % of the limit, and larger powers overflow."""
@@ -42,6 +47,13 @@ class TorqueSaturation(Effect):
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
         """Limits among the torques that the recording asks for."""
         return [{"limit": float(level)} for level in np.geomspace(scales.often, scales.seldom, LEVELS)]
+
+    @classmethod
+    def unseen_at(cls, scales: Scales) -> str | None:
+        """Torques near the stated limit: a lower one above those that are asked for does nothing."""
+        if not isfinite(scales.torque_limit) or scales.seldom > REACHED * scales.torque_limit:
+            return None
+        return f"asked for up to {scales.seldom:.3g} of {scales.torque_limit:.3g} {unit_at('N m', scales.slides)}"
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

@@ -1,0 +1,59 @@
+"""A recording says which effects it could not show, were they there."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tactile_cube.drivetrain.effects import catalogue, find_effect
+from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.identification.in_words import unseen_effects
+from tactile_cube.identification.unseen import Unseen, unseen
+from tactile_cube.measurement.joint_scales import joint_scales
+from tests.identification.rigs_of_any_size import Size, simulated
+
+SATURATION, STOP = find_effect("torque_saturation"), find_effect("joint_stop")
+
+
+@pytest.mark.parametrize(("limit", "why"), [(0.75, None), (1.0, "asked for up to 0.7 of 1 N m"), (float("inf"), None)])
+def test_a_lower_torque_limit_shows_where_the_stated_one_is_nearly_reached(limit: float, why: str | None) -> None:
+    assert SATURATION.unseen_at(replace(FINGER, torque_limit=limit)) == why
+
+
+@pytest.mark.parametrize(
+    ("ends", "why"),
+    [
+        ((-0.05, 1.3), None),
+        ((-0.3, 1.3), "moved from 0 to 1.2 of -0.3 to 1.3 rad"),
+        ((-0.05, 1.5), "moved from 0 to 1.2 of -0.05 to 1.5 rad"),
+        ((-float("inf"), float("inf")), "moved from 0 to 1.2 rad"),
+    ],
+)
+def test_a_stop_shows_where_both_ends_are_visited(ends: tuple[float, float], why: str | None) -> None:
+    assert STOP.unseen_at(replace(FINGER, lower=ends[0], upper=ends[1])) == why
+
+
+def test_an_axis_that_slides_says_so_in_its_own_units() -> None:
+    axis = replace(FINGER, slides=True, torque_limit=200.0, seldom=35.0)
+    assert SATURATION.unseen_at(axis) == "asked for up to 35 of 200 N"
+
+
+def test_the_ends_and_the_limit_are_those_of_urdf_and_controller(tmp_path: Path) -> None:
+    recording = simulated(tmp_path, Size(), find_effect("viscous_friction"), {"damping": 0.08})
+    (scales,), tree = joint_scales(recording), recording.rigid_body()
+    assert (scales.lower, scales.upper) == (tree.lower[0], tree.upper[0])
+    assert scales.torque_limit == recording.gains.torque_limit[0]
+
+
+def test_what_was_seen_all_the_same_is_not_listed() -> None:
+    sizes = {"q1": replace(FINGER, torque_limit=2.0), "q2": replace(FINGER, torque_limit=2.0)}
+    found = unseen(tuple(catalogue().values()), sizes, ["torque_saturation@q1", "joint_stop@q1", "joint_stop@q2"])
+    assert found == (Unseen("torque_saturation", "q2", "asked for up to 0.7 of 2 N m"),)
+
+
+def test_an_effect_is_told_once_with_all_its_joints() -> None:
+    entries = [Unseen("joint_stop", joint, f"moved {joint}")._asdict() for joint in ("q1", "q2")]
+    assert unseen_effects({"unseen": entries}) == [
+        "Not to be seen in these trials, there or not: joint_stop at q1 (moved q1), q2 (moved q2)."
+    ]
+    assert unseen_effects({}) == []
