@@ -200,6 +200,8 @@ def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
     error = validation_error(bench, place / "diagnose" / "model.yaml", place / "unseen")
     floor = float(np.hypot(BENCH.noise, BENCH.resolution / np.sqrt(12.0)))
     line["judged"] = score({"effects": hand["effects"]}, diagnosis, None if error is None else error / floor).outcome
+    if before["successes"] > LOST:
+        return line  # nothing to win back
     model = None
     if named:
         effects = ",".join(f'"{one}"' for one in named)
