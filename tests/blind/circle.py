@@ -172,10 +172,12 @@ def unhappy(place: Path, seed: int, policy: str) -> tuple[int, dict[str, Any], d
 
 
 def learned(folder: Path, policy: str, steps: int, model: Path | None) -> Path:
-    """The policy after so many steps more in PyBullet, in the world of a model or the stated one."""
+    """The mean of the last policies of so many steps more in PyBullet, in the world of a model or the stated one."""
     world = [f"model={model}"] if model else []
     words = ["+experiment=adapt", "collector.processes=1", f"training.init_from={policy}", f"training.steps={steps}"]
-    return run("train", folder, "policy.safetensors", *words, *world)
+    run("train", folder, "policy.safetensors", *words, *world)
+    mean = folder.with_name(f"{folder.name}_mean")
+    return run("average", mean, "policy.safetensors", f"run={folder}", f"output={mean / 'policy.safetensors'}")
 
 
 def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
