@@ -4,7 +4,7 @@
 
 The "real" hand of a draw is MuJoCo's, with soft tips, their friction and one or two effects of the drive drawn by
 chance; the effects grow until the shipped policy fails. A finger of it is measured on a bench whose physics shares no
-code with the package (physics.py, moved by MuJoCo). The package is given that recording alone: it is diagnosed, what
+code with the package (physics.py). The package is given that recording alone: it is diagnosed, what
 is named is fitted, the policy goes on learning in PyBullet in the world of that model (`+experiment=adapt`), and
 returns to the real hand. The control learns as long in PyBullet without the model. Every stage is a command of the
 package; one that is done is left out, so the same call goes on after an interruption. circle.jsonl has a line for each
@@ -100,7 +100,8 @@ def measured(plant: Plant) -> World:
     return World("finger", finger(), plant, nominal, low, high)
 
 
-BENCH = Bench(500.0, 12.0, 3, ("ramps", "multisine", "policy", "holds"), 2e-4, 1e-4, 1.5, 0.0, 0.004)
+BENCH = Bench(500.0, 12.0, 3, ("ramps", "multisine", "policy", "steps"), 2e-4, 1e-4, 1.5, 0.0, 0.004)
+"""With steps, which ask for all the torque there is: in gentle motion a weak motor cannot be seen."""
 
 
 def healthy() -> Plant:
@@ -188,7 +189,7 @@ def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
     bench = place / "bench"
     if not (bench / "recording.yaml").is_file():
         world = measured(hand["plant"])
-        trials, unseen = perform(seed, world, BENCH, "mujoco")
+        trials, unseen = perform(seed, world, BENCH)
         save(bench / "validation", world, BENCH, unseen)
         save(bench, world, BENCH, trials)
     words = (f"recording={bench}", "engine=fast", "rerun=false")

@@ -1,4 +1,4 @@
-"""Commands that a bench would send: ramps, multisines, filtered steps as a 10 Hz policy makes them, and holds."""
+"""Commands that a bench would send: ramps, multisines, filtered steps as a 10 Hz policy makes them, holds and steps."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,4 +59,12 @@ def holds(rng: np.random.Generator, low: Array, high: Array, samples: int, rate:
     )
 
 
+def steps(rng: np.random.Generator, low: Array, high: Array, samples: int, rate: float) -> Array:
+    """Postures without any filter, half a second each: the controller asks for all the torque that it may."""
+    return _stepped(rng, low, high, samples, 0.5, rate)
+
+
 KINDS = {"ramps": ramps, "multisine": multisine, "policy": policy, "holds": holds}
+"""What the rounds draw from."""
+COMMANDS = KINDS | {"steps": steps}
+"""By name."""

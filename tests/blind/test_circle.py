@@ -50,6 +50,22 @@ def test_what_is_hidden_on_the_bench_is_what_the_hand_has(tmp_path: Path, name: 
     assert beside < 2e-3 < 4e-3 < without
 
 
+def test_steps_that_ask_for_all_the_torque_are_followed_as_well_as_gentle_motion(tmp_path: Path) -> None:
+    world = circle.measured(circle.healthy())
+    world.homing = 0.0
+    bench = replace(QUIET, kinds=("steps",))
+    save(tmp_path, world, bench, perform(3, world, bench)[0])
+    recording = read_recording(tmp_path)
+    torque = np.abs(np.concatenate([trial.torque for trial in recording.trials if trial.torque is not None]))
+    assert torque.max() > 0.9 * circle.STATED["torque_limit"]
+    coarse, fine = (
+        free_run_error(recording, free_run(recording, nominal_model(recording), step=step)).overall
+        for step in (2e-3, 2.5e-4)
+    )
+    assert coarse < 1e-3
+    assert fine < 1e-4
+
+
 def test_a_draw_is_the_same_each_time_and_its_effects_grow_before_others_are_tried() -> None:
     assert circle.draw(7, 0)["words"] == circle.draw(7, 0)["words"]
     for seed in range(20):

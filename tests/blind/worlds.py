@@ -6,7 +6,7 @@ from typing import Any
 
 import hidden
 import numpy as np
-from excitation import KINDS
+from excitation import COMMANDS, KINDS
 from numpy.typing import NDArray
 from physics import simulate
 from plant import Plant, neutral
@@ -151,7 +151,7 @@ def draw_usual(
 def command_of(world: World, kind: str, rng: np.random.Generator, samples: int, rate: float) -> Array:
     """A command (samples, joints) of one kind: a finger's, as wide and as slow as this machine moves."""
     unit = world.plant.angle_unit
-    return unit * KINDS[kind](rng, world.low / unit, world.high / unit, samples, rate * world.time_unit)
+    return unit * COMMANDS[kind](rng, world.low / unit, world.high / unit, samples, rate * world.time_unit)
 
 
 def probe(world: World, seed: int, step: float = 5e-4) -> tuple[Array, Array, Array]:

@@ -7,8 +7,11 @@ import pytest
 from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.windows import Drive, _half_width, _states, cut, steps_per_row
 from tests.measurement.small_rig import write
+
+NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 @pytest.fixture
@@ -83,10 +86,54 @@ def test_a_start_in_the_middle_of_a_jerk_is_read_without_bias(recording: Recordi
     trial = replace(recording.trials[0], time=time, position=motor)
     half = _half_width(trial.step, np.full(2, 1e-4), 0.02, time=1.0)
     assert half == 12, "this noise asks for no more"
-    position, speed, _, spread = _states(trial, command, np.zeros_like(command), drive, np.array([row]), half)
+    position, speed, _, spread = _states(trial, command, 0.0 * command, drive, NO_ROWS, np.array([row]), half)
     assert np.all(spread * 1e-4 < 0.02)
     assert position[0] == pytest.approx(motor[row])
     assert speed[0] == pytest.approx(3.0 * pulse[row], abs=0.06)
+
+
+def stepped(recording: Recording, every: int) -> Trial:
+    """A trial whose command jumps by 3 rad so often."""
+    trial = recording.trials[0]
+    command = np.where(np.arange(len(trial.time)) // every % 2 == 0, 0.0, 3.0)
+    return replace(trial, command=np.repeat(command[:, None], 2, axis=1))
+
+
+def test_a_segment_that_begins_just_after_a_step_of_the_command_weighs_nothing(recording: Recording) -> None:
+    noise = np.array([2e-4, 2e-4])
+    windows = cut(recording, noise, [stepped(recording, 12)], segment=10)
+    counted = windows.weight[0, :80, 0].reshape(-1, 10).any(axis=1)  # of eight segments, that from row 60 on
+    assert counted.tolist() == [True, True, True, True, True, True, False, True]
+    gentle = recording.trials[0]
+    assert cut(recording, noise, [gentle], segment=10).weight[0, :80].all()
+
+
+def test_where_most_segments_begin_just_after_a_step_they_all_count(recording: Recording) -> None:
+    windows = cut(recording, np.array([2e-4, 2e-4]), [stepped(recording, 10)], segment=10)
+    assert windows.weight[0, :80].all()
+
+
+def test_the_impulse_of_a_step_asks_for_half_the_torque_there_is(recording: Recording) -> None:
+    trial = stepped(recording, 12)
+    windows = cut(recording, np.array([2e-4, 2e-4]), [trial])
+    at = (windows.history + 11) * windows.substeps  # row 11 is read as the command of row 12 comes into force
+    reach = np.array(trial.gains.torque_limit) / np.array(trial.gains.kp)
+    assert (reach < 3.0).all()
+    assert windows.commands[0, at] == pytest.approx(0.5 * reach)
+    assert windows.commands[0, at + 1] == pytest.approx([3.0, 3.0])
+
+
+def test_a_speed_is_read_before_a_step_and_not_across(recording: Recording) -> None:
+    """At rest until the command steps, and fast at once."""
+    time, row, half = np.arange(60) / 500.0, 30, 12
+    link = np.repeat(np.maximum(time - time[row], 0.0)[:, None], 2, axis=1)
+    drive = Drive(*(np.full(2, value) for value in (4.0, 0.0, 1.0, 0.0)))
+    trial = replace(recording.trials[0], time=time, position=link)
+    rest, moving = (
+        _states(trial, link, 0.0 * link, drive, kinks, np.array([row]), half)[1] for kinks in (np.array([row]), NO_ROWS)
+    )
+    assert rest[0] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert moving[0, 0] > 0.3
 
 
 def test_where_few_rows_leave_the_speed_too_noisy_more_are_taken() -> None:

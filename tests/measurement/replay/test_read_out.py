@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.replay.read_out import free_way, read_out
+from tactile_cube.measurement.replay.read_out import before_steps, free_way, read_out
 
 
 def test_the_next_command_is_not_felt_yet() -> None:
@@ -33,3 +33,12 @@ def test_a_motor_follows_the_command_freely_as_far_as_the_gap_goes(lead: float, 
     assert free_way(np.array([lead]), np.array([jump]), np.array([0.02])) == pytest.approx(free)
     read, torque = read_out(np.zeros((1, 1)), np.zeros((1, 1)), jump, (0.1, 2.0), 1.0, free)  # type: ignore[arg-type]
     assert (read[0, 0], torque[0, 0]) == pytest.approx((-free - 0.1 * (jump - free), -2.0 * (jump - free)))
+
+
+def test_before_a_step_of_the_command_the_row_goes_on_as_it_did() -> None:
+    """Two segments of two rows of four steps; the second row of each is the line through the row before."""
+    signals = np.array([0.0, 9.0, 1.0, 1.5, 7.0, 7.0, 7.0, 7.0, 0.0, 9.0, 3.0, 2.0, 7.0, 7.0, 7.0, 7.0])
+    shown, known = before_steps(signals[None, :, None], segment=2, substeps=4)
+    assert shown[0, :, 0].tolist() == [0.0, 2.0, 0.0, 1.0]
+    assert known.tolist() == [False, True, False, True]
+    assert not before_steps(signals[None, :, None], segment=2, substeps=2)[1].any(), "too few steps for a line"

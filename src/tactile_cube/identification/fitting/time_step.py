@@ -37,14 +37,15 @@ def spread(windows: Windows) -> Windows:
 def finer(windows: Windows, times: int) -> Windows:
     """Windows for simulation steps so many times as short.
 
-    The first step of a row takes the mean of two commands, all others the later one. Where a row is one step the jump
-    tells the later one; of the past, which only wakes memories, the mean is kept.
+    The first step of a row takes the mean of two commands, all others the later one. Where a row is one step that is
+    what the next row's jump begins with; of the past, which only wakes memories, the mean is kept.
     """
     count, _, joints = windows.commands.shape
     rows = windows.commands.reshape(count, -1, windows.substeps, joints)
     held = rows[:, :, -1:].copy()
     if windows.substeps == 1:
-        held[:, windows.history :, 0] += windows.jump
+        held[:, windows.history : -1, 0] = (held[:, windows.history + 1 :, 0] - windows.jump[:, 1:]).copy()
+        held[:, -1, 0] += windows.jump[:, -1]
     fine = windows.substeps * times
     commands = np.concatenate([rows[:, :, :1], np.repeat(held, fine - 1, axis=2)], axis=2)
     return replace(windows, commands=commands.reshape(count, -1, joints), substeps=fine)

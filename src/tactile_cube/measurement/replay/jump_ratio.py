@@ -9,9 +9,10 @@ from tactile_cube.drivetrain import Plant
 from tactile_cube.drivetrain.effects.backlash import Backlash
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION, TORQUE
 from tactile_cube.measurement.replay.read_out import free_way
+from tactile_cube.measurement.replay.windows import SAFE
 
 Array = NDArray[np.float64]
-PROBE, SAFE = 0.05, 0.25  # [rad] beyond every dead zone; part of the torque limit that it asks for at most
+PROBE = 0.05  # [rad] beyond every dead zone
 NOTHING = 1e-9  # part of the probe below which it is rounding that passes
 
 

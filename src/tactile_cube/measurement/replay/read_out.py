@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
+FEWEST = 3  # steps of a row of which two feel nothing of the row before
 
 
 def simulated_jumps(acting: Array, windows: Windows) -> Array:
@@ -64,3 +65,25 @@ def read_out(
     """
     felt = np.where(np.abs(torque) < 0.999 * torque_limit, jump - free, 0.0)
     return position - free - ratios[0] * felt, torque - ratios[1] * felt
+
+
+def before_steps(signals: Array, segment: int, substeps: int) -> tuple[Array, NDArray[np.bool_]]:
+    """What a row would show had its command not changed: the line through the last two steps of the row before.
+
+    For a jump of the command that asks for much: `jump_ratio` does not know where a torque meets its limit.
+
+    Args:
+        signals: (S, K segment substeps, ..., joints) of every step.
+        segment: rows after which the simulation starts anew.
+        substeps: steps of a row; the first one takes the mean of two commands, so there must be three.
+
+    Returns:
+        (S, K segment, ..., joints), and which rows have a row before them (K segment,).
+    """
+    shown = signals[:, ::substeps].copy()
+    known = np.arange(shown.shape[1]) % segment > 0
+    if substeps < FEWEST:
+        return shown, np.zeros_like(known)
+    last = np.flatnonzero(known) * substeps - 1
+    shown[:, known] = 2.0 * signals[:, last] - signals[:, last - 1]
+    return shown, known

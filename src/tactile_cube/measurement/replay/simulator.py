@@ -22,8 +22,8 @@ from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.jump_ratio import gaps, jump_ratio
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.read_out import free_way, read_out, simulated_jumps
-from tactile_cube.measurement.replay.windows import SMOOTHING, Windows, whole_trials
+from tactile_cube.measurement.replay.read_out import before_steps, free_way, read_out, simulated_jumps
+from tactile_cube.measurement.replay.windows import SMOOTHING, Windows, asks_for_much, whole_trials
 
 if TYPE_CHECKING:
     from tactile_cube.simulation.rig import RigWorld
@@ -181,6 +181,11 @@ class Simulator:
         shown = signals[:, :: windows.substeps]
         free = free_way(shown[:, :, 3], jump, gap) if gap.any() else 0.0
         position, torque = read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
+        far = asks_for_much(jump, self.plant.view(memory, "kp")[:, None], limit)
+        if far.any():
+            before, known = before_steps(signals[:, :, :2], windows.segment, windows.substeps)
+            far &= known[:, None]
+            position, torque = np.where(far, before[:, :, 0], position), np.where(far, before[:, :, 1], torque)
         out[0] = position
         out[1:] = torque
 

@@ -44,6 +44,7 @@ ROWS = (
 """Arrays with one row a window."""
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
 START_SPEED = 0.02  # [rad/s] how well the speed at a segment's start is known beforehand
+SAFE = 0.25  # part of the torque limit below which a jump of the command is answered in proportion
 MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
 
 
@@ -199,18 +200,20 @@ def _pieces(
     substeps: int,
 ) -> Iterator[dict[str, object]]:
     fine, jump = _as_simulated(recording, trial, substeps)
-    command = _as_positions(recording, trial)
+    command, _ = _around(_as_positions(recording, trial), recording.read)
     drive = _drive(recording, trial)
     half = _half_width(trial.step, noise, speed_known, time)
+    kinks = np.flatnonzero(asks_for_much(jump, drive.kp, drive.limit).any(axis=1))
     for first in range(0, len(trial.time), forward):
         span = np.arange(first, first + rows)
         usable = np.minimum(span, len(trial.time) - 1)
         counted = span >= (first + rows - forward if first > 0 else 0)
         present = (span < len(trial.time)) & trial.valid[usable] & counted
+        starts = np.minimum(span[::segment], len(trial.time) - 1)
+        present &= ~np.repeat(_unsteady(starts, kinks, half), segment)
         if first > 0 and np.count_nonzero(present) < FEWEST:
             continue
-        starts = np.minimum(span[::segment], len(trial.time) - 1)
-        position, speed, acceleration, spread = _states(trial, command, jump, drive, starts, half)
+        position, speed, acceleration, spread = _states(trial, command, jump, drive, kinks, starts, half)
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": trial.position[usable],
@@ -237,10 +240,11 @@ def _as_positions(recording: Recording, trial: Trial) -> Array:
 
 def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Array, Array]:
     """What a trial's steps take (T, substeps, n), and the mean command at each reading less the one felt (T, n)."""
-    command = _as_positions(recording, trial)
-    fine = _impulses(command, recording.read, substeps).reshape(len(command), substeps, -1)
-    before, after = _around(command, recording.read)
-    return fine, 0.5 * (after - before)
+    before, after = _around(_as_positions(recording, trial), recording.read)
+    drive = _drive(recording, trial)
+    most = drive.limit / np.maximum(drive.kp, np.finfo(float).tiny)
+    jump = 0.5 * np.clip(after - before, -most, most)
+    return _impulses(before, after, jump, substeps), jump
 
 
 def _soft(drive: Drive) -> Array:
@@ -261,6 +265,11 @@ def _rows(fine: Array, first: int, last: int) -> Array:
 def steps_per_row(recording: Recording, time: float = 1.0) -> int:
     """Simulation steps between two samples."""
     return recording.substeps(LONGEST_STEP * time)
+
+
+def asks_for_much(jump: Array, kp: Array, limit: Array) -> NDArray[np.bool_]:
+    """Where a jump of the command (..., n) [rad] may take a torque to its limit (..., n)."""
+    return np.asarray(kp * np.abs(jump) > SAFE * limit)
 
 
 def _gains(recording: Recording, trial: Trial) -> Array:
@@ -289,16 +298,15 @@ def _drive(recording: Recording, trial: Trial) -> Drive:
     return Drive(np.array(gains.kp), np.array(gains.kd), np.array(gains.torque_limit), 1.0 / stiffness)
 
 
-def _impulses(command: Array, reading: str, substeps: int) -> Array:
-    """Commands (T, n) as the simulation's steps take them, (T substeps, n), from the instant at which row 0 is read.
+def _impulses(before: Array, after: Array, jump: Array, substeps: int) -> Array:
+    """Commands as the simulation's steps take them, (T, substeps, n), from the instant at which each row is read.
 
     A step acts like an impulse at its beginning, a held command from there on; so the first step of a row takes the
-    mean of the commands before and after that instant, which makes the simulation second order in its step. A row is
-    read at the end of the period in which its command acts, or at its beginning.
+    mean of the commands before and after that instant, which makes the simulation second order in its step. A command
+    that jumps further than the torque reaches adds no more than half of that reach: the impulse is the mean of torques.
     """
-    before, after = _around(command, reading)
-    fine = np.repeat(after, substeps, axis=0)
-    fine[::substeps] = 0.5 * (before + after)
+    fine = np.repeat(after[:, None], substeps, axis=1)
+    fine[:, 0] = before + jump
     return fine
 
 
@@ -326,29 +334,42 @@ def _half_width(step: float, noise: Array, speed: Array | float, time: float) ->
     return half
 
 
+def _unsteady(starts: Rows, kinks: Rows, half: int) -> NDArray[np.bool_]:
+    """Segments that begin just after a kink, with a speed that changes faster than it is read (K,): they tell nothing.
+
+    None where that would be most of them.
+    """
+    after = np.searchsorted(kinks, starts) - np.searchsorted(kinks, starts - half)
+    late = np.asarray(after > 0)
+    return late & (np.count_nonzero(late) <= len(late) // 2)
+
+
 def _terms(half: int) -> int:
     """Coefficients of the polynomial through so many rows on either side."""
     return 5 if 2 * half >= MANY else 3
 
 
 def _states(
-    trial: Trial, command: Array, jump: Array, drive: Drive, rows: Rows, half: int
+    trial: Trial, command: Array, jump: Array, drive: Drive, kinks: Rows, rows: Rows, half: int
 ) -> tuple[Array, Array, Array, Array]:
     """Position of the sensor, speed and acceleration of the link (K, n) at some rows, and the speed's share of noise.
 
     The last one is its standard deviation where that of a sample is one [1/s].
 
+    `command` (T, n) is the one that each row feels [rad].
+
     The sensor follows every kink of the command, for the drive deflects with its torque; the link does not. So speed
     and acceleration come from a polynomial through the samples around, with the drive's deflection taken off: of
     fourth degree, since a joint that is pulled out of its stiction is fast before a parabola can follow, or a parabola
-    where samples lie on one side only or are few.
+    where samples lie on one side only or are few. It ends at the next of the trial's kinks (rows).
     """
     torque = np.clip(drive.kp * (command - trial.position), -drive.limit, drive.limit)
     link = trial.position - drive.compliance * torque  # behind by compliance * kd * speed
     damping = drive.compliance * drive.kd  # [s]
     found, spread = [], []
     for row in rows:
-        near = slice(max(0, row - half), min(len(trial.time), row + half + 1))
+        last = min([len(trial.time) - 1, row + half, *kinks[kinks >= row]])
+        near = slice(max(0, row - half), last + 1)
         centred = near.start == row - half and near.stop == row + half + 1
         terms = _terms(half) if centred else 3
         basis = np.vander(trial.time[near] - trial.time[row], terms, increasing=True)
