@@ -1,4 +1,4 @@
-"""Commands that a bench would send: ramps, multisines, filtered steps as a 10 Hz policy makes them, holds and steps."""
+"""Commands that a bench would send: ramps, multisines, steps as a 10 Hz policy makes them, holds and fast steps."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +60,8 @@ def holds(rng: np.random.Generator, low: Array, high: Array, samples: int, rate:
 
 
 def steps(rng: np.random.Generator, low: Array, high: Array, samples: int, rate: float) -> Array:
-    """Postures without any filter, half a second each: the controller asks for all the torque that it may."""
-    return _stepped(rng, low, high, samples, 0.5, rate)
+    """Postures, each commanded within some 30 ms and held half a second: the controller asks for all that it may."""
+    return _filtered(_stepped(rng, low, high, samples, 0.5, rate), 0.03, rate)
 
 
 KINDS = {"ramps": ramps, "multisine": multisine, "policy": policy, "holds": holds}

@@ -45,6 +45,7 @@ ROWS = (
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
 START_SPEED = 0.02  # [rad/s] how well the speed at a segment's start is known beforehand
 SAFE = 0.25  # part of the torque limit below which a jump of the command is answered in proportion
+UNSTEADY = 0.125  # [s] after a step of the command: a drive's delay, and what a speed is read from
 MANY = 12  # samples around a start that suffice for a polynomial of fourth degree
 
 
@@ -210,7 +211,7 @@ def _pieces(
         counted = span >= (first + rows - forward if first > 0 else 0)
         present = (span < len(trial.time)) & trial.valid[usable] & counted
         starts = np.minimum(span[::segment], len(trial.time) - 1)
-        present &= ~np.repeat(_unsteady(starts, kinks, half), segment)
+        present &= ~np.repeat(_unsteady(starts, kinks, round(UNSTEADY * time / trial.step)), segment)
         if first > 0 and np.count_nonzero(present) < FEWEST:
             continue
         position, speed, acceleration, spread = _states(trial, command, jump, drive, kinks, starts, half)
@@ -334,12 +335,12 @@ def _half_width(step: float, noise: Array, speed: Array | float, time: float) ->
     return half
 
 
-def _unsteady(starts: Rows, kinks: Rows, half: int) -> NDArray[np.bool_]:
-    """Segments that begin just after a kink, with a speed that changes faster than it is read (K,): they tell nothing.
+def _unsteady(starts: Rows, kinks: Rows, rows: int) -> NDArray[np.bool_]:
+    """Segments that begin so soon after a kink that their speed changes faster than it is read (K,): they tell nothing.
 
     None where that would be most of them.
     """
-    after = np.searchsorted(kinks, starts) - np.searchsorted(kinks, starts - half)
+    after = np.searchsorted(kinks, starts) - np.searchsorted(kinks, starts - rows)
     late = np.asarray(after > 0)
     return late & (np.count_nonzero(late) <= len(late) // 2)
 
