@@ -26,6 +26,16 @@ def test_holds_stand_still_most_of_the_time() -> None:
     assert np.mean(np.abs(np.diff(command[:, 0])) < 1e-12) > 0.7
 
 
+def test_steps_are_over_within_hundredths_of_a_second() -> None:
+    command = excitation("steps", np.zeros(1), np.ones(1), 20.0, 500.0, np.random.default_rng(0))[:, 0]
+    moving = np.abs(np.diff(command)) > 1e-12
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], moving, [0]])))
+    lengths = np.diff(edges)[::2]
+    assert len(lengths) >= 20
+    assert lengths.max() <= 11
+    assert np.mean(moving) < 0.05
+
+
 def test_an_unknown_kind_is_refused() -> None:
     with pytest.raises(InputError, match="'chirp' is no excitation"):
         excitation("chirp", np.zeros(1), np.ones(1), 1.0, 100.0, np.random.default_rng(0))

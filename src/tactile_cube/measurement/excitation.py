@@ -1,4 +1,4 @@
-"""Commands that excite a rig: ramps, holds, multisines and the steps of a policy, inside the joints' limits."""
+"""Commands that excite a rig: ramps, holds, steps, multisines and what a policy does, inside the joints' limits."""
 
 from collections.abc import Callable
 
@@ -55,6 +55,16 @@ def holds(time: Array, rng: np.random.Generator) -> Array:
     return np.asarray(np.interp(time, corners, values))
 
 
+def steps(time: Array, rng: np.random.Generator) -> Array:
+    """Postures commanded within two hundredths of a second and held, in 0..1: all the torque that a motor has."""
+    corners, values = [0.0], [float(rng.uniform())]
+    while corners[-1] < time[-1]:
+        corners += [corners[-1] + rng.uniform(0.4, 0.8), 0.0]
+        corners[-1] = corners[-2] + 0.02
+        values += [values[-1], float(rng.uniform())]
+    return np.asarray(np.interp(time, corners, values))
+
+
 def multisine(time: Array, rng: np.random.Generator) -> Array:
     """A sum of sines from 0.2 to 6 Hz with falling amplitude, in 0..1: inertia, delay, lag."""
     frequencies = np.geomspace(0.2, 6.0, 8) * rng.uniform(0.9, 1.1, 8)
@@ -78,6 +88,7 @@ def policy(time: Array, rng: np.random.Generator) -> Array:
 KINDS: dict[str, Callable[[Array, np.random.Generator], Array]] = {
     "ramps": ramps,
     "holds": holds,
+    "steps": steps,
     "multisine": multisine,
     "policy": policy,
 }

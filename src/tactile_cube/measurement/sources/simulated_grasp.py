@@ -55,7 +55,7 @@ class SimulatedGrasp:
         true_spread: relative half width by which the true drivetrain differs from what is believed.
         hidden: effects that recording.yaml does not mention, of the contact (`lateral_friction: coefficient=0.6`) or of
             the drivetrain (`stribeck_friction@ring_q3`).
-        kinds: `hold`, `twist`, and kinds of free motion (`ramps`, `holds`, `multisine`, `policy`).
+        kinds: `hold`, `twist`, and kinds of free motion (`ramps`, `holds`, `steps`, `multisine`, `policy`).
         initialisations: how often the robot is initialised anew.
         offset: half width of the joint offsets that an initialisation brings [rad].
         placing: half width of the error with which the box is put in its place [m].
