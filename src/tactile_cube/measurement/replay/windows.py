@@ -56,7 +56,8 @@ class Windows:
     Attributes:
         commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
         measured: (S, K segment, n) measured positions [rad].
-        jump: (S, K segment, n) mean command at each reading less the one that the log feels [rad].
+        jump: (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of the
+            command, or of what the torque reaches [rad].
         weight: (S, K segment, n) 1 / sensor noise; 0 where nothing was measured [1/rad].
         position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
         speed: (S, K, n) [rad/s].
@@ -240,7 +241,7 @@ def _as_positions(recording: Recording, trial: Trial) -> Array:
 
 
 def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Array, Array]:
-    """What a trial's steps take (T, substeps, n), and the mean command at each reading less the one felt (T, n)."""
+    """What a trial's steps take (T, substeps, n), and the jump of the command at each reading (T, n)."""
     before, after = _around(_as_positions(recording, trial), recording.read)
     drive = _drive(recording, trial)
     most = drive.limit / np.maximum(drive.kp, np.finfo(float).tiny)
