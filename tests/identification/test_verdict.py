@@ -351,6 +351,18 @@ def test_a_law_that_is_the_simpler_one_in_practice_is_no_rival_of_it(best: str) 
     assert decide(twins, Answers(alike=True)).kind == "ambiguous", "different laws stay rivals however alike"
 
 
+def test_another_law_that_predicts_the_same_is_a_rival_though_the_data_speak_against_it() -> None:
+    found = findings(20.0, explanation("torque_gain", 1.0), explanation("elasticity", 1.05))
+    assert decide(found).kind == "missing_effect", "the difference is significant"
+    verdict = decide(found, Answers(alike=True))
+    assert verdict.kind == "ambiguous"
+    assert [one.effects[0].effect.name for one in verdict.rivals] == ["elasticity"]
+    richer = findings(20.0, explanation("torque_gain", 1.0), explanation("stribeck_friction", 1.05))
+    assert decide(richer, Answers(alike=True)).kind == "missing_effect", "more numbers follow more"
+    far = findings(20.0, explanation("torque_gain", 1.0), explanation("elasticity", 1.15))
+    assert decide(far, Answers(alike=True)).kind == "missing_effect", "errors so different are never alike"
+
+
 def test_a_criterion_that_is_given_decides() -> None:
     found = findings(9.0, explanation("backlash", 1.9, 9.0))
     assert decide(found).kind == "partly_explained"

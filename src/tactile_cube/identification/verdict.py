@@ -67,8 +67,7 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
     whole = _explains(chosen, base, ask, criteria) and not ask.follows_signals(chosen)
     if not whole and chosen.explained(base) < criteria.most and not ask.as_repeats(chosen):
         return Verdict("unknown_effect", chosen)
-    rivals = find_rivals(chosen, plausible, criteria)
-    rivals = tuple(one for one in rivals if not (contains(one, chosen) and ask.alike(one, chosen)))
+    rivals = find_rivals(chosen, plausible, ask, criteria)
     if not whole:
         return Verdict("partly_explained", chosen, rivals)
     return Verdict("ambiguous" if rivals else "missing_effect", chosen, rivals)
@@ -112,22 +111,33 @@ def at_bound(one: Explanation) -> bool:
 
 
 def find_rivals(
-    chosen: Explanation, found: Sequence[Explanation], criteria: Criteria = STANDARD
+    chosen: Explanation, found: Sequence[Explanation], ask: Questions, criteria: Criteria = STANDARD
 ) -> tuple[Explanation, ...]:
     """Explanations by as many other effects that are as good: with at most a number more, or else clearly better.
 
-    Of laws that contain the chosen one only those that are clearly better: they always follow data as well.
+    Of laws that contain the chosen one only those that are clearly better, and not alike in practice: they always
+    follow data as well. Of other laws with as few numbers those too that are alike in practice: what tells them apart
+    is less than a law differs from the real thing in detail, however significant.
     """
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
         if len(named(other)) > len(named(chosen)) or named(other) == named(chosen):
             continue
-        simple = other.size <= chosen.size + 1 and not contains(other, chosen)
-        if (simple or _richer_earned(other, chosen, criteria)) and not worse(
-            other.judgement, chosen.judgement, criteria
-        ):
+        if contains(other, chosen):
+            rival = _richer_earned(other, chosen, criteria) and not ask.alike(other, chosen)
+        else:
+            simple = other.size <= chosen.size + 1 or _richer_earned(other, chosen, criteria)
+            rival = simple and not worse(other.judgement, chosen.judgement, criteria)
+            rival = rival or (_may_be_alike(other, chosen, criteria) and ask.alike(other, chosen))
+        if rival:
             rivals.setdefault(named(other), other)
     return tuple(rivals.values())
+
+
+def _may_be_alike(other: Explanation, chosen: Explanation, criteria: Criteria) -> bool:
+    """Whether another law, no richer and no special case, may predict the same: errors differ by no more than that."""
+    close = abs(other.error - chosen.error) <= criteria.alike
+    return close and other.size <= chosen.size and not contains(chosen, other)
 
 
 def _richer_earned(other: Explanation, chosen: Explanation, criteria: Criteria) -> bool:

@@ -56,8 +56,8 @@ class Windows:
     Attributes:
         commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
         measured: (S, K segment, n) measured positions [rad].
-        jump: (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of the
-            command, or of what the torque reaches [rad].
+        jump: (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of
+            the command, or of what the torque reaches [rad].
         weight: (S, K segment, n) 1 / sensor noise; 0 where nothing was measured [1/rad].
         position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
         speed: (S, K, n) [rad/s].
