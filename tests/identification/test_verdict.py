@@ -351,6 +351,14 @@ def test_a_law_that_is_the_simpler_one_in_practice_is_no_rival_of_it(best: str) 
     assert decide(twins, Answers(alike=True)).kind == "ambiguous", "different laws stay rivals however alike"
 
 
+@pytest.mark.parametrize("alike", [True, False])
+def test_of_rivals_that_are_one_law_in_practice_the_simpler_one_is_named(alike: bool) -> None:
+    found = findings(20.0, *(explanation(name, 1.0) for name in ("elasticity", "torque_gain", "torque_curve")))
+    verdict = decide(found, Answers(alike=alike))
+    named = {one.effects[0].effect.name for one in (verdict.chosen, *verdict.rivals)}
+    assert named == {"elasticity", "torque_gain"} | (set() if alike else {"torque_curve"})
+
+
 def test_another_law_that_predicts_the_same_is_a_rival_though_the_data_speak_against_it() -> None:
     found = findings(20.0, explanation("torque_gain", 1.0), explanation("elasticity", 1.05))
     assert decide(found).kind == "missing_effect", "the difference is significant"

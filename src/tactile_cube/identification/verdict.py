@@ -117,7 +117,8 @@ def find_rivals(
 
     Of laws that contain the chosen one only those that are clearly better, and not alike in practice: they always
     follow data as well. Of other laws with as few numbers those too that are alike in practice: what tells them apart
-    is less than a law differs from the real thing in detail, however significant.
+    is less than a law differs from the real thing in detail, however significant. A rival that is another one in
+    practice is none of its own.
     """
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
@@ -131,7 +132,8 @@ def find_rivals(
             rival = rival or (_may_be_alike(other, chosen, criteria) and ask.alike(other, chosen))
         if rival:
             rivals.setdefault(named(other), other)
-    return tuple(rivals.values())
+    different = rivals.values()
+    return tuple(r for r in different if not any(contains(r, other) and ask.alike(r, other) for other in different))
 
 
 def _may_be_alike(other: Explanation, chosen: Explanation, criteria: Criteria) -> bool:
