@@ -44,9 +44,9 @@ INERTIA = 0.0015
 Put = Callable[[Plant, int, float], None]
 
 
-def _put(name: str, of: Callable[[float], float] = lambda x: x) -> Put:
+def _put(name: str) -> Put:
     def put(plant: Plant, joint: int, size: float) -> None:
-        getattr(plant, name)[joint] = of(size)
+        getattr(plant, name)[joint] = size
 
     return put
 
@@ -55,9 +55,15 @@ def _more_friction(plant: Plant, joint: int, size: float) -> None:
     plant.static_friction[joint] += size
 
 
+def _weaker(plant: Plant, joint: int, size: float) -> None:
+    """A motor's gain, before the spring that its torque deflects; the blind physics has its own behind it."""
+    plant.gain[joint] = 1.0 + size
+    plant.stiffness[joint] /= 1.0 + size
+
+
 EFFECTS: dict[str, tuple[str, float, float, bool, Put]] = {
     "torque_bias": ("bias", 0.1, 0.4, True, _put("bias")),
-    "torque_gain": ("error", -0.3, -0.7, False, _put("gain", lambda x: 1.0 + x)),
+    "torque_gain": ("error", -0.3, -0.7, False, _weaker),
     "torque_saturation": ("limit", 0.3, 0.08, False, _put("saturation")),
     "backlash": ("gap", 0.05, 0.15, False, _put("backlash")),
     "coulomb_friction": ("friction", 0.1, 0.4, False, _more_friction),

@@ -144,8 +144,8 @@ class Plant:
         self._check_known(effect)
         a = self._index(joint)
         block = np.empty((*memory.shape[:-1], len(effect.parameters)))
-        for k, parameter in enumerate(effect.parameters):
-            block[..., k] = values.get(parameter.name, parameter.typical)
+        for k, (key, default) in enumerate(effect.defaults(values).items()):
+            block[..., k] = values.get(key, default)
         if effect.stage is Stage.MECHANISM:
             effect.configure(lambda key: self.view(memory, key), self.place(joint), block)
             return

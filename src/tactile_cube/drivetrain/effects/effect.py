@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import isfinite, nan
@@ -139,13 +139,14 @@ class Effect:
         return getattr(cls, law) is not getattr(Effect, law)
 
     def __init__(self, joint: str, **values: float) -> None:
-        """Place the effect on `joint`; parameters not given take their typical value.
+        """Place the effect on `joint`; parameters not given are as `defaults` has them.
 
         Raises:
             InputError: an unknown parameter or a value that is no finite number.
         """
         self.joint = joint
-        self.values = {p.name: float(values.pop(p.name, p.typical)) for p in self.parameters}
+        defaults = self.defaults(values)
+        self.values = {key: float(values.pop(key, default)) for key, default in defaults.items()}
         for key in values:
             known = ", ".join(p.name for p in self.parameters)
             raise InputError(f"effect '{self.name}' has no parameter '{key}'; it has {known}")
@@ -157,6 +158,15 @@ class Effect:
     def parameters_at(cls, scales: Scales) -> dict[str, Parameter]:
         """The parameters by name with the sizes that they have at a joint."""
         return {p.name: p.at(scales) for p in cls.parameters}
+
+    @classmethod
+    def defaults(cls, given: Collection[str] = ()) -> dict[str, float]:
+        """What a parameter is when only the `given` ones are stated: typical, or neutral if it is of another form."""
+        every = {key for form in cls.forms for key in form}
+        named = every.intersection(given)
+        meant = {key for form in cls.forms if named <= form.keys() for key in form}
+        other = every - meant
+        return {p.name: p.neutral if p.name in other else p.typical for p in cls.parameters}
 
     @classmethod
     def forms_at(cls, scales: Scales) -> list[dict[str, float]]:

@@ -14,7 +14,13 @@ class LoadDependentFriction(Effect):
     stage = Stage.FRICTION
     parameters = (
         Parameter(
-            "coefficient", unit="1", neutral=0.0, low=0.0, high=0.6, typical=0.1, source="0.07-0.3 for small gears"
+            "coefficient",
+            unit="1",
+            neutral=0.0,
+            low=0.0,
+            high=0.9,  # at 1 a gear holds whatever load there is
+            typical=0.1,
+            source="0.07-0.3 for small gears",
         ),
     )
 
