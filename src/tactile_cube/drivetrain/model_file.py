@@ -104,7 +104,8 @@ class ModelFile(_Strict):
         rig: name of the URDF that was identified.
         joints: actuated joints in column order.
         values: parameter -> joint -> estimate; parameters are kp [N m/rad], kd [N m s/rad], torque_limit [N m],
-            stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2], friction_creep [rad/s per N m].
+            stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2], friction_creep [rad/s per N m],
+            reading_delay [s].
         effects: what had to be added to the plain drivetrain.
         offsets: joint -> offset of the joint's zero [rad]; the interval spans the robot initialisations.
         provenance: recording, command, version, seed, trials.

@@ -66,6 +66,16 @@ class Findings:
     surpassed: tuple[Explanation, ...] = ()
 
 
+ENOUGH = 24  # held-out segments at least
+FEWEST_ROWS = 8
+
+
+def enough_rows(held_out: Recording) -> int:
+    """Rows of a segment at most, so that the held-out trials have enough of them for a test."""
+    rows = sum(np.count_nonzero(trial.valid) for trial in held_out.trials)
+    return max(FEWEST_ROWS, rows // ENOUGH)
+
+
 class Search(Division):
     """A recording with its trials divided, and the effects that may be missing."""
 
@@ -102,7 +112,7 @@ class Search(Division):
         shooting = Shooting(fitted, effects)
         usual = shooting.cut(fitted, noise)
         windows = some(usual if longer == 1 else shooting.cut(fitted, noise, segment=longer * usual.segment), SEGMENTS)
-        segment = steady_rows(shooting, start, windows)
+        segment = min(steady_rows(shooting, start, windows), enough_rows(held_out))
         segments = min(SEGMENTS, SEGMENTS * usual.segment // segment)
         super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
         self.say, self.criteria, self.effects, self.folds = say, criteria, effects, folds
