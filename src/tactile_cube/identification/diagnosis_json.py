@@ -121,6 +121,8 @@ def _unexplained(one: Any) -> dict[str, Any]:
     return {
         "joint": one.joint,
         "black_box": round(one.black_box, 4),
+        "explained": round(one.explained, 4),
+        "of_explainable": round(one.of_explainable, 4),
         "beside": best.beside if best else None,
         "depends_most_on": best.against if best else None,
         "shapes": [

@@ -116,6 +116,11 @@ def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
 
 
 def _unexplained(entry: dict[str, Any]) -> str:
+    if entry.get("explained", 0.0) > NO_LAW:
+        return (
+            f"  {entry['joint']}: the effects explain {100 * entry['explained']:.0f} % of the torque that the refitted "
+            f"model lacks, {100 * entry['of_explainable']:.0f} % of what they and a black box explain together"
+        )
     if entry["black_box"] < NO_LAW:
         return (
             f"  {entry['joint']}: a black box of positions, speeds, torque and time explains nothing of what is left; "

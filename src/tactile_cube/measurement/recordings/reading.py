@@ -3,6 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.columns import pick_columns
@@ -16,6 +18,7 @@ from tactile_cube.measurement.recordings.consistency import (
 )
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.excluded import without_excluded
+from tactile_cube.measurement.recordings.outliers import without_outliers
 from tactile_cube.measurement.recordings.plausibility import check_assignment, check_units
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
@@ -81,7 +84,10 @@ def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: R
     if description.controller.mode == "position":
         warnings += check_units(columns, limits, gains, path)
         warnings += check_assignment(columns, limits, path) if entry.object is None else []
+    columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, description.rate_hz)
+    stamps = columns.time[outlying] - columns.time[0]
+    valid &= ~(np.abs(grid.time[:, None] - stamps) * description.rate_hz < 1.0).any(axis=1)
     return Trial(
         path.stem,
         entry.file,
@@ -96,7 +102,7 @@ def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: R
         entry.force,
         entry.clamped,
         entry.touch,
-        tuple(warnings + time_warnings),
+        tuple(warnings + time_warnings + single),
         load_of(description.object, entry.object) if description.object and entry.object else None,
     )
 
