@@ -1,4 +1,4 @@
-"""Single readings that are nonsense: found beside their neighbours, replaced, and left out of every error."""
+"""Single readings that are nonsense: found beside their neighbours, bridged, and left out of every error."""
 
 from __future__ import annotations
 
@@ -11,44 +11,57 @@ from numpy.typing import NDArray
 from tactile_cube.measurement.recordings.columns import Columns
 
 Array = NDArray[np.float64]
-BEYOND = 5.0  # times the difference from its neighbours that 99 of 100 readings stay below; 13 sigma of white noise
+BEYOND = {0.9: 8.0, 0.99: 5.0}
+"""Quantile -> times the difference from the neighbours there; both are 13 sigma of white noise.
+
+Neighbours of outliers differ too, which the first quantile leaves out; it is zero where a coarse encoder rests.
+"""
+SPIKE = 0.5  # of the difference from the cubic that a spike differs from the median too
 MOST = 0.01  # share of the readings; more are no single ones
 NEAR = 2  # rows on either side
 
 
-def without_outliers(columns: Columns, joints: tuple[str, ...], path: Path) -> tuple[Columns, NDArray[np.bool_], list[str]]:
-    """The columns with outlying positions bridged, which rows those are (n,), and a warning for each joint that has any.
+def without_outliers(
+    columns: Columns, joints: tuple[str, ...], path: Path
+) -> tuple[Columns, NDArray[np.bool_], list[str]]:
+    """Return the columns with outlying positions bridged, the mask of their rows (n,), and a warning per joint.
 
-    A reading is an outlier if it differs far more than usual both from the median of its neighbours and from the cubic
-    through them: a step of the motion passes the first test, a quick turn the second.
+    A reading is an outlier if it differs far more than usual from the cubic through its neighbours, and by half of that
+    at least from their median: a quick turn of the motion is near the cubic, a step of it near the median.
     """
     position, rows, warnings = columns.position.copy(), np.zeros(len(columns.position), dtype=bool), []
     for j, joint in enumerate(joints):
-        found, cubic = _outliers(position[:, j])
+        found, cleaned = _outliers(position[:, j])
         if not len(found):
             continue
-        worst = float(np.abs(position[found, j] - cubic[found]).max())
+        worst = float(np.abs(position[found, j] - cleaned[found]).max())
         warnings.append(
             f"{path}: column '{joint}.position': {len(found)} single readings differ from their neighbours by up to "
-            f"{worst:.3g} (first in row {found[0]}: {position[found[0], j]:.4g}); they are bridged and counted in no error"
+            f"{worst:.3g} (first in row {found[0]}: {position[found[0], j]:.4g}); "
+            "they are bridged, and errors leave them out"
         )
-        position[found, j], rows[found] = cubic[found], True
+        position[found, j], rows[found] = cleaned[found], True
     return replace(columns, position=position), rows, warnings
 
 
 def _outliers(values: Array) -> tuple[NDArray[np.int64], Array]:
-    """Rows of outliers, and the cubic through the neighbours of each row, outliers among them left out."""
-    median, cubic = _beside(values)
-    limits = [BEYOND * np.quantile(np.abs(values - other), 0.99) for other in (median, cubic)]
+    """Rows of outliers, and the values with outliers replaced by the cubic through their neighbours."""
+    limit = _limit(np.abs(values - _beside(values)[1]))
     cleaned, found = values.copy(), np.zeros(len(values), dtype=bool)
-    for _ in range(int(MOST * len(values)) + 1):
+    while limit > 0.0 and np.count_nonzero(found) <= MOST * len(values):
         median, cubic = _beside(cleaned)
-        far = np.minimum(np.abs(cleaned - median) - limits[0], np.abs(cleaned - cubic) - limits[1])
+        far = np.abs(cleaned - cubic)
+        far[np.abs(cleaned - median) < SPIKE * far] = 0.0
         row = int(np.argmax(far))
-        if far[row] <= 0.0 or 0.0 in limits:
+        if far[row] <= limit:
             return np.flatnonzero(found), cleaned
         cleaned[row], found[row] = cubic[row], True
     return np.zeros(0, dtype=np.int64), values
+
+
+def _limit(differences: Array) -> float:
+    limits = [times * float(np.quantile(differences, quantile)) for quantile, times in BEYOND.items()]
+    return next((limit for limit in limits if limit > 0.0), 0.0)
 
 
 def _beside(values: Array) -> tuple[Array, Array]:
