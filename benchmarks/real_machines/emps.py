@@ -53,4 +53,6 @@ class Emps:
     def _trial(self, name: str) -> TrialTable:
         archive = open_archive(Path(self.folder) / f"emps_{name}.npz")
         force, position = (np.asarray(archive[key], dtype=np.float64)[:, None] for key in ("force_N", "position_m"))
-        return TrialTable(TrialEntry(file=f"trials/{name}.parquet", kind=name), np.arange(len(force)) / RATE, force, position)
+        return TrialTable(
+            TrialEntry(file=f"trials/{name}.parquet", kind=name), np.arange(len(force)) / RATE, force, position
+        )
