@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from tactile_cube.drivetrain.effects import Parameter
 from tactile_cube.simulation.constants import EpisodeConstants
@@ -26,5 +25,5 @@ class ObjectMass(ContactEffect):
     @classmethod
     def apply(cls, constants: EpisodeConstants, values: Mapping[str, float]) -> EpisodeConstants:
         """As of every effect; a tenth of the stated mass always remains."""
-        changed = super().apply(constants, values)
-        return replace(changed, cube_mass=max(changed.cube_mass, LEAST * constants.cube_mass))
+        least = (LEAST - 1.0) * constants.cube_mass
+        return super().apply(constants, {key: max(value, least) for key, value in values.items()})
