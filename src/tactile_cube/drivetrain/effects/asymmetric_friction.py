@@ -19,15 +19,7 @@ class AsymmetricFriction(Effect):
     stage = Stage.FRICTION
     contains = ("coulomb_friction",)
     parameters = (
-        Parameter(
-            "difference",
-            unit="N m",
-            neutral=0.0,
-            low=-0.3,
-            high=0.3,
-            typical=0.02,
-            source="5-30 % of the dry friction; more with worn gears",
-        ),
+        Parameter("difference", "N m", 0.0, -0.3, 0.3, 0.02, "5-30 % of the dry friction; more with worn gears"),
         Parameter("ratio", unit="1", neutral=0.0, low=-0.9, high=0.9, typical=0.0, source="5-30 %"),
         Parameter("friction", unit="N m", neutral=0.0, low=-0.1, high=0.5, typical=0.0, source="worn or dry gears"),
     )

@@ -23,15 +23,7 @@ class FrictionDrift(Effect):
     contains = ("coulomb_friction",)
     parameters = (
         Parameter("change", unit="N m", neutral=0.0, low=-5.0, high=5.0, typical=0.02, source="-20 to -50 % over 20 K"),
-        Parameter(
-            "time_constant",
-            unit="s",
-            neutral=200.0,
-            low=0.5,
-            high=200.0,
-            typical=5.0,
-            source="seconds (lubricant) to minutes (housing)",
-        ),
+        Parameter("time_constant", "s", 200.0, 0.5, 200.0, 5.0, "seconds (lubricant) to minutes (housing)"),
         Parameter("friction", unit="N m", neutral=0.0, low=-0.1, high=0.5, typical=0.0, source="cold, beyond nominal"),
     )
 

@@ -27,26 +27,8 @@ class JointStop(Effect):
     name = "joint_stop"
     stage = Stage.JOINT_TORQUE
     parameters = (
-        Parameter(
-            "upper",
-            unit="rad",
-            neutral=1e9,
-            low=-7.0,
-            high=1e9,
-            typical=1.0,
-            source="within the range of motion",
-            scale=0.05,
-        ),
-        Parameter(
-            "lower",
-            unit="rad",
-            neutral=-1e9,
-            low=-1e9,
-            high=7.0,
-            typical=-1e9,
-            source="within the range of motion",
-            scale=0.05,
-        ),
+        Parameter("upper", "rad", 1e9, -7.0, 1e9, 1.0, "within the range of motion", scale=0.05),
+        Parameter("lower", "rad", -1e9, -1e9, 7.0, -1e9, "within the range of motion", scale=0.05),
         Parameter("stiffness", unit="N m/rad", neutral=5.0, low=0.1, high=500.0, typical=5.0, source="rubber to metal"),
         Parameter("damping", unit="N m s/rad", neutral=0.0, low=0.0, high=2.0, typical=0.0, source="rubber to metal"),
         Parameter(

@@ -17,16 +17,8 @@ class LoadDependentFriction(Effect):
     name = "load_dependent_friction"
     stage = Stage.FRICTION
     parameters = (
-        Parameter(
-            "coefficient",
-            unit="1",
-            neutral=0.0,
-            low=0.0,
-            high=0.9,  # at 1 a gear holds any load
-            typical=0.1,
-            source="0.07-0.3 for small gears",
-        ),
-    )
+        Parameter("coefficient", "1", 0.0, 0.0, 0.9, 0.1, "0.07-0.3 for small gears"),
+    )  # at 1 a gear holds any load
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

@@ -19,15 +19,7 @@ class NonlinearDrag(Effect):
     name = "nonlinear_drag"
     stage = Stage.JOINT_TORQUE
     parameters = (
-        Parameter(
-            "coefficient",
-            unit="N m s^2/rad^2",
-            neutral=0.0,
-            low=0.0,
-            high=1.0,
-            typical=0.02,
-            source="as large as viscous friction at the top speed",
-        ),
+        Parameter("coefficient", "N m s^2/rad^2", 0.0, 0.0, 1.0, 0.02, "as large as viscous friction at the top speed"),
         Parameter("power", unit="1", neutral=2.0, low=1.2, high=4.0, typical=2.0, source="2 of fluids", scale=0.5),
         Parameter("speed", unit="rad/s", neutral=2.0, low=0.01, high=100.0, typical=2.0, source="the joint's largest"),
     )

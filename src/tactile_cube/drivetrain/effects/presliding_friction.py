@@ -25,24 +25,8 @@ class PreslidingFriction(Effect):
     contains = ("coulomb_friction",)
     parameters = (
         Parameter("breakaway", unit="rad", neutral=0.0, low=0.0, high=0.1, typical=0.003, source="0.05 mrad to 1 deg"),
-        Parameter(
-            "excess",
-            unit="N m",
-            neutral=0.0,
-            low=-0.05,
-            high=0.5,
-            typical=0.0,
-            source="friction beyond the nominal static friction",
-        ),
-        Parameter(
-            "micro_damping",
-            unit="N m s/rad",
-            neutral=0.0,
-            low=0.0,
-            high=2.0,
-            typical=0.0,
-            source="0.5 to 1 of what damps the link critically on its bristles, 2 sqrt(limit / breakaway * inertia)",
-        ),
+        Parameter("excess", "N m", 0.0, -0.05, 0.5, 0.0, "friction beyond the nominal static friction"),
+        Parameter("micro_damping", "N m s/rad", 0.0, 0.0, 2.0, 0.0, "0.5-1 of critical damping on the bristles"),
     )
 
     forms = (

@@ -25,24 +25,8 @@ class StiffeningElasticity(Effect):
     stage = Stage.DEFLECTION
     contains = ("elasticity",)
     parameters = (
-        Parameter(
-            "compliance",
-            unit="rad/(N m)",
-            neutral=0.0,
-            low=0.0,
-            high=2.0,
-            typical=0.1,
-            source="slack tendons: 2-20 N m/rad",
-        ),
-        Parameter(
-            "cubic",
-            unit="N m/rad^3",
-            neutral=0.0,
-            low=0.0,
-            high=10000000.0,
-            typical=2000.0,
-            source="as large as the linear part at 10-50 mrad",
-        ),
+        Parameter("compliance", "rad/(N m)", 0.0, 0.0, 2.0, 0.1, "slack tendons: 2-20 N m/rad"),
+        Parameter("cubic", "N m/rad^3", 0.0, 0.0, 10000000.0, 2000.0, "as large as the linear part at 10-50 mrad"),
     )
 
     forms = ({"compliance": 0.1, "cubic": 2e3},)

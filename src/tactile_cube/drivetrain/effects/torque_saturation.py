@@ -32,16 +32,7 @@ class TorqueSaturation(Effect):
     name = "torque_saturation"
     stage = Stage.MOTOR_TORQUE
     parameters = (
-        Parameter(
-            "limit",
-            unit="N m",
-            neutral=1e9,
-            low=0.005,
-            high=1e9,
-            typical=0.1,
-            source="a fraction of the stated limit",
-            scale=0.02,
-        ),
+        Parameter("limit", "N m", 1e9, 0.005, 1e9, 0.1, "a fraction of the stated limit", scale=0.02),
         Parameter(
             "softness", unit="1", neutral=0.0, low=0.0, high=1.0, typical=0.0, source="0 hard, 0.4 tanh", scale=0.2
         ),

@@ -18,24 +18,8 @@ class ViscousFriction(Effect):
     name = "viscous_friction"
     stage = Stage.JOINT_TORQUE
     parameters = (
-        Parameter(
-            "damping",
-            unit="N m s/rad",
-            neutral=0.0,
-            low=0.0,
-            high=1.0,
-            typical=0.05,
-            source="0.004-0.3 N m s/rad in geared joints",
-        ),
-        Parameter(
-            "difference",
-            unit="N m s/rad",
-            neutral=0.0,
-            low=-1.0,
-            high=1.0,
-            typical=0.0,
-            source="5-30 % between the directions: screws, worn gears, seals",
-        ),
+        Parameter("damping", "N m s/rad", 0.0, 0.0, 1.0, 0.05, "0.004-0.3 N m s/rad in geared joints"),
+        Parameter("difference", "N m s/rad", 0.0, -1.0, 1.0, 0.0, "5-30 % by direction: screws, worn gears, seals"),
     )
     forms = ({"damping": 0.05}, {"damping": 0.05, "difference": 0.02})
 
