@@ -1,8 +1,8 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
 Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
-`export`, `deploy`, `view` and `monitor`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give
-what they work on. Nothing slow is imported before it is used.
+`export`, `deploy`, `view`, `monitor` and `effects`; `make_env`, `load_policy`, `read_recording` and
+`recording_from_arrays` give what they work on. Nothing slow is imported before it is used.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.comparison import compare
     from tactile_cube.api.deployment import deploy
     from tactile_cube.api.diagnosis import diagnose
+    from tactile_cube.api.effects import effects
     from tactile_cube.api.environment import env_config, make_env
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.api.export import export, load_policy
@@ -37,6 +38,7 @@ _PLACES = {
     "deploy": "api.deployment",
     "diagnose": "api.diagnosis",
     "diagnose_each": "api.batch",
+    "effects": "api.effects",
     "env_config": "api.environment",
     "make_env": "api.environment",
     "evaluate": "api.evaluation",
@@ -60,6 +62,7 @@ __all__ = [
     "deploy",
     "diagnose",
     "diagnose_each",
+    "effects",
     "env_config",
     "evaluate",
     "export",

@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,22 @@ import yaml
 
 _OPTION = re.compile(r"Could not find '(?P<group>[\w/]+)/(?P<option>[^'/]+)'")
 _KEY = re.compile(r"Could not override '(?P<key>[^']+)'|^(?P<setting>[\w.]+): no such setting")
+
+
+def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
+    """Return the end of an error message: "; did you mean ...?", or nothing if no known name is near.
+
+    Args:
+        word: as the user wrote it.
+        known: names that there are.
+        prefix: what the user has to write before the name.
+
+    Example:
+        >>> suggestion("evalute", ["evaluate", "export"])
+        '; did you mean evaluate?'
+    """
+    near = difflib.get_close_matches(word, [*known], 1)
+    return f"; did you mean {prefix}{near[0]}?" if near else ""
 
 
 def did_you_mean(message: str, tree: Path) -> str:

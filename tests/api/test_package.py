@@ -10,7 +10,8 @@ import pytest
 
 import tactile_cube
 
-COMMANDS = ("compare", "deploy", "diagnose", "evaluate", "export", "identify", "monitor", "record", "train", "view")
+COMMANDS = ("compare", "deploy", "diagnose", "effects", "evaluate", "export", "identify", "monitor", "record", "train")
+COMMANDS += ("view",)
 
 
 def test_importing_the_package_imports_nothing_slow() -> None:

@@ -1,8 +1,11 @@
-"""A search for an elastic drive begins near that of fingers and near that of stiffly controlled machines."""
+"""Where a search begins follows from the sizes of the joint."""
+
+from dataclasses import replace
 
 import pytest
 
 from tactile_cube.drivetrain.effects.elasticity import Elasticity
+from tactile_cube.drivetrain.effects.payload import Payload
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales, unit_at
 from tactile_cube.drivetrain.effects.stiffening_elasticity import StiffeningElasticity
 
@@ -25,3 +28,14 @@ def test_units_read_as_somebody_with_a_sliding_joint_writes_them() -> None:
     assert unit_at("rad/(N m)", slides=True) == "m/N"
     assert unit_at("N m s/rad", slides=True) == "N s/m"
     assert unit_at("rad/(N m)", slides=False) == "rad/(N m)"
+
+
+def test_a_search_begins_with_little_mass_and_with_that_of_a_tool() -> None:
+    starts = Payload.starts_at(replace(FINGER, mass=2.0, lever=0.5))
+    assert starts[-1] == {"mass": 1.0, "distance": 0.5}
+    assert starts[0]["mass"] == -starts[1]["mass"] > 0.0
+
+
+def test_where_a_joint_slides_it_does_not_matter_how_far_out_the_tool_is() -> None:
+    starts = Payload.starts_at(replace(FINGER, mass=2.0, lever=0.5, slides=True))
+    assert all(set(one) == {"mass"} for one in starts)
