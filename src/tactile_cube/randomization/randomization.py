@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -62,10 +62,20 @@ class Randomization:
         for key in ("cube_position", "cube_rotation"):
             if len(getattr(self, key)) != 3:
                 raise InputError(f"randomization.{key} has {len(getattr(self, key))} entries; give 3, for x, y, z")
+        for place, one in self._distributions():
+            if not isinstance(one, Distribution):
+                raise InputError(f"randomization.{place} is {one!r}; give a distribution, such as Uniform")
         if not self.sensor_noise >= 0.0:
             raise InputError(f"randomization.sensor_noise is {self.sensor_noise}; give a standard deviation >= 0 [rad]")
         if not 0.0 <= self.sticky_probability < 1.0:
             raise InputError(f"randomization.sticky_probability is {self.sticky_probability}; give a number in [0, 1)")
+
+    def _distributions(self) -> Iterator[tuple[str, Any]]:
+        for group in ("values", "factors", "shifts"):
+            yield from ((f"{group}.{key}", one) for key, one in getattr(self, group).items())
+        for group in ("cube_position", "cube_rotation"):
+            yield from ((f"{group}[{axis}]", one) for axis, one in enumerate(getattr(self, group)))
+        yield from (("start_angles", self.start_angles), ("joint_offset", self.joint_offset))
 
     def constants(self, nominal: EpisodeConstants, rng: np.random.Generator) -> EpisodeConstants:
         """Draws the constants of one episode around `nominal`."""

@@ -30,6 +30,7 @@ from tactile_cube.transforms.sticky_action import StickyAction
 
 ALMOST_ALL = 1.0 - 1e-9
 """The fraction of draws below what counts as a distribution's largest value."""
+DEEPEST_STACK = 1_000
 GAITS = 64  # that demonstrations choose from
 
 
@@ -85,8 +86,9 @@ class EnvConfig:
             effects += known[2]
             object.__setattr__(self, "model", None)
         object.__setattr__(self, "effects", effects)
-        if self.stack < 1:
-            raise InputError(f"env.stack is {self.stack}; give at least 1 reading")
+        self.randomization.constants(self.constants, np.random.default_rng(0))  # refuses what cannot be drawn
+        if not 1 <= self.stack <= DEEPEST_STACK:
+            raise InputError(f"env.stack is {self.stack}; give 1 to {DEEPEST_STACK} readings")
 
     def approximations(self) -> list[str]:
         """What is computed less well than it could be, in words; [] if nothing."""
