@@ -13,7 +13,7 @@ import polars
 import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
-from safetensors.torch import load
+from safetensors.numpy import load
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor

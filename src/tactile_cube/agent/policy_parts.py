@@ -82,7 +82,7 @@ def require_parts(env: Any, label: str, replaced: Collection[str] = ()) -> dict[
 
 @contextmanager
 def making(label: str) -> Iterator[None]:
-    """Say in one line what a class does not take from a policy's file, however it or Hydra says so."""
+    """Say in one line what cannot be made of a policy's configuration, however Python or Hydra says so."""
     try:
         yield
     except InputError:
@@ -90,7 +90,7 @@ def making(label: str) -> Iterator[None]:
     except Exception as error:  # of any kind: the values are a stranger's
         if isinstance(error.__cause__, InputError):
             raise error.__cause__ from None
-        raise InputError(f"{label}: its environment: {' '.join(str(error).split())}") from error
+        raise InputError(f"{label}: its configuration cannot be used: {' '.join(str(error).split())}") from error
 
 
 def _count(value: Any) -> int:
