@@ -5,6 +5,7 @@ import hashlib
 import io
 import os
 import sys
+from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -86,7 +87,7 @@ def with_evil(name: str) -> dict[str, Any]:
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where commands are typed: with a module that leaves a mark when it is imported, and files that are nobody's business."""
+    """Where commands are typed, with a module that leaves a mark when it is imported, and files of the user's."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     Path("stranger.py").write_text(f"open({MARK!r}, 'w')\nclass Harm: pass\n")
@@ -99,15 +100,24 @@ def untouched() -> bool:
     return not Path(MARK).exists() and "stranger" not in sys.modules
 
 
+def evaluated(config: dict[str, Any]) -> None:
+    """What evaluate and view make of a configuration."""
+    environment(composed("evaluate", []), PolicySource(HoldPolicy(), "evil", config=config), {})
+
+
+def deployed(config: dict[str, Any]) -> None:
+    """What export and deploy make of it."""
+    training_setting({"config": config})
+
+
 @pytest.mark.parametrize("name", EVIL)
-@pytest.mark.parametrize("reader", ["evaluate", "deploy"])
-def test_whatever_a_configuration_asks_for_is_refused_before_any_of_it_is_made(reader: str, name: str) -> None:
+@pytest.mark.parametrize("reader", [evaluated, deployed])
+def test_whatever_a_configuration_asks_for_is_refused_before_any_of_it_is_made(
+    reader: Callable[[dict[str, Any]], None], name: str
+) -> None:
     config = with_evil(name)
     with pytest.raises(InputError, match=EVIL[name][1]) as told:
-        if reader == "evaluate":
-            environment(composed("evaluate", []), PolicySource(HoldPolicy(), "evil", config=config), {})
-        else:
-            training_setting({"config": config})
+        reader(config)
     assert untouched()
     assert "\n" not in str(told.value)
     assert len(str(told.value)) < 400
@@ -119,14 +129,17 @@ def test_sizes_are_refused_before_anything_is_allocated(sizes: dict[str, str]) -
     for part, key in sizes.items():
         config["env"][part][key] = 10**15
     with pytest.raises(InputError, match=rf"{key} is {10**15}"):
-        environment(composed("evaluate", []), PolicySource(HoldPolicy(), "evil", config=config), {})
+        evaluated(config)
 
 
 def test_an_effect_of_its_owner_is_not_imported() -> None:
-    for named in ({"model": {"joints": ["q2"], "effects": [{"effect": "stranger.Harm@q2"}]}}, {"effects": ["stranger.Harm"]}):
+    for named in (
+        {"model": {"joints": ["q2"], "effects": [{"effect": "stranger.Harm@q2"}]}},
+        {"effects": ["stranger.Harm"]},
+    ):
         config = {"env": sound()["env"] | named}
         with pytest.raises(InputError, match=r"own_effects=\[stranger\.Harm\]"):
-            environment(composed("evaluate", []), PolicySource(HoldPolicy(), "evil", config=config), {})
+            evaluated(config)
     assert untouched()
 
 
@@ -165,13 +178,20 @@ COMMANDS = {
     "average": ["run=run", "last=1"],
     "ship": ["policy=evil.safetensors", "name=evil"],
     "train": ["+experiment=smoke", "training.init_from=evil.safetensors", *RUN],
-    "train with a teacher": ["+experiment=smoke", "exploration=teacher", "exploration.teacher=evil.safetensors", *RUN],
+    "train with a teacher": [
+        "+experiment=smoke",
+        "exploration=teacher",
+        "exploration.teacher=evil.safetensors",
+        "hydra.run.dir=next",
+    ],
 }
 MAKING = ("evaluate", "view", "export", "deploy")
 """Commands that make something of a policy's configuration; the others only keep it."""
 
 
-def typed(name: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> tuple[int, str]:
+def typed(
+    name: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> tuple[int, str]:
     """Status and stderr of a command."""
     command = name.partition(" ")[0]
     monkeypatch.setattr(sys, "argv", [command, *words])
@@ -184,7 +204,9 @@ def typed(name: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: p
     return status, capfd.readouterr().err
 
 
-@pytest.mark.parametrize(("name", "damage"), [*((name, "") for name in MAKING), *((name, "flipped") for name in COMMANDS)])
+@pytest.mark.parametrize(
+    ("name", "damage"), [*((name, "") for name in MAKING), *((name, "flipped") for name in COMMANDS)]
+)
 def test_a_command_that_takes_a_policy_runs_nothing_of_it(
     name: str, damage: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -238,7 +260,9 @@ BAD_STATES = {
 }
 
 
-@pytest.mark.parametrize("words", [[], ["training.init_from=next", "hydra.run.dir=other"]], ids=["resumed", "begun with"])
+@pytest.mark.parametrize(
+    "words", [[], ["training.init_from=next", "hydra.run.dir=other"]], ids=["resumed", "begun with"]
+)
 @pytest.mark.parametrize("name", BAD_STATES)
 def test_a_run_takes_nothing_from_a_bad_checkpoint(
     name: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

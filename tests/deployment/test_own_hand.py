@@ -13,6 +13,7 @@ import tactile_cube
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
+from tactile_cube.api.deployment import limits_of
 from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
@@ -108,11 +109,27 @@ def test_a_policy_of_files_elsewhere_wants_them_named_and_knows_its_urdf(elsewhe
     with pytest.raises(InputError, match=r"env\.constants\.object\.file is .* name it yourself: object="):
         tactile_cube.export(elsewhere, "own.npz", *hand)
     contract = json.loads(tactile_cube.export(elsewhere, "own.npz", *hand, *object_).read_text())
-    assert contract["hand"]["urdf"] == {"file": "mine.urdf", "sha256": hashlib.sha256(Path("mine.urdf").read_bytes()).hexdigest()}
+    assert contract["hand"]["urdf"] == {
+        "file": "mine.urdf",
+        "sha256": hashlib.sha256(Path("mine.urdf").read_bytes()).hexdigest(),
+    }
     assert contract["task"]["object"]["shape"].startswith("mesh")
     Path("mine.urdf").write_text(Path("mine.urdf").read_text() + "\n")
     with pytest.raises(InputError, match="its URDF has the SHA-256"):
         tactile_cube.deploy(elsewhere, "seconds=0.1", *hand, *object_, say=lambda line: None)
+
+
+@pytest.mark.parametrize("drives", [{"torque_limit": 1.1}, {"kp": 1e-9}, {"kp": 9.0}, {"kd": [0.3] * 7 + [1e3]}])
+def test_a_file_cannot_widen_the_limits_of_a_hand(drives: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=rf"env\.constants\.{next(iter(drives))} is .*, the hand's is"):
+        training_setting({"config": {"env": ENV | {"constants": ENV["constants"] | drives}}})
+
+
+def test_the_limits_of_a_softer_training_are_the_hands() -> None:
+    soft = {"kp": 2.0, "torque_limit": 0.8}
+    setting = training_setting({"config": {"env": ENV | {"constants": ENV["constants"] | soft}}})
+    limits = limits_of(setting, 6.0)
+    assert (limits.kp.min(), limits.torque) == (3.0, 0.8)
 
 
 def test_a_file_that_names_what_is_no_constant_is_refused() -> None:

@@ -189,7 +189,9 @@ def _verified(path: Path, content: bytes) -> dict[str, Any]:
         reason = f"{type(error).__name__} in its header"
         raise InputError(f"{path}: damaged or not a policy file ({reason})") from error
     if metadata.get("format") != FORMAT:
-        raise InputError(f"{path}: not a policy file (format {str(metadata.get('format'))[:40]!r}, expected {FORMAT!r})")
+        raise InputError(
+            f"{path}: not a policy file (format {str(metadata.get('format'))[:40]!r}, expected {FORMAT!r})"
+        )
     if len(stated) != len(NO_DIGEST) or _digest(content.replace(stated, NO_DIGEST, 1)) != stated:
         raise InputError(f"{path}: damaged, its checksum does not fit its contents; take another copy of the file")
     return metadata

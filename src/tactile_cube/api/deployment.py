@@ -135,6 +135,8 @@ def control_loop(job: Job, network: Network, hand: Hand, limits: Limits) -> Cont
 def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     """The limits of the interface contract: the hand's range, the gains and the torque of the training.
 
+    A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.
+
     Args:
         setting: of the training.
         rate: largest change of a desired angle [rad/s].
@@ -142,7 +144,8 @@ def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     import numpy as np
 
     from tactile_cube.deployment.limits import Limits
+    from tactile_cube.simulation import constants_of
 
     hand, constants = setting.hand, setting.constants
-    gains = (np.asarray(constants.kp), np.asarray(constants.kd))
+    gains = (np.maximum(constants.kp, constants_of(hand).kp), np.asarray(constants.kd))
     return Limits(hand.lower, hand.upper, rate, constants.torque_limit, *gains)

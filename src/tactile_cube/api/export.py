@@ -86,4 +86,4 @@ def setting_of(config: Any, network: Network, trained: bool = True) -> TrainingS
     if hand is not None and not trained:
         return TrainingSetting.of(hand)
     object_: Any = OmegaConf.to_container(config.object, resolve=True) if config.get("object") else None
-    return training_setting(network.info, hand, object_)
+    return training_setting(network.info, hand, object_, network.label)

@@ -95,6 +95,7 @@ def training_run(job: Job) -> Run:
     from hydra.utils import instantiate
     from omegaconf import OmegaConf
 
+    from tactile_cube.agent.policy_file import read_policy
     from tactile_cube.evaluation.policy_path import networks_path, policy_path
     from tactile_cube.training.build import build_run
     from tactile_cube.training.environment import as_environment
@@ -103,8 +104,9 @@ def training_run(job: Job) -> Run:
     config: Any = job.config
     plain = _plain(job)
     if teacher := config.exploration.get("teacher"):
-        file = str(policy_path(teacher, "exploration.teacher"))
-        config = OmegaConf.merge(config, {"exploration": {"teacher": file}})
+        file = policy_path(teacher, "exploration.teacher")
+        read_policy(file)  # a damaged one is the user's error here, a worker's later
+        config = OmegaConf.merge(config, {"exploration": {"teacher": str(file)}})
     return build_run(
         folder=job.folder,
         seed=RunSettings(name=config.name, seed=config.seed).seed,

@@ -31,7 +31,7 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
         network: the policy.
         setting: that it was trained in; None: as its file says.
     """
-    setting = setting or training_setting(network.info)
+    setting = setting or training_setting(network.info, label=network.label)
     hand, constants = setting.hand, setting.constants
     names = list(hand.joint_names)
     return {

@@ -22,11 +22,13 @@ class Network:
         weights: one matrix `(out, in)` a layer.
         biases: one vector `(out,)` a layer.
         info: the policy file's metadata.
+        label: how the policy is called in a message.
     """
 
     weights: tuple[Array, ...]
     biases: tuple[Array, ...]
     info: dict[str, Any]
+    label: str = "the policy"
 
     @property
     def observation_size(self) -> int:
@@ -57,4 +59,4 @@ def read_network(path: Path) -> Network:
     """Read a policy file; raises what `read_policy` does."""
     info, layers = read_policy(path)
     weights, biases = zip(*layers, strict=True)
-    return Network(weights, biases, info.model_dump())
+    return Network(weights, biases, info.model_dump(), f"policy={path}")

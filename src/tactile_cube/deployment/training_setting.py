@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import numpy as np
+
 from tactile_cube.agent.policy_parts import making, require_parts
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
@@ -13,7 +15,8 @@ from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.randomization import StartStates
 from tactile_cube.simulation import EpisodeConstants, constants_of
 
-LABEL = "the policy's file"
+DRIVES = {"kp": (0.5, 2.0), "kd": (0.5, 2.0), "torque_limit": (0.0, 1.0)}
+"""Between which multiples of the hand's own the gains and the torque limit of a training may lie."""
 CONSTANTS = {"object", *(field.name for field in fields(EpisodeConstants))}
 
 
@@ -42,7 +45,10 @@ class TrainingSetting:
 
 
 def training_setting(
-    info: Mapping[str, Any], hand: Hand | None = None, object: Mapping[str, Any] | None = None
+    info: Mapping[str, Any],
+    hand: Hand | None = None,
+    object: Mapping[str, Any] | None = None,
+    label: str = "the policy",
 ) -> TrainingSetting:
     """Return what a policy was trained with.
 
@@ -50,20 +56,23 @@ def training_setting(
         info: what the policy file says beside its weights.
         hand: the one that the file names, where its URDF is none of the package's: no file has another file read.
         object: likewise, as `constants_of` takes it.
+        label: how the policy is called in a message.
 
     Raises:
         InputError: another hand or another URDF than the file names, or a file of which no setting can be made; see
             `require_parts`.
     """
     named = {"hand": hand, "object": object}
-    env = require_parts((info.get("config") or {}).get("env") or {}, LABEL, [key for key in named if named[key]])
+    env = require_parts((info.get("config") or {}).get("env") or {}, label, [key for key in named if named[key]])
     if hand is not None:
         _require_trained(hand, info["config"]["env"].get("hand") or {})
-    with making(LABEL):
+    with making(label):
         hand = hand or _hand(env.get("hand"))
-        constants = {"object": object} | _values(env, "constants", CONSTANTS)
-        task = _values(env, "task", {field.name for field in fields(Task)})
-        return TrainingSetting.of(hand, constants_of(hand, **constants), Task(**task) if task else None)
+        constants = {"object": object} | _values(env, "constants", CONSTANTS, label)
+        task = _values(env, "task", {field.name for field in fields(Task)}, label)
+        made = constants_of(hand, **constants)
+        _require_drives(made, constants_of(hand), label)
+        return TrainingSetting.of(hand, made, Task(**task) if task else None)
 
 
 def _require_trained(hand: Hand, named: Mapping[str, Any]) -> None:
@@ -80,6 +89,17 @@ def _require_trained(hand: Hand, named: Mapping[str, Any]) -> None:
         )
 
 
+def _require_drives(trained: EpisodeConstants, own: EpisodeConstants, label: str) -> None:
+    """Refuse gains and torques of other drives than the hand's: by them the commands to a robot are limited."""
+    for key, (least, most) in DRIVES.items():
+        stated, known = np.asarray(getattr(trained, key)), np.asarray(getattr(own, key))
+        if not np.all((least * known <= stated) & (stated <= most * known)):
+            raise InputError(
+                f"{label}: env.constants.{key} is {stated.max():g}, the hand's is {known.max():g}; describe a hand "
+                "with such drives and name it: hand=..."
+            )
+
+
 def _hand(named: Mapping[str, Any] | None) -> Hand:
     from hydra.utils import instantiate
 
@@ -87,9 +107,9 @@ def _hand(named: Mapping[str, Any] | None) -> Hand:
     return hand
 
 
-def _values(env: Mapping[str, Any], part: str, known: set[str]) -> dict[str, Any]:
+def _values(env: Mapping[str, Any], part: str, known: set[str], label: str) -> dict[str, Any]:
     """The plain values of a part of the environment; classes and the hand stand elsewhere."""
     values = {key: value for key, value in (env.get(part) or {}).items() if key not in ("_target_", "hand", "joints")}
     for key in values.keys() - known:
-        raise InputError(f"the policy's file has env.{part}.{key}, which this version does not know")
+        raise InputError(f"{label}: has env.{part}.{key}, which this version does not know")
     return values

@@ -75,7 +75,7 @@ def _with_ancestors(folder: Path, given: set[str]) -> list[Ancestor]:
 
 
 def _named(path: Path, beside: Path, given: set[str]) -> list[Ancestor]:
-    """The ancestry of a run in the folder `beside`, or of a policy of the package; of what is not there, that it was."""
+    """The ancestry of a run in the folder `beside`, or of a policy of the package; else its name alone."""
     folder = path if path.is_dir() else path.parent
     if folder.name in given:
         return []
