@@ -13,13 +13,15 @@ import polars
 import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
-from safetensors.torch import load
+from safetensors.numpy import load
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy, sealed
 from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.composition import composed
+from tactile_cube.deployment.interface_contract import interface_contract
+from tactile_cube.deployment.network import read_network
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
 from tactile_cube.env import Task
 from tactile_cube.evaluation.environment import environment
@@ -159,6 +161,7 @@ def _read_policy(folder: Path) -> None:
     (folder / "info.json").unlink(missing_ok=True)
     info = load_policy(folder / "policy.safetensors")[1]
     environment(_evaluation(), PolicySource(HoldPolicy(), "stranger", config=info.config), {})
+    interface_contract(read_network(folder / "policy.safetensors"))
 
 
 def state(written: int, capacity: int, seed: int) -> dict[str, Any]:

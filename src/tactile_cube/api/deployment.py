@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_cube.api.export import load_policy
+from tactile_cube.api.export import load_policy, setting_of
 from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, Say, called_job
 
@@ -91,7 +91,7 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
     from tactile_cube.deployment.simulated_hand import SimulatedHand
 
     config, network = job.config, load_policy(job.config.policy)
-    setting = setting_of(job, network)
+    setting = setting_of(config, network, config.motion == "policy")
     limits = limits_of(setting, float(config.rate_limit))
     target = str(config.robot._target_)
     simulated = target.endswith(".SimulatedHand")
@@ -108,23 +108,6 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
         finally:
             robot.close()
     return DeploymentResult(runs, turned, limits, job, setting.hand)
-
-
-def setting_of(job: Job, network: Network) -> TrainingSetting:
-    """What the policy was trained with; with an excitation in place of a policy, the hand that was asked for.
-
-    Raises:
-        InputError: a policy on another hand than its own.
-    """
-    from hydra.utils import instantiate
-
-    from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
-
-    config = job.config
-    if config.get("hand") is None:
-        return training_setting(network.info)
-    hand: Hand = instantiate(config.hand, _convert_="all")
-    return training_setting(network.info, hand) if config.motion == "policy" else TrainingSetting.of(hand)
 
 
 def control_loop(job: Job, network: Network, hand: Hand, limits: Limits) -> ControlLoop:
@@ -152,6 +135,8 @@ def control_loop(job: Job, network: Network, hand: Hand, limits: Limits) -> Cont
 def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     """The limits of the interface contract: the hand's range, the gains and the torque of the training.
 
+    A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.
+
     Args:
         setting: of the training.
         rate: largest change of a desired angle [rad/s].
@@ -159,7 +144,8 @@ def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     import numpy as np
 
     from tactile_cube.deployment.limits import Limits
+    from tactile_cube.simulation import constants_of
 
     hand, constants = setting.hand, setting.constants
-    gains = (np.asarray(constants.kp), np.asarray(constants.kd))
+    gains = (np.maximum(constants.kp, constants_of(hand).kp), np.asarray(constants.kd))
     return Limits(hand.lower, hand.upper, rate, constants.torque_limit, *gains)

@@ -13,9 +13,9 @@ from tactile_cube.deployment.controller import POLICY_RATE, reading_size
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
-from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.hand import Hand, HandModel
 
-FORMAT = "tactile_cube contract 2"
+FORMAT = "tactile_cube contract 3"
 FINGER = {
     "q1": "abduction, 0 is straight",
     "q2": "positive flexes, 0 is straight",
@@ -24,13 +24,19 @@ FINGER = {
 TOLERANCE = 1e-5  # between float32 products in different orders
 
 
-def interface_contract(network: Network) -> dict[str, Any]:
-    """Return the contract of a policy on the hand that it was trained on, ready for JSON."""
-    setting = training_setting(network.info)
+def interface_contract(network: Network, setting: TrainingSetting | None = None) -> dict[str, Any]:
+    """Return the contract of a policy on the hand that it was trained on, ready for JSON.
+
+    Args:
+        network: the policy.
+        setting: that it was trained in; None: as its file says.
+    """
+    setting = setting or training_setting(network.info, label=network.label)
     hand, constants = setting.hand, setting.constants
     names = list(hand.joint_names)
     return {
         "format": FORMAT,
+        "hand": _hand(setting),
         "joints": names,
         "joint_convention": {
             name: {"unit": "rad", "zero": 0.0, "direction": 1, "meaning": meaning}
@@ -85,9 +91,42 @@ def interface_contract(network: Network) -> dict[str, Any]:
     }
 
 
+def _hand(setting: TrainingSetting) -> dict[str, Any]:
+    """Which mechanism it is, how it is held, and what touches the object."""
+    hand, constants = setting.hand, setting.constants
+    tips = [hand.finger_tips(k, hand.start_angles[None, hand.of_finger(k)])[0] for k in range(len(hand.fingers))]
+    return {
+        "name": hand.name,
+        "urdf": {"file": hand.urdf_name, "sha256": hand.urdf_sha256},
+        "coupled_joints": [_coupled(hand, k, *pair) for k in range(len(hand.fingers)) for pair in hand.coupled()],
+        "palm": {
+            "position": {"value": _plain(hand.position), "unit": "m"},
+            "rotation": [_plain(row) for row in hand.rotation],
+            "frame": "of the URDF's root link in the world: p_world = position + rotation @ p_palm",
+            "gravity": {"value": _plain(constants.gravity * hand.rotation.T @ constants.down), "unit": "m/s^2"},
+            "gravity_frame": "palm; hold the hand so that it is this",
+        },
+        "fingertips": [
+            {
+                "finger": finger.name,
+                "link": hand.link_names(k)[-1],
+                "radius": hand.tip_radius,
+                "at_start": _plain(hand.rotation.T @ (tip - hand.position)),
+            }
+            for k, (finger, tip) in enumerate(zip(hand.fingers, tips, strict=True))
+        ],
+        "fingertips_unit": "m; at_start: centre of the sphere in the palm's frame at the start angles",
+    }
+
+
+def _coupled(hand: Hand, finger: int, link: int, leader: int) -> dict[str, Any]:
+    joints = hand.chain_joints(finger)
+    return {"joint": joints[link], "follows": joints[leader], "ratio": 1.0}
+
+
 def _meanings(hand: Hand) -> list[str]:
     """What each joint does: known of the DLR-Hand II, else as its URDF says."""
-    if hand.name == DLR_HAND2.name:
+    if isinstance(hand, HandModel):
         return [FINGER[name[-2:]] for name in hand.joint_names]
     return ["as in the URDF of the hand"] * hand.joints
 
@@ -100,6 +139,8 @@ def _task(setting: TrainingSetting) -> dict[str, Any]:
             "shape": str(constants.object_shape),
             "size": {"value": _plain(constants.cube_size), "unit": "m, edges of its bounding box"},
             "mass": {"value": constants.cube_mass, "unit": "kg"},
+            "centre_of_mass": {"value": _plain(constants.cube_com), "unit": "m, from the middle of the bounding box"},
+            "friction": {"object": constants.cube_friction, "fingertips": constants.tip_friction, "law": "product"},
         },
         "axis": _plain(task.axis_vector()),
         "direction": task.direction,

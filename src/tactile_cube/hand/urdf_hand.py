@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,12 +34,16 @@ class UrdfHand(Hand):
         chains: its fingers.
         palm: shapes of what no joint moves, for pictures.
         radius: of the fingertips [m].
+        file: name of the URDF's file.
+        sha256: of that file.
     """
 
     label: str
     chains: tuple[UrdfFinger, ...]
     palm: tuple[Shape, ...]
     radius: float
+    file: str
+    sha256: str
 
     @property
     def name(self) -> str:
@@ -101,6 +106,16 @@ class UrdfHand(Hand):
         fingers = [chain.parts("palm", base) for chain, base in zip(self.chains, bases, strict=True)]
         return robot_element(self.label, [f'<link name="palm">{drawn}</link>', *fingers])
 
+    @property
+    def urdf_name(self) -> str:
+        """See `Hand`."""
+        return self.file
+
+    @property
+    def urdf_sha256(self) -> str:
+        """See `Hand`."""
+        return self.sha256
+
     def chain_joints(self, finger: int) -> tuple[str, ...]:
         """See `Hand`."""
         return self.chains[finger].joints
@@ -143,6 +158,7 @@ def hand_from_urdf(
     action: Mapping[str, Sequence[float]] | None = None,
     start: Sequence[float] | None = None,
     drive: Mapping[str, float | Sequence[float]] | None = None,
+    sha256: str | None = None,
 ) -> UrdfHand:
     """Describe a hand.
 
@@ -159,12 +175,16 @@ def hand_from_urdf(
             of all [rad]; None: the URDF's limits.
         start: joint angles in which episodes start [rad]; None: fingertips 1 mm off a cube of 8 cm.
         drive: constants of the drives by their names in EpisodeConstants, e.g. kp [N m/rad].
+        sha256: that the URDF's file has to have; None: any.
 
     Raises:
         InputError: what does not fit, by its key.
     """
-    file = _file(urdf)
+    file = urdf_file(urdf)
     text = file.read_text(encoding="utf-8")
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    if sha256 not in (None, digest):
+        raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
     chains, bases = _fingers(fingers, text, file.parent)
     own = sorted({chains[0].columns.index(column) for column in chains[0].columns})
     limits = np.concatenate([chain.limits[own] for chain in chains])
@@ -184,11 +204,18 @@ def hand_from_urdf(
         chains=chains,
         palm=tuple(palm_shapes(text, moving, file.parent)),
         radius=float(tip_radius),
+        file=file.name,
+        sha256=digest,
     )
     return replace(hand, start_angles=_start(hand, start))
 
 
-def _file(urdf: str) -> Path:
+def urdf_file(urdf: str) -> Path:
+    """Return the file that a hand's `urdf` means.
+
+    Raises:
+        InputError: there is none.
+    """
     file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.is_file()), None)
     if file is None:
         raise InputError(f"hand.urdf={urdf}: no such file, nor one of the package's in {DESCRIPTIONS.name}/")
