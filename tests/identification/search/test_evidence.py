@@ -5,8 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactile_cube.identification.search.evidence import charged, correlation_length, in_blocks, p_value
-from tests.identification.test_verdict import judged
+from tactile_cube.identification.search.evidence import (
+    Judgement,
+    charged,
+    correlation_length,
+    in_blocks,
+    p_value,
+)
+from tests.identification.test_verdict import MODEL, NOTHING, judged
 
 
 def remembering(length: int, count: int = 600, seed: int = 0) -> np.ndarray:
@@ -23,6 +29,14 @@ def test_the_length_of_a_correlation_is_found(length: int) -> None:
 def test_one_trial_does_not_remember_another() -> None:
     levels = np.repeat(np.random.default_rng(0).normal(size=60), 10)
     assert correlation_length(levels, np.arange(600)) == 1
+
+
+def test_five_differences_of_one_sign_have_the_one_sided_probability_of_1_in_32() -> None:
+    before = Judgement(MODEL, np.full(5, 400.0), np.full(5, 100), NOTHING, np.ones(1), np.arange(5))
+    after = replace(before, costs=before.costs - [20.0, 30.0, 50.0, 70.0, 110.0])
+    assert p_value(before, after) == pytest.approx(1 / 32)
+    assert p_value(after, before) == 1.0
+    assert p_value(before, before) == 1.0
 
 
 def test_the_same_difference_many_times_is_no_proof() -> None:
