@@ -32,7 +32,9 @@ def test_proximal_term_sums_the_fourth_power_of_each_fingers_first_joint() -> No
 
 
 def test_off_centre_is_the_squared_horizontal_distance_from_the_start() -> None:
-    assert terms.off_centre(STILL._replace(x=0.1, y=0.1), STILL._replace(x=0.13, y=0.06, z=0.5)) == pytest.approx(0.0025)
+    assert terms.off_centre(STILL._replace(x=0.1, y=0.1), STILL._replace(x=0.13, y=0.06, z=0.5)) == pytest.approx(
+        0.0025
+    )
 
 
 def test_advance_counts_fingers_that_go_back_and_not_those_that_turn_with_the_object() -> None:

@@ -63,7 +63,7 @@ def test_a_mesh_in_another_unit_is_noticed(unit: float, hint: str, tmp_path: Pat
         read_mesh(write_obj(tmp_path, 0.08 * unit * CUBE))
 
 
-def test_a_hollow_mesh_is_refused_until_its_hull_is_asked_for_and_keeps_its_own_mass_and_inertia(tmp_path: Path) -> None:
+def test_a_hollow_mesh_is_refused_until_its_hull_is_asked_for_and_keeps_its_own_inertia(tmp_path: Path) -> None:
     file = write_hollow(tmp_path)
     with pytest.raises(InputError, match=r"fills 86 % of its convex hull.*object\.hull=true"):
         read_mesh(file)

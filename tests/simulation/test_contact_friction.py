@@ -1,4 +1,4 @@
-"""What friction does in both engines: forces at sliding contacts, and what holds a cube against sliding and spinning."""
+"""What friction does in both engines: forces at sliding contacts, what holds a cube against sliding and spinning."""
 
 import dataclasses
 from collections.abc import Iterator

@@ -14,7 +14,7 @@ from tactile_cube.command_help import CONFIG
 from tactile_cube.curriculum import LinearCurriculum
 from tactile_cube.env import Reward
 from tactile_cube.errors import InputError
-from tactile_cube.randomization import LogUniform, StartStates
+from tactile_cube.randomization import StartStates
 from tactile_cube.transforms import EnvConfig, make_env
 from tests.meshes import CUBE, write_obj
 
@@ -98,12 +98,6 @@ def test_early_reward_makes_motion_cheap_and_twisted_fingers_dear() -> None:
     for term in ("height", "plane", "tilt"):
         assert getattr(early, term) == pytest.approx(0.2 * getattr(paper, term))
     assert (early.spin, early.proximal, early.leaving) == (16, 8, 20)
-
-
-def test_followup_has_the_published_spinning_friction_and_forces() -> None:
-    values = configured(randomization="followup").randomization.values
-    assert values["tip_spinning_friction"] == LogUniform(2e-4, 2e-2)
-    assert (values["force_mean"].value, values["force_std"].value) == (0.04, 0.008)
 
 
 @pytest.mark.parametrize(

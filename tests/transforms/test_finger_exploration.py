@@ -3,7 +3,7 @@ from collections.abc import Callable
 import pytest
 import torch
 from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import check_env_specs, step_mdp
+from torchrl.envs.utils import step_mdp
 
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
@@ -115,10 +115,6 @@ def test_impossible_settings_are_refused() -> None:
         Exploration(episodes=1.5)
     with pytest.raises(InputError, match="shortest"):
         Exploration(shortest=8)
-
-
-def test_specs_hold(transformed: MakeEnv) -> None:
-    check_env_specs(transformed(FingerExploration(Exploration())))
 
 
 def test_a_teacher_acts_on_what_it_observes() -> None:

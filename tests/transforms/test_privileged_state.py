@@ -1,14 +1,8 @@
-from collections.abc import Callable
-
 import pytest
 import torch
 from tensordict import TensorDict
-from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import check_env_specs
 
 from tactile_cube.transforms import PrivilegedState
-
-MakeEnv = Callable[..., TransformedEnv]
 
 USUAL = [0.01] * 3 + [1.0] * 2 + [0.1] * 2 + [0.05] * 3 + [1.0] * 15
 """Centimetres, sin and cos, tilt [rad], velocity [m/s], angular velocity [rad/s], q_f [rad]."""
@@ -19,7 +13,3 @@ def test_numbers_of_the_usual_size_become_ones_if_visible(visible: bool) -> None
     data = PrivilegedState(visible=visible)._call(TensorDict({"object_state": torch.tensor([USUAL] * 2)}, [2]))
     torch.testing.assert_close(data["privileged"], torch.full((2, 25), float(visible)))
     assert "object_state" not in data
-
-
-def test_specs_hold(transformed: MakeEnv) -> None:
-    check_env_specs(transformed(PrivilegedState()))
