@@ -11,6 +11,7 @@ from tactile_cube.identification.search.evidence import (
     correlation_length,
     in_blocks,
     p_value,
+    worse,
 )
 from tests.identification.test_verdict import MODEL, NOTHING, judged
 
@@ -37,6 +38,10 @@ def test_five_differences_of_one_sign_have_the_one_sided_probability_of_1_in_32(
     assert p_value(before, after) == pytest.approx(1 / 32)
     assert p_value(after, before) == 1.0
     assert p_value(before, before) == 1.0
+    few = replace(before, costs=before.costs[:4], samples=before.samples[:4], trial=before.trial[:4])
+    steady = replace(few, costs=few.costs + [390.0, 410.0, 400.0, 400.0])
+    assert (p_value(steady, few), worse(steady, few)) == (1.0, True), "four blocks prove nothing, a steady loss does"
+    assert not worse(replace(few, costs=few.costs + [1600.0, 0.0, 0.0, 0.0]), few)
 
 
 def test_the_same_difference_many_times_is_no_proof() -> None:
@@ -57,11 +62,12 @@ def test_blocks_keep_the_sum_and_do_not_cross_trials() -> None:
 
 
 def test_numbers_that_a_segment_chose_for_itself_are_charged_above_the_noise_alone() -> None:
-    samples, numbers = np.full(3, 400), np.array([0, 2, 2])
-    found = charged(np.array([4000.0, 4000.0, 390.0]), samples, numbers)
+    samples, numbers = np.array([400, 400, 400, 50]), np.array([0, 2, 2, 2])
+    found = charged(np.array([4000.0, 4000.0, 390.0, 150.0]), samples, numbers)
     assert found[0] == 4000.0
     assert found[1] == pytest.approx(400.0 + 3600.0 * (8.0 / 6.0) ** 2), "eight of 400 samples are independent"
     assert found[2] == 390.0
+    assert found[3] == pytest.approx(50.0 + 100.0 * 3.0**2), "a short segment has at least one more than it chose"
 
 
 def test_an_effect_that_shows_in_fast_motion_alone_is_proven_by_each_segment_of_it() -> None:
