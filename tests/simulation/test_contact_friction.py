@@ -8,6 +8,7 @@ import pytest
 
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation import Contact, EpisodeConstants, SimulationOptions, Start, World
+from tactile_cube.simulation.surface import Surface
 
 ALL, OPPOSING = (0, 1, 2, 3), (0, 2)
 SETTLED, WEIGHT = 15, 0.05 * 9.81
@@ -38,14 +39,23 @@ def normal_force(world: World) -> float:
     return sum(contact.force for contact in on_the_cube(world))
 
 
-@pytest.mark.parametrize("tip_friction", [0.9, 0.4])
-def test_tips_hold_the_cube_up_to_friction_times_normal_force(world: World, tip_friction: float) -> None:
-    constants = EpisodeConstants(tip_friction=tip_friction, filter_time=0.1, gravity_onset=1000)
+def test_what_two_surfaces_are_together_does_not_depend_on_which_is_named_first() -> None:
+    skin, hard = Surface(0.9, 0.003, 3e-4), Surface(0.5, 0.001)
+    assert skin.on(hard) == hard.on(skin)
+
+
+@pytest.mark.parametrize(("tip_friction", "cube_friction"), [(0.9, 1.0), (0.4, 1.0), (0.9, 0.5)])
+def test_tips_hold_the_cube_up_to_friction_times_normal_force(
+    world: World, tip_friction: float, cube_friction: float
+) -> None:
+    constants = EpisodeConstants(
+        tip_friction=tip_friction, cube_friction=cube_friction, filter_time=0.1, gravity_onset=1000
+    )
     lifted = []
     for share in (0.8, 1.3):
         target = held(world, constants, ALL)
         before = world.cube_position[2]
-        world.push_cube(np.array([0.0, 0.0, share * tip_friction * normal_force(world)]), np.zeros(3))
+        world.push_cube(np.array([0.0, 0.0, share * tip_friction * cube_friction * normal_force(world)]), np.zeros(3))
         for _ in range(3):
             world.step(target)
         lifted.append(world.cube_position[2] - before)
