@@ -46,11 +46,24 @@ def test_another_command_is_no_repeat_and_the_floor_is_a_guess(tmp_path: Path) -
     assert floor.overall == pytest.approx(2e-4, rel=0.5)
 
 
-def test_a_coarse_sensor_bounds_the_guess(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["sensors"]["position_resolution"] = 0.01
+def test_the_sensors_noise_is_that_of_the_positions_whatever_jumps_there_are(tmp_path: Path) -> None:
+    def spoil(columns: dict) -> None:
+        columns["a.position"][::30] += 0.05
 
-    assert np.all(sensor_noise(read_recording(write(tmp_path, change))) >= 0.01 / np.sqrt(12))
+    assert sensor_noise(read_recording(write(tmp_path, spoil=spoil))) == pytest.approx([2e-4, 2e-4], rel=0.1)
+
+
+def test_a_sensor_is_no_better_than_its_owner_says_or_than_a_millionth_of_the_motion(tmp_path: Path) -> None:
+    def noise(name: str, **sensors: float) -> np.ndarray:
+        def spoil(columns: dict) -> None:
+            columns.update(table(noise=0.0))
+
+        recording = read_recording(write(tmp_path / name, lambda data: data.update(sensors=sensors), spoil))
+        return sensor_noise(recording.with_trials(recording.trials[:1]))
+
+    stated = noise("stated", position_resolution=0.012, position_noise=0.004)
+    np.testing.assert_allclose(stated, np.hypot(0.012 / np.sqrt(12.0), 0.004))
+    np.testing.assert_allclose(noise("ideal"), 1e-6 * np.array([0.6, 0.8]), rtol=1e-3)
 
 
 def test_the_floor_is_the_recordings_alone_and_the_step_size_error_stands_beside_it(tmp_path: Path) -> None:
