@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,16 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import table, write
 
 
-def test_repeats_give_the_sensor_noise_and_not_the_joint_offset(tmp_path: Path) -> None:
-    floor = noise_floor(read_recording(write(tmp_path)))
+@pytest.mark.parametrize("repeats", [2, 5])
+def test_repeats_give_the_sensor_noise_and_not_the_joint_offset(tmp_path: Path, repeats: int) -> None:
+    recording = read_recording(write(tmp_path))
+    noises = np.random.default_rng(0).normal(scale=2e-4, size=(repeats - 2, *recording.trials[0].position.shape))
+    clean = table(noise=0.0)
+    position = np.stack([clean["a.position"], clean["b.position"]], axis=1)
+    more = [replace(recording.trials[0], name=f"more {k}", position=position + n) for k, n in enumerate(noises)]
+    floor = noise_floor(recording.with_trials((*recording.trials, *more)))
     assert floor.source == "repeats"
-    assert floor.repeats == 2
+    assert floor.repeats == repeats
     assert floor.overall == pytest.approx(2e-4, rel=0.1)
 
 
