@@ -38,17 +38,23 @@ def test_single_fingers_move_one_at_a_time(transformed: MakeEnv) -> None:
     assert moved.any(dim=(0, 1)).all()
 
 
-def test_whole_fingers_hold_a_target_for_two_to_seven_steps(transformed: MakeEnv) -> None:
+def test_one_two_or_all_fingers_hold_a_random_target_for_two_to_seven_steps(transformed: MakeEnv) -> None:
     env = transformed(FingerExploration(Exploration(episodes=1.0, probability=0.06)), worlds=60)
-    taken = run(env, 60, 80)
-    moved = (taken != 0.0).all(-1)
-    assert torch.equal(moved, (taken != 0.0).any(-1))
-    assert set(moved.sum(-1).unique().tolist()) == {0, 1, 2, 4}
-    lengths = []
+    taken, lengths, held = run(env, 60, 80).flatten(2), [], []
     for world in range(60):
-        runs, count = torch.unique_consecutive(taken[:, world].flatten(1), dim=0, return_counts=True)
-        lengths += count[(runs != 0.0).any(-1)][:-1].tolist()
+        runs, count = torch.unique_consecutive(taken[:, world], dim=0, return_counts=True)
+        holds = (runs != 0.0).any(-1)
+        lengths += count[holds][:-1].tolist()
+        held.append(runs[holds].unflatten(-1, (4, 3)))
+    targets = torch.cat(held)
+    moved = (targets != 0.0).all(-1)
+    assert torch.equal(moved, (targets != 0.0).any(-1))
+    shares = torch.bincount(moved.sum(-1), minlength=5) / len(moved)
+    assert shares.tolist() == pytest.approx([0.0, 0.5, 0.25, 0.0, 0.25], abs=0.08)
     assert set(lengths) == {2, 3, 4, 5, 6, 7}
+    angles = targets[moved]
+    assert (angles.min(), angles.max()) == pytest.approx((-1.0, 1.0), abs=0.02)
+    assert float(angles.mean()) == pytest.approx(0.0, abs=0.05)
 
 
 def test_what_was_taken_reaches_the_world(transformed: MakeEnv) -> None:
@@ -108,6 +114,19 @@ def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> N
     after = env.step(data.set("action", torch.zeros(2, 12)))["next", "action_taken"]
     assert torch.equal(after[1], before[1])
     assert not torch.equal(after[0], before[0])
+
+
+def test_a_gait_begins_anew_in_the_worlds_that_are_reset(transformed: MakeEnv) -> None:
+    gait = (torch.arange(9.0) / 10.0)[None, :, None].expand(1, 9, 12)
+    explore = Exploration(episodes=0.0, probability=0.0, demonstrations=1.0, noise=0.0)
+    env = transformed(FingerExploration(explore, gait))
+    data = env.reset()
+    for _ in range(3):
+        data = step_mdp(env.step(data.set("action", torch.zeros(2, 12))))
+    data = env.reset(data.set("_reset", torch.tensor([[True], [False]])))
+    assert data["demonstrated"].flatten().tolist() == [False, True]
+    taken = env.step(data.set("action", torch.zeros(2, 12)))["next", "action_taken"]
+    torch.testing.assert_close(taken, torch.tensor([[0.0], [0.3]]).expand(2, 12))
 
 
 def test_impossible_settings_are_refused() -> None:
