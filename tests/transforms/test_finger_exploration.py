@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 import torch
@@ -101,11 +102,6 @@ def test_noise_on_demonstrations_stays_in_the_action_range(transformed: MakeEnv)
     assert float(taken.mean()) == pytest.approx(0.83, abs=0.03)
 
 
-def test_more_than_all_episodes_are_refused() -> None:
-    with pytest.raises(InputError, match="more than all"):
-        Exploration(episodes=0.6, demonstrations=0.5)
-
-
 def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> None:
     env = transformed(FingerExploration(Exploration(episodes=1.0, probability=1.0, shortest=7)), worlds=2)
     data = step_mdp(env.step(env.reset().set("action", torch.zeros(2, 12))))
@@ -129,13 +125,6 @@ def test_a_gait_begins_anew_in_the_worlds_that_are_reset(transformed: MakeEnv) -
     torch.testing.assert_close(taken, torch.tensor([[0.0], [0.3]]).expand(2, 12))
 
 
-def test_impossible_settings_are_refused() -> None:
-    with pytest.raises(InputError, match=r"exploration\.episodes is 1\.5"):
-        Exploration(episodes=1.5)
-    with pytest.raises(InputError, match="shortest"):
-        Exploration(shortest=8)
-
-
 def test_a_teacher_acts_on_what_it_observes() -> None:
     seen: list[torch.Tensor] = []
 
@@ -152,6 +141,18 @@ def test_a_teacher_acts_on_what_it_observes() -> None:
     assert torch.equal(torch.stack(seen, 1), rollout["observation"])
 
 
-def test_gaits_and_a_teacher_at_once_are_refused() -> None:
-    with pytest.raises(InputError, match=r"exploration\.teacher=default beside exploration\.gaits"):
-        Exploration(demonstrations=0.3, gaits=GaitRanges(low={}, high={}), teacher="default")
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"episodes": 1.5}, r"exploration\.episodes is 1\.5"),
+        ({"episodes": 0.6, "demonstrations": 0.5}, "more than all"),
+        ({"shortest": 8}, "shortest"),
+        (
+            {"gaits": GaitRanges(low={}, high={}), "teacher": "default"},
+            r"exploration\.teacher=default beside exploration\.gaits",
+        ),
+    ],
+)
+def test_impossible_settings_are_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Exploration(**wrong)
