@@ -92,13 +92,6 @@ def test_published_options_equal_the_published_defaults_of_the_code() -> None:
     assert config.curriculum == LinearCurriculum()
 
 
-def test_early_reward_makes_motion_cheap_and_twisted_fingers_dear() -> None:
-    early, paper = configured(reward="early").reward, Reward()
-    for term in ("height", "plane", "tilt"):
-        assert getattr(early, term) == pytest.approx(0.2 * getattr(paper, term))
-    assert (early.spin, early.proximal, early.leaving) == (16, 8, 20)
-
-
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
