@@ -34,13 +34,7 @@ def env() -> Iterator[GymnasiumRotation]:
     env.close()
 
 
-def test_checker_of_gymnasium_is_content(env: GymnasiumRotation) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_env(env, skip_render_check=True)
-
-
-def test_checker_of_gymnasium_is_content_with_the_pictures() -> None:
+def test_checker_of_gymnasium_is_content() -> None:
     env = gymnasium.make("tactile_cube/Rotation-v0", render_mode="rgb_array", overrides=("task.episode_steps=5",))
     with warnings.catch_warnings():
         warnings.simplefilter("error")

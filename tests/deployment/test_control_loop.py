@@ -9,7 +9,7 @@ from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.limits import Limits
 from tactile_cube.deployment.played_targets import PlayedTargets
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.deployment.stop_rules import StopRules
+from tactile_cube.deployment.stop_rules import StopRules, Watchdog
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 
@@ -104,6 +104,14 @@ def test_a_measurement_that_is_lost_now_and_then_stops_nothing() -> None:
     loop, _ = loop_of(np.tile(HOME, (20, 1)))
     run(loop, 1400, lambda now, q_d: None if round(1e3 * now) % 10 < 5 and now > 0 else following(now, q_d))
     assert loop.reason == "time is over"
+
+
+def test_only_torque_that_lasts_without_a_break_stops() -> None:
+    watchdog = Watchdog(StopRules(saturation=1.0), DLR_HAND2.lower, DLR_HAND2.upper, DLR_HAND2.joint_names)
+    saturated = np.ones(12, dtype=bool)
+    for tick in range(2500):
+        reading = Reading(1e-3 * tick, HOME, np.zeros(12))
+        assert watchdog.judge(1e-3 * tick, 1e-3, reading, saturated & (tick % 800 != 0)) == ""
 
 
 def test_a_late_tick_stops() -> None:

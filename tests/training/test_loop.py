@@ -45,12 +45,6 @@ def test_worker_process_gives_the_weights_of_this_process(tmp_path: Path, refere
     assert torch.equal(finish(tiny_run(tmp_path, collector={"kind": "multi_sync"})), reference)
 
 
-def test_two_runs_with_two_worker_processes_are_equal(tmp_path: Path) -> None:
-    collector = {"kind": "multi_sync", "processes": 2}
-    first, second = (finish(tiny_run(tmp_path / name, collector=collector)) for name in ("a", "b"))
-    assert torch.equal(first, second)
-
-
 @pytest.mark.parametrize("agent_settings", [{"n_step": 1}, {"n_step": 3}])
 def test_resumed_run_equals_an_uninterrupted_one(tmp_path: Path, agent_settings: dict[str, Any]) -> None:
     whole = tiny_run(tmp_path / "whole", agent_settings=agent_settings)

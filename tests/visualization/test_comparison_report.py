@@ -122,14 +122,6 @@ def test_compare_and_diagnose_state_one_floor(comparison: Comparison) -> None:
     assert any(line.startswith("beside it: the simulator's own time step") for line in lines)
 
 
-def test_the_diagnosis_draws_traces_before_and_after(comparison: Comparison, tmp_path: Path) -> None:
-    before = compare(comparison.recording, floor=comparison.floor)
-    text = page(diagnosis_report(DIAGNOSIS, before, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
-    assert "Measured and simulated, before and after what was found" in text
-    for name in ("simulated before", "simulated after", "error before", "error after"):
-        assert name in text
-
-
 def test_a_sliding_joint_is_shown_in_millimetres_and_newtons(tmp_path: Path) -> None:
     urdf = URDF.replace('name="a" type="revolute"', 'name="a" type="prismatic"')
     recording = read_recording(write(tmp_path / "r", urdf=urdf))
@@ -179,10 +171,13 @@ DIAGNOSIS = {
 }
 
 
-def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals(
+def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals_and_draws_traces_before_and_after(
     comparison: Comparison, tmp_path: Path
 ) -> None:
-    text = page(diagnosis_report(DIAGNOSIS, comparison, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
+    before = compare(comparison.recording, floor=comparison.floor)
+    text = page(diagnosis_report(DIAGNOSIS, before, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
+    for name in ("before and after", "simulated before", "simulated after", "error before", "error after"):
+        assert name in text
     assert "The missing effect was found: command_delay at a." in text
     assert "0.02 s [0.015, 0.025]" in text
     assert "cannot be told from actuator_lag" in text
