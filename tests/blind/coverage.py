@@ -20,13 +20,13 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from scipy import stats
 
 import tactile_cube
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
-from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 
 EFFECTS = ("viscous_friction", "stribeck_friction", "command_delay", "payload", "torque_gain", "coulomb_friction")
 CONTROLLER = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0}

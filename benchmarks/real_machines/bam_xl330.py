@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import ControllerChange, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.data_set import open_archive
-from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.sources.source import described
 
 MASS, LENGTH = 0.49, 0.10  # [kg], [m] of the pendulum

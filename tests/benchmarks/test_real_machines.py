@@ -4,20 +4,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from benchmarks.real_machines.__main__ import KEY, MACHINES, judged
+from benchmarks.real_machines.bam_xl330 import BamXl330, stiffness
+from benchmarks.real_machines.dfki_double import DfkiDouble
+from benchmarks.real_machines.dfki_pendulum import DfkiPendulum
+from benchmarks.real_machines.emps import Emps
+from benchmarks.real_machines.shadow_lfj3 import ShadowLfj3
+from benchmarks.real_machines.so101_sage import So101Sage
+from benchmarks.real_machines.tx40 import Tx40
 
+from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.sources.bam_xl330 import BamXl330, stiffness
-from tactile_cube.measurement.sources.dfki_pendulum import DfkiPendulum
-from tactile_cube.measurement.sources.shadow_lfj3 import ShadowLfj3
-from tactile_cube.measurement.sources.so101_sage import So101Sage
 from tactile_cube.measurement.sources.source import Source
-from tactile_cube.measurement.sources.tx40 import Tx40
 
-DATA = Path(__file__).parents[4] / "shared" / "data"
+DATA = Path(__file__).parents[3] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data")
 
 
@@ -85,3 +90,33 @@ def test_the_arms_joint_6_is_freed_from_joint_5_and_friction_brakes_every_joint(
 def test_a_missing_archive_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"source\.file=.*none\.npz: no such file"):
         BamXl330(str(tmp_path / "none.npz")).recordings(0)
+
+
+@needs_data
+def test_emps_is_cut_into_its_periods_and_the_pulses_stay_whole(tmp_path: Path) -> None:
+    parts = imported(Emps(str(DATA / "emps")), tmp_path)
+    assert [round(trial.duration, 1) for trial in parts[""].trials] == [6.2, 6.2, 6.2, 6.2]
+    assert parts["validation"].trials[0].duration == pytest.approx(24.84)
+    assert parts[""].torque_controlled
+    assert parts[""].units == {"slide": "m"}
+
+
+@needs_data
+def test_the_double_pendulum_hangs_as_its_owners_say(tmp_path: Path) -> None:
+    recording = imported(DfkiDouble(str(DATA / "dfki_double")), tmp_path)[""]
+    mass = recording.rigid_body().actuated_mass_matrix(np.array([0.0, np.pi / 2]))
+    assert mass[1, 1] == pytest.approx(0.05087, rel=1e-3), "I2 about joint 2"
+    assert mass[0, 0] == pytest.approx(0.03189 + 0.05087 + 0.6256 * 0.2**2, rel=1e-3)
+
+
+def test_the_key_names_every_machine_and_its_effects_exist() -> None:
+    key = yaml.safe_load(KEY.read_text())
+    assert list(key) == list(MACHINES)
+    names = [name for one in key.values() for line in (*one["named"], one.get("not_named", [])) for name in line]
+    assert {name.partition("@")[0] for name in names} <= set(catalogue())
+
+
+def test_a_documented_effect_counts_wherever_it_is_named_and_an_absent_one_is_said() -> None:
+    key = {"named": [["backlash"], ["coulomb_friction@q1"]], "not_named": ["cogging"]}
+    assert judged({"named": ["backlash@q2"], "sets": []}, key) == "1 of 2"
+    assert judged({"named": [], "sets": [["coulomb_friction@q1"], ["cogging@q1"]]}, key) == "1 of 2, wrongly cogging"

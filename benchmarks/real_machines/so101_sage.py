@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.data_set import open_archive
-from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.sources.source import described
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """Take recordings of real machines through the whole loop and write the table of what was found.
 
-    python benchmarks/real_machines/run.py DATA [--only emps tx40] [--out outputs/real_machines]
+    python -m benchmarks.real_machines DATA [--only emps tx40] [--out outputs/real_machines]
 
 DATA holds the folders of the data sets; README.md beside this file says where they come from and how to add one. A
 stage whose result exists is left out, so the same command goes on.
@@ -21,18 +21,15 @@ from typing import Any
 
 import yaml
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from dfki_double import DfkiDouble
-from emps import Emps
-
+from benchmarks.real_machines.bam_xl330 import BamXl330
+from benchmarks.real_machines.dfki_double import DfkiDouble
+from benchmarks.real_machines.dfki_pendulum import DfkiPendulum
+from benchmarks.real_machines.emps import Emps
+from benchmarks.real_machines.shadow_lfj3 import ShadowLfj3
+from benchmarks.real_machines.so101_sage import So101Sage
+from benchmarks.real_machines.tx40 import Tx40
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.sources.bam_xl330 import BamXl330
-from tactile_cube.measurement.sources.dfki_pendulum import DfkiPendulum
-from tactile_cube.measurement.sources.shadow_lfj3 import ShadowLfj3
-from tactile_cube.measurement.sources.so101_sage import So101Sage
 from tactile_cube.measurement.sources.source import Source
-from tactile_cube.measurement.sources.tx40 import Tx40
 
 KEY = Path(__file__).parent / "key.yaml"
 MACHINES: dict[str, Callable[[Path], Source]] = {

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.foreign_log import cut
-from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.sources.source import described
 
 MASS, LENGTH = 0.676, 0.45  # [kg], [m] of weight, rod and mounting together
