@@ -24,7 +24,8 @@ def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
         >>> suggestion("evalute", ["evaluate", "export"])
         '; did you mean evaluate?'
     """
-    near = difflib.get_close_matches(word, [*known], 1)
+    names = [*known]
+    near = difflib.get_close_matches(word, names, 1, 0.75) or [name for name in names if word and word in name]
     return f"; did you mean {prefix}{near[0]}?" if near else ""
 
 
