@@ -8,12 +8,11 @@ Each command of the package is also a function of it: `train`, `evaluate`, `comp
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import gymnasium
+
 from tactile_cube.errors import InputError
-from tactile_cube.registration_hook import register_with_gymnasium
 
 if TYPE_CHECKING:
     from tactile_cube.api.batch import diagnose_each
@@ -87,14 +86,5 @@ def __getattr__(name: str) -> Any:
     return value
 
 
-class _Package(ModuleType):
-    """`tactile_cube.train` stays the function when the command line of that name, a module, is imported."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _PLACES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
-
-register_with_gymnasium()
+# Gymnasium 1 loads no entry points of other packages
+gymnasium.register(id="tactile_cube/Rotation-v0", entry_point="tactile_cube.registration:make_rotation")

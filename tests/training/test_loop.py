@@ -141,15 +141,16 @@ def test_an_actor_without_its_critics_waits_unless_told_otherwise(tmp_path: Path
     assert frozen == {"policy.safetensors": FROZEN, "checkpoint.pt": None}
 
 
-def test_a_run_says_how_long_it_takes_and_whose_networks_it_begins_with(
+def test_a_run_says_how_long_it_takes_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     finish(tiny_run(tmp_path / "first", steps=80))
     policy = str(tmp_path / "first" / "policy.safetensors")
     capsys.readouterr()
     tiny_run(tmp_path / "next", init_from=policy).announce()
-    first, second = capsys.readouterr().out.splitlines()[:2]
+    first, saved, second = capsys.readouterr().out.splitlines()[:3]
     assert first.endswith("starts, 160 steps in all, about 0 min 00 s on two idle cores")
+    assert saved.startswith("saved every 80 steps; after Ctrl-C the same command goes on from the last time")
     assert second == f"networks of {policy}; critics begin anew, the actor waits for {FROZEN} updates"
 
 

@@ -78,7 +78,8 @@ def build_run(
         made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
         seconds = expected_seconds(training.steps - learner.steps, learner.agent.settings, collector, training)
         notices = [*environment.approximations, *learner.agent.approximations()]
-        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, notices)
+        barrier = collector.worlds * training.steps_per_iteration * training.barrier_iterations
+        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, barrier, notices)
         held.pop_all()  # it is the run's from here
     run.best_angle = saved["best_angle"] if saved is not None else 0.0
     return run

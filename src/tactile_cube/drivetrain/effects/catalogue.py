@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.errors import InputError
 
@@ -67,8 +69,10 @@ def find_effect(name: str) -> EffectClass:
     if name in catalogue():
         return catalogue()[name]
     if "." not in name:
-        known = ", ".join(catalogue())
-        raise InputError(f"effect '{name}' is unknown; use a dotted path to your own class, or one of: {known}")
+        raise InputError(
+            f"effect '{name}' is unknown; use a dotted path to your own class, or one of: {', '.join(catalogue())}"
+            f"{suggestion(name, catalogue())}"
+        )
     return _own_effect(name)
 
 
@@ -124,7 +128,8 @@ def matching_joints(joint: str, joints: Sequence[str]) -> list[str]:
         return [joint]
     found = [name for name in joints if joint and name.endswith(tuple(mark + joint for mark in "_/."))]
     if not found:
-        raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(joints)}")
+        near = suggestion(joint, [*joints, *(re.split("[_/.]", name)[-1] for name in joints)])
+        raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(joints)}{near}")
     return found
 
 
