@@ -8,8 +8,8 @@ from hydra.utils import instantiate
 
 import tactile_cube
 from tactile_cube.composition import composed
-from tactile_cube.deployment.control_loop import Homing
-from tactile_cube.deployment.run_log import RunLog
+from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.limits import RATE
 from tactile_cube.deployment.stop_rules import StopRules
 
 
@@ -48,19 +48,15 @@ def test_a_broken_link_stops_the_fingers_and_what_came_before_is_kept() -> None:
     assert "no measurement for" in done.runs[0].reason
 
 
-def test_ticks_without_a_measurement_leave_a_gap_in_the_log() -> None:
-    log = RunLog()
-    log.add(None, np.zeros(12))
-    assert log.time == []
+@pytest.mark.parametrize("value", ["-1", ".nan", "inf"])
+@pytest.mark.parametrize("key", ["rate_limit", "seconds", "filter_time", "robot.rate", "stop.silence", "homing.speed"])
+def test_what_cannot_be_run_is_an_input_error_that_names_the_key(key: str, value: str) -> None:
+    with pytest.raises(tactile_cube.InputError, match=f"{key} is {value}; give a finite number"):
+        tactile_cube.deploy(None, f"{key}={value}", say=quiet)
 
 
-@pytest.mark.parametrize("settings", [["motion=jumps"], ["seconds=0"]])
-def test_what_cannot_be_run_is_an_input_error(settings: list[str]) -> None:
-    with pytest.raises(tactile_cube.InputError):
-        tactile_cube.deploy(None, *settings, say=quiet)
-
-
-def test_the_contract_states_the_stop_rules_and_the_homing_that_the_loop_takes() -> None:
+def test_the_contract_states_the_rules_the_rate_and_the_homing_that_the_loop_takes() -> None:
     config = composed("deploy", [])
     assert instantiate(config.stop) == StopRules()
     assert instantiate(config.homing) == Homing()
+    assert config.rate_limit == RATE

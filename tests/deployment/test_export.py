@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tactile_cube.deployment import export
-from tactile_cube.deployment.control_loop import ControlLoop, Homing
+from tactile_cube.deployment.control_loop import ControlLoop
 from tactile_cube.deployment.controller import Controller
 from tactile_cube.deployment.export import export_policy
+from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.interface_contract import interface_contract
 from tactile_cube.deployment.limits import Limits
 from tactile_cube.deployment.network import Network
@@ -135,10 +136,11 @@ def test_a_loop_written_from_the_contract_alone_sends_what_ours_sends(network: N
     gains = (np.full(12, kp), np.full(12, kd))
     limits = Limits(DLR_HAND2.lower, DLR_HAND2.upper, rate, torque, *gains)
     loop = ControlLoop(Controller(network), 0.5, limits, StopRules(), Homing(settle=1e-3), seconds=1.0)
-    loop.tick(0.0, Reading(0.0, home, np.zeros(12)))
+    for tick in range(-4, 1):  # five that agree before the first command
+        loop.tick(1e-3 * tick, Reading(1e-3 * tick, home))
     stack, q_f, q_d, q_m = None, home, home, home
     for tick in range(1, 500):
-        ours = loop.tick(1e-3 * tick, Reading(1e-3 * tick, q_m, np.zeros(12)))
+        ours = loop.tick(1e-3 * tick, Reading(1e-3 * tick, q_m))
         if (tick - 1) % 100 == 0:
             reading = np.concatenate([q_m, q_f - q_m])
             stack = np.tile(reading, readings) if stack is None else np.concatenate([stack[24:], reading])

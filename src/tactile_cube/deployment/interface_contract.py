@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.controller import POLICY_RATE, reading_size
+from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.limits import RATE
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
@@ -70,20 +71,22 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
             "time_constant_s": network.info.get("time_constant"),
         },
         "limits": {
-            "order": "clip q_f to joint_range, then the rate, then the torque",
-            "rate": {"value": StopRules().speed, "unit": "rad/s"},
+            "law": "the q_d nearest to q_f within joint_range, the rate since the last q_d and the torque, all at once",
+            "rate": {"value": RATE, "unit": "rad/s"},
             "torque": {"value": constants.torque_limit, "unit": "N m"},
-            "torque_law": "q_d in [q_m + (K_D dq - limit) / K_P, q_m + (K_D dq + limit) / K_P]",
+            "torque_law": "q_d in [q_m - limit / K_P, q_m + limit / K_P], q_m as last accepted",
         },
         "impedance": {
-            "law": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after rate and torque limits",
+            "law": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after the limits",
             "kp": {"value": _alike(constants.kp), "unit": "N m/rad"},
             "kd": {"value": _alike(constants.kd), "unit": "N m s/rad"},
         },
         "stop": {
             "rules": asdict(StopRules()),
             "unit": {"silence": "s", "lateness": "s", "margin": "rad", "speed": "rad/s", "saturation": "s"},
-            "then": "hold the measured angles; start again from homing",
+            "accepted": "a q_m stamped within silence of now, in range by margin, no further from the last than speed "
+            "allows, around which a q_d keeps all limits; else q_f stays for this tick",
+            "then": "hold the last accepted angles, within the limits; start again from homing",
         },
         "test_vector": _test_vector(network, hand) | {"tolerance": TOLERANCE},
         "sha256": {"weights": weights_hash(network), "of": "weight0, bias0, weight1, ... as little-endian float32"},
