@@ -1,5 +1,6 @@
 """The whole loop against the simulated hand: it turns the cube, its log is a recording, faults of the link stop it."""
 
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,15 @@ def test_the_log_of_a_dry_run_is_a_recording_that_the_model_follows_down_to_the_
 def test_a_broken_link_stops_the_fingers_and_what_came_before_is_kept() -> None:
     done = tactile_cube.deploy(None, "seconds=2", "robot.link.lost=0.9", "stop.silence=0.01", say=quiet)
     assert "no measurement for" in done.runs[0].reason
+
+
+def test_a_signal_ends_all_runs() -> None:
+    def interrupt(line: str) -> None:
+        if line.startswith("running"):
+            signal.raise_signal(signal.SIGTERM)
+
+    done = tactile_cube.deploy(None, "runs=3", "homing.settle=0.1", say=interrupt)
+    assert [run.reason for run in done.runs] == ["interrupted by SIGTERM"]
 
 
 @pytest.mark.parametrize("value", ["-1", ".nan", "inf"])
