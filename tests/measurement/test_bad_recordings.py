@@ -150,7 +150,7 @@ def test_a_urdf_that_lacks_the_joint_is_named(tmp_path: Path) -> None:
 
 
 def test_a_urdf_that_is_no_xml(tmp_path: Path) -> None:
-    assert "not a URDF" in error_of(write(tmp_path, urdf="<robot"))
+    assert "rig.urdf: URDF: not well-formed XML" in error_of(write(tmp_path, urdf="<robot"))
 
 
 def test_columns_of_a_joint_that_is_not_listed_are_a_warning(tmp_path: Path) -> None:
@@ -227,7 +227,7 @@ def test_a_trial_of_three_samples_is_an_error(tmp_path: Path) -> None:
 def test_a_truncated_parquet_file_is_an_error(tmp_path: Path) -> None:
     path = write(tmp_path) / "first.parquet"
     path.write_bytes(path.read_bytes()[:-100])
-    assert "first.parquet: not a complete Parquet file" in error_of(tmp_path)
+    assert "first.parquet: not a complete .parquet file" in error_of(tmp_path)
 
 
 def test_a_truncated_npz_file_is_an_error(tmp_path: Path) -> None:

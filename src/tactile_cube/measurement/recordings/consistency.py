@@ -12,6 +12,7 @@ from tactile_cube.measurement.recordings.trial import Gains
 
 Array = NDArray[np.float64]
 SLOWER = 0.75  # share of the log's rate that rounding explains
+MAY_BE_INFINITE = ("stiffness", "torque_limit", "rate_limit")
 
 
 def check_joints(description: Description, rig: Rig, file: Path) -> None:
@@ -95,7 +96,7 @@ def _require_gains(gains: Gains, joints: tuple[str, ...], key: str) -> None:
 def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
     """Refuse nominal values that are no physical constants."""
     for key, values in nominal.items():
-        if np.isnan(values).any() or (values < 0).any():
+        if (values < 0).any() or (np.isinf(values).any() and key not in MAY_BE_INFINITE):
             raise ValueError(
                 f"key 'nominal.{key}': received {values.tolist()}; expected numbers >= 0 for {list(joints)}"
             )
