@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.model_file import MAY_BE_INFINITE
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.rig import Rig
@@ -12,7 +13,6 @@ from tactile_cube.measurement.recordings.trial import Gains
 
 Array = NDArray[np.float64]
 SLOWER = 0.75  # share of the log's rate that rounding explains
-MAY_BE_INFINITE = ("stiffness", "torque_limit", "rate_limit")
 
 
 def check_joints(description: Description, rig: Rig, file: Path) -> None:
