@@ -2,8 +2,10 @@
 
 TEXT = 2_000_000
 """Bytes of YAML or URDF: a recording of 10 000 trials has 1 MB, a humanoid's URDF 0.2 MB."""
-VALUES = 100_000
-"""Keys and values in a YAML file, those that aliases repeat counted each time. 10 000 values take PyYAML 0.2 s."""
+VALUES = 200_000
+"""Keys and values in a YAML file, those that aliases repeat counted each time: 20 000 trials have as many."""
+DEPTH = 50
+"""Lists and mappings of a YAML file within each other; a recording has five."""
 TABLE = 1_000_000_000
 """Bytes of a table, an archive or a bag: `NUMBERS` as text."""
 NUMBERS = 50_000_000

@@ -163,7 +163,9 @@ class ModelFile(_Strict):
         for where, one, key in named:
             if not (one.finite or key in MAY_BE_INFINITE) or (key != "offsets" and one.value < 0.0):
                 numbers = f"{one.value:g} in [{one.low:g}, {one.high:g}]"
-                raise ValueError(f"{where} is {numbers}; give finite numbers{'' if key == 'offsets' else ', 0 or more'}")
+                raise ValueError(
+                    f"{where} is {numbers}; give finite numbers{'' if key == 'offsets' else ', 0 or more'}"
+                )
         return self
 
     @model_validator(mode="after")

@@ -18,17 +18,8 @@ DIGITS = 40
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
     """PyYAML's plain data, in which a key stands once and a number is one that a computer holds."""
-
-    values = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: object) -> yaml.Node:
-        """Stop where the file goes on for too long."""
-        self.values += 1
-        if self.values > limits.VALUES:
-            raise ValueError(f"it has more than {limits.VALUES} keys and values")
-        return super().compose_node(parent, index)
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         """Refuse keys that stand twice, and `<<`, by which few lines make more than any memory holds."""
@@ -72,6 +63,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """
     text = read_text(path)
     try:
+        _require_shallow(text)
         data = yaml.load(text, _Loader)
         if _size(data, {}) >= limits.VALUES:
             raise ValueError(f"its aliases (*name) make more than {limits.VALUES} values of it")
@@ -80,11 +72,20 @@ def read_yaml(path: Path) -> dict[str, Any]:
     except yaml.YAMLError as error:
         problem = getattr(error, "problem", None) or " ".join(str(error).split())
         raise InputError(f"{path}{_place(error)}: not valid YAML: {problem}") from None
-    except (ValueError, RecursionError) as error:  # a number of thousands of digits, lists within lists within lists
+    except ValueError as error:
         raise InputError(f"{path}: not usable YAML: {str(error).partition(';')[0]}") from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping of keys to values, received {type(data).__name__}")
     return data
+
+
+def _require_shallow(text: str) -> None:
+    """Refuse lists within lists within lists, and more values than `limits.VALUES`, before anything is made of them."""
+    depth = 0
+    for count, event in enumerate(yaml.parse(text, _Loader)):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if count > limits.VALUES or depth > limits.DEPTH:
+            raise ValueError(f"more than {limits.VALUES} keys and values, or {limits.DEPTH} within each other")
 
 
 def _size(value: Any, known: dict[int, int]) -> int:

@@ -17,15 +17,13 @@ PARTS = re.compile(r"^\s*(?:mtllib|map_\w+|bump|disp|decal|refl|norm)\s(.+)$", r
 """Lines of an OBJ file that name materials, and of a material that name pictures."""
 
 
-def with_own_files(
-    urdf: str, folder: Path, root: Path | None = None, shapes: tuple[str, ...] = SHAPES
-) -> tuple[str, list[str]]:
+def with_own_files(urdf: str, file: Path, root: Path, shapes: tuple[str, ...] = SHAPES) -> tuple[str, list[str]]:
     """Return a URDF whose files all lie below a folder and have absolute names.
 
     Args:
         urdf: the text.
-        folder: of the URDF, which names are relative to.
-        root: folder of the robot's files, which `package://NAME/` stands for; None: `folder`.
+        file: that it was read from, which names are relative to.
+        root: folder of the robot's files, which `package://NAME/` stands for.
         shapes: kinds to keep.
 
     Returns:
@@ -41,7 +39,7 @@ def with_own_files(
                 tag = _local(child.tag)
                 try:
                     if tag not in SHAPES or tag in shapes:
-                        _make_absolute(child, folder, root or folder, f"URDF: link '{parent.get('name')}'")
+                        _make_absolute(child, file.parent, root, f"{file}: link '{parent.get('name')}'")
                     else:
                         parent.remove(child)
                 except InputError as error:
@@ -49,7 +47,7 @@ def with_own_files(
                     left_out.append(str(error))
         return ElementTree.tostring(robot, encoding="unicode"), left_out
     except RecursionError:
-        raise InputError("URDF: its elements are nested too deeply") from None
+        raise InputError(f"{file}: its elements are nested too deeply") from None
 
 
 def package_of(urdf: Path) -> Path:

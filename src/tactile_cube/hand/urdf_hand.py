@@ -183,9 +183,9 @@ def hand_from_urdf(
         InputError: what does not fit, by its key.
     """
     file = urdf_file(urdf)
-    text, left_out = with_own_files(read_text(file), file.parent, package_of(file), ("collision",))
+    text, left_out = with_own_files(read_text(file), file, package_of(file), ("collision",))
     if left_out:
-        raise InputError(f"hand.urdf={urdf}: {left_out[0]}")
+        raise InputError(left_out[0])
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     if sha256 not in (None, digest):
         raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")

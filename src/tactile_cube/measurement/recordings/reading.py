@@ -45,7 +45,7 @@ def read_recording(folder: str | Path) -> Recording:
     file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)
     rig = read_rig(below(folder, description.rig, f"{file}: key 'rig'"))
-    urdf, not_drawn = with_own_files(rig.text, folder)
+    urdf, not_drawn = with_own_files(rig.text, rig.path, folder)
     rig = replace(rig, text=urdf)
     check_joints(description, rig, file)
     check_rate(description, file)

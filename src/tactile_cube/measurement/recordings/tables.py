@@ -57,14 +57,14 @@ def _parquet(path: Path, most: int, only_numbers: bool) -> Table:
         raise OSError(error) from None
     frame = polars.scan_parquet(path, glob=False, hive_partitioning=False)
     schema = frame.collect_schema()
-    size = sum(max(8 * abs(group.num_rows) * len(schema), group.total_byte_size) for group in groups)
-    _require_size(path, size // 8, len(schema), most)
-    numbers = [name for name, kind in schema.items() if kind.is_numeric() or kind == polars.Null]
+    numbers = sum(max(abs(group.num_rows) * len(schema), group.total_byte_size // 16) for group in groups)
+    _require_size(path, numbers, len(schema), most)
+    plain = [name for name, kind in schema.items() if kind.is_numeric() or kind == polars.Null]
     dates = [] if only_numbers else [name for name, kind in schema.items() if kind.is_temporal()]
-    wrong = [name for name in schema if only_numbers and name not in numbers]
+    wrong = [name for name in schema if only_numbers and name not in plain]
     if wrong:
         raise InputError(f"{path}: column '{wrong[0]}' holds {schema[wrong[0]]}, expected numbers")
-    return _numbers(_in_seconds(frame.select(*numbers, *dates).collect()), path)
+    return _numbers(_in_seconds(frame.select(*plain, *dates).collect()), path)
 
 
 def _csv(path: Path, most: int, only_numbers: bool) -> Table:
