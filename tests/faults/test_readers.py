@@ -186,9 +186,7 @@ def test_no_command_puts_what_lies_outside_of_a_recording_into_its_files(tmp_pat
 
 
 @pytest.mark.parametrize("command", ["compare", "diagnose", "monitor", "evaluate", "train"])
-def test_no_command_imports_what_a_model_names(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_command_imports_what_a_model_names(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "stranger.py").write_text("raise SystemExit('imported')")
     model = ModelFile(joints=["a", "b"], effects=[EffectEstimate(effect="stranger.Drag@a")], errors={"over_noise": 1.0})

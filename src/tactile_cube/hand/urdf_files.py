@@ -33,18 +33,22 @@ def with_own_files(urdf: str, file: Path, root: Path, shapes: tuple[str, ...] = 
         InputError: no URDF, or elements nested too deeply.
     """
     robot, left_out = robot_of(urdf), []
+    waiting = [robot]
+    while waiting:
+        parent = waiting.pop()
+        for child in list(parent):
+            tag = _local(child.tag)
+            if tag in SHAPES and tag not in shapes:
+                parent.remove(child)
+                continue
+            try:
+                _make_absolute(child, file.parent, root, f"{file}: link '{parent.get('name')}'")
+            except InputError as error:
+                parent.remove(child)
+                left_out.append(str(error))
+            else:
+                waiting += [] if tag in SHAPES else [child]
     try:
-        for parent in list(robot.iter()):
-            for child in list(parent):
-                tag = _local(child.tag)
-                try:
-                    if tag not in SHAPES or tag in shapes:
-                        _make_absolute(child, file.parent, root, f"{file}: link '{parent.get('name')}'")
-                    else:
-                        parent.remove(child)
-                except InputError as error:
-                    parent.remove(child)
-                    left_out.append(str(error))
         return ElementTree.tostring(robot, encoding="unicode"), left_out
     except RecursionError:
         raise InputError(f"{file}: its elements are nested too deeply") from None

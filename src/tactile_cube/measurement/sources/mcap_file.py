@@ -41,10 +41,15 @@ def decoded_messages(stream: BinaryIO, topics: Sequence[str]) -> Iterator[tuple[
 
 def _records(stream: BinaryIO) -> Iterator[Any]:
     for record in StreamReader(stream, emit_chunks=True, record_size_limit=limits.CHUNK).records:
-        yield from breakup_chunk(_unpacked(record)) if isinstance(record, Chunk) else (record,)
+        yield from breakup_chunk(unpacked(record)) if isinstance(record, Chunk) else (record,)
 
 
-def _unpacked(chunk: Chunk) -> Chunk:
+def unpacked(chunk: Chunk) -> Chunk:
+    """Return a chunk as it was before it was compressed.
+
+    Raises:
+        ValueError: it is larger than it says, or than `limits.CHUNK`.
+    """
     size = chunk.uncompressed_size
     if size > limits.CHUNK:
         raise ValueError(f"a chunk of {size / 1e6:.4g} MB; chunks up to {limits.CHUNK / 1e6:g} MB are read")
