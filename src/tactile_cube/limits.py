@@ -26,5 +26,5 @@ NUMBER = 1e9
 """Largest size of a finite number in SI units: 1e9 N m/rad is rigid, 1e9 N m is more than any drive has."""
 MASS = 1e5
 """[kg] of a link or an object: an excavator's boom has 5e3 kg."""
-RATE = 1e5
-"""Samples per second; current loops take 4e4."""
+RATE = 1e6
+"""[Hz] of samples and of controllers; current loops run at 4e4."""

@@ -153,7 +153,11 @@ def evil_recording(folder: Path) -> Path:
     names = [str(outside), f"file://{outside}", "../outside/secret.stl", "link.stl", "linked/secret.stl", "own.stl",
              "package://../outside/secret.stl", "package://x/../../outside/secret.stl", "/dev/zero"]  # fmt: skip
     meshes = [f'<mesh filename="{name}"/>' for name in names]
-    meshes += [f'<e:mesh xmlns:e="evil" e:filename="{outside}"/>', f'<mesh xmlns="evil" filename="{outside}"/>']
+    meshes += [
+        f"<mesh><filename>{outside}</filename></mesh>",
+        f'<e:mesh xmlns:e="evil" e:filename="{outside}"/>',
+        f'<mesh xmlns="evil" filename="{outside}"/>',
+    ]
     shapes = "".join(
         f'<{kind}><geometry>{mesh}</geometry><material name="m"><texture filename="{outside}"/></material></{kind}>'
         if kind == "visual" and mesh != meshes[5] else f"<{kind}><geometry>{mesh}</geometry></{kind}>"

@@ -268,7 +268,6 @@ GRASP = {"position": [0.0, 0.0, 0.0]}
             "fast",
             "key 'rate_hz': Input should be a valid number, unable to parse string as a number, received 'fast'",
         ),
-        ("rate_hz", 1e-6, "key 'rate_hz'"),
         ("rate_hz", 1e9, "key 'rate_hz'"),
         ("controler", {}, "key 'controler'"),
         ("gravity", [np.nan, 0.0, -9.81], "key 'gravity.0'"),

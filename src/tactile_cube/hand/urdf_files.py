@@ -83,6 +83,8 @@ def _require_parts(file: Path) -> list[Path]:
 def _make_absolute(element: ElementTree.Element, folder: Path, root: Path, where: str) -> None:
     """Of a shape all files that it names; of another element that which it names itself."""
     for part in element.iter() if _local(element.tag) in SHAPES else (element,):
+        if _local(part.tag) == "filename":  # as some readers have it
+            raise InputError(f"{where}: <filename> is an attribute; write filename=")
         for key, name in part.items():
             if _local(key) == "filename":
                 inside = name.startswith("package://")

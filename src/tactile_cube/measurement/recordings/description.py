@@ -12,7 +12,7 @@ Number = Annotated[float, Field(ge=-limits.NUMBER, le=limits.NUMBER, allow_inf_n
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Mass = Annotated[Positive, Field(le=limits.MASS)]
-Rate = Annotated[Positive, Field(ge=1, le=limits.RATE)]
+Rate = Annotated[Positive, Field(le=limits.RATE)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 PerJoint = float | list[float] | dict[str, float]
 
