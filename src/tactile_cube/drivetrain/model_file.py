@@ -21,6 +21,7 @@ OBJECT_EFFECTS = (
     "object_size",
 )
 """Effects of fingertips and object, which `simulation.contact_effects` describes; no joint has them."""
+NOT_NEGATIVE = ("kp", "kd", "torque_limit", "stiffness", "static_friction", "reflected_inertia")
 MAY_BE_INFINITE = ("stiffness", "torque_limit", "rate_limit")
 """Constants of a drive that need not end: a rigid one, one that is not limited."""
 
@@ -161,11 +162,9 @@ class ModelFile(_Strict):
         named = [(f"values.{key}.{joint}", one, key) for key, row in self.values.items() for joint, one in row.items()]
         named += [(f"offsets.{joint}", one, "offsets") for joint, one in self.offsets.items()]
         for where, one, key in named:
-            if not (one.finite or key in MAY_BE_INFINITE) or (key != "offsets" and one.value < 0.0):
+            if not (one.finite or key in MAY_BE_INFINITE) or (key in NOT_NEGATIVE and one.value < 0.0):
                 numbers = f"{one.value:g} in [{one.low:g}, {one.high:g}]"
-                raise ValueError(
-                    f"{where} is {numbers}; give finite numbers{'' if key == 'offsets' else ', 0 or more'}"
-                )
+                raise ValueError(f"{where} is {numbers}; give finite numbers{', 0 or more' * (key in NOT_NEGATIVE)}")
         return self
 
     @model_validator(mode="after")

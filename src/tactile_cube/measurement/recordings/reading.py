@@ -95,8 +95,9 @@ def _trial(table: Table, path: Path, entry: TrialEntry, description: Description
         warnings += check_assignment(columns, ranges, path) if entry.object is None else []
     columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, description.rate_hz)
-    stamps = columns.time[outlying] - columns.time[0]
-    valid &= ~(np.abs(grid.time[:, None] - stamps) * description.rate_hz < 1.0).any(axis=1)
+    stamps = (columns.time[outlying] - columns.time[0]) * description.rate_hz
+    beside = np.concatenate([np.floor(stamps), np.ceil(stamps)]).astype(np.int64)
+    valid[np.minimum(beside, len(valid) - 1)] = False
     return Trial(
         path.stem,
         entry.file,
