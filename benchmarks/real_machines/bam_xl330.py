@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import ControllerChange, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.source import described
+from tactile_cube.npz_file import read_npz
 
 MASS, LENGTH = 0.49, 0.10  # [kg], [m] of the pendulum
 STALL_TORQUE = (
@@ -37,7 +37,7 @@ class BamXl330:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """Gains 100, 400 and 800 to identify with; gain 200 is held out."""
-        archive = open_archive(Path(self.file))
+        archive = read_npz(Path(self.file))
         columns = [str(name) for name in archive.pop("columns")]
         urdf = single_joint_urdf("xl330", "servo", MASS, LENGTH)
         parts: dict[str, list[TrialTable]] = {"": [], "validation": []}

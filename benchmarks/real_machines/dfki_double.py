@@ -10,9 +10,9 @@ import numpy as np
 
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.foreign_log import cut
 from tactile_cube.measurement.sources.source import described
+from tactile_cube.npz_file import read_npz
 
 RATE = 500.0  # [Hz]
 MASSES, LENGTHS, CENTRES = (0.5235, 0.6256), (0.2, 0.3), (0.2, 0.2557)  # [kg], [m], [m]
@@ -69,7 +69,7 @@ class DfkiDouble:
         }
 
     def _trials(self, path: Path) -> list[TrialTable]:
-        archive = open_archive(path)
+        archive = read_npz(path)
         stamps = np.asarray(archive["time"], dtype=np.float64)
         time = np.arange(0.0, stamps[-1] - stamps[0], 1.0 / RATE)
         torque, position = (

@@ -11,9 +11,9 @@ import numpy as np
 from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.foreign_log import cut
 from tactile_cube.measurement.sources.source import described
+from tactile_cube.npz_file import read_npz
 
 MASS, LENGTH = 0.676, 0.45  # [kg], [m] of weight, rod and mounting together
 INERTIA = 0.0096  # [kg m^2] about their centre: 0.546 kg at 0.5 m beside a rod of 0.13 kg
@@ -45,7 +45,7 @@ class DfkiPendulum:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """Runs to identify with, a run held out, and under `heavier` a run with another weight than the one stated."""
-        archive = open_archive(Path(self.file))
+        archive = read_npz(Path(self.file))
         description = described(
             gravity=[0.0, 0.0, -9.81], rate_hz=RATE, joints=["pendulum"], controller={"mode": "torque"},
             nominal={"reflected_inertia": ROTOR}, sensors={"read": "before", "position_resolution": RESOLUTION},

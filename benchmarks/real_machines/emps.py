@@ -10,9 +10,9 @@ import numpy as np
 
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.foreign_log import cut
 from tactile_cube.measurement.sources.source import described
+from tactile_cube.npz_file import read_npz
 
 MASS = 95.11  # [kg] published
 RATE = 1000.0  # [Hz]
@@ -51,7 +51,7 @@ class Emps:
         }
 
     def _trial(self, name: str) -> TrialTable:
-        archive = open_archive(Path(self.folder) / f"emps_{name}.npz")
+        archive = read_npz(Path(self.folder) / f"emps_{name}.npz")
         force, position = (np.asarray(archive[key], dtype=np.float64)[:, None] for key in ("force_N", "position_m"))
         return TrialTable(
             TrialEntry(file=f"trials/{name}.parquet", kind=name), np.arange(len(force)) / RATE, force, position

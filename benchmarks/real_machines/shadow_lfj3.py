@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.source import described
+from tactile_cube.npz_file import read_npz
 
 EFFORT = 1e-3  # [N m] taken for one unit of effort: the true scale is unknown, all torques and inertias share it
 RATE = 1000.0  # [Hz]
@@ -35,7 +35,7 @@ class ShadowLfj3:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """Sweeps of 120 and 150 to identify with, of 180 and 100 held out, as in the data set's reference figures."""
-        archive = open_archive(Path(self.file))
+        archive = read_npz(Path(self.file))
         columns = [str(name) for name in archive.pop("columns")]
         description = described(
             gravity=[0.0, 0.0, 0.0], rate_hz=RATE, joints=["LFJ3"], controller={"mode": "torque"}, nominal=NOMINAL,

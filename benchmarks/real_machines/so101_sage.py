@@ -14,8 +14,8 @@ from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.source import described
+from tactile_cube.npz_file import read_npz
 
 Array = NDArray[np.float64]
 RATE = 50.0  # [Hz]
@@ -49,7 +49,7 @@ class So101Sage:
         """The first part of each motion, and under `validation` the rest."""
         parts: dict[str, list[TrialTable]] = {"": [], "validation": []}
         for motion in self.motions:
-            archive = open_archive(Path(self.folder) / f"{motion}.npz")
+            archive = read_npz(Path(self.folder) / f"{motion}.npz")
             time, command, position = self._signals(archive)
             length = _period(command) if motion == REPEATED else round(self.length * RATE)
             starts = list(range(0, len(time) - length + 1, length))

@@ -13,9 +13,9 @@ from scipy import signal
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.data_set import open_archive
 from tactile_cube.measurement.sources.foreign_log import cut
 from tactile_cube.measurement.sources.source import described
+from tactile_cube.npz_file import read_npz
 
 Array = NDArray[np.float64]
 LOGGED = 5000.0  # [Hz]
@@ -41,7 +41,7 @@ class Tx40:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """The first 60 % of the motion, and under `validation` the rest."""
-        archive = open_archive(Path(self.folder) / "tx40.npz")
+        archive = read_npz(Path(self.folder) / "tx40.npz")
         motor = smoothed(np.radians(archive["position_deg"]) * np.abs(np.diag(REDUCTION)))
         position = motor @ np.linalg.inv(REDUCTION).T
         torque = smoothed(archive["motor_current_signal"]) @ REDUCTION

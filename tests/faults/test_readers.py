@@ -11,6 +11,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import tactile_cube
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
@@ -18,9 +19,12 @@ from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.whole import write_whole
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
 from tactile_cube.measurement.sources.csv_files import CsvFiles
+from tactile_cube.measurement.sources.source import described
 from tactile_cube.training.checkpoint import Checkpoints
 from tactile_cube.training.settings import TrainingSettings
 from tests.faults.fuzz import strike
@@ -129,6 +133,80 @@ def test_any_chain_of_links_is_read_with_its_masses(masses: list[float], length:
     tree = RigidBodyTree.from_urdf(f'<robot name="r"><link name="base"/>{"".join(links + joints)}</robot>')
     assert np.allclose(tree.mass, masses)
     assert tree.joint_names == tuple(f"j{k}" for k in range(len(masses)))
+
+
+SECRET = "".join(map("{:02x}".format, Random(1).randbytes(200)))
+"""What stands in a file outside of the recording; no compression hides its letters."""
+
+
+def evil_recording(folder: Path) -> Path:
+    """A short recording whose URDF names a file outside of its folder in every way, and one mesh of its own."""
+    own, outside = folder / "evil", folder / "outside" / "secret.stl"
+    outside.parent.mkdir()
+    outside.write_text(SECRET)
+    write(own, lambda data: data["trials"].append({"file": "first.parquet", "initialisation": 1, "kind": "sines"}))
+    for file in own.glob("*.parquet"):
+        polars.read_parquet(file)[:120].write_parquet(file)
+    (own / "own.stl").write_text(SECRET[::-1])
+    (own / "link.stl").symlink_to(outside)
+    (own / "linked").symlink_to(outside.parent)
+    names = [str(outside), f"file://{outside}", "../outside/secret.stl", "link.stl", "linked/secret.stl", "own.stl",
+             "package://../outside/secret.stl", "package://x/../../outside/secret.stl", "/dev/zero"]  # fmt: skip
+    meshes = [f'<mesh filename="{name}"/>' for name in names]
+    meshes += [
+        f"<mesh><filename>{outside}</filename></mesh>",
+        f'<e:mesh xmlns:e="evil" e:filename="{outside}"/>',
+        f'<mesh xmlns="evil" filename="{outside}"/>',
+    ]
+    shapes = "".join(
+        f'<{kind}><geometry>{mesh}</geometry><material name="m"><texture filename="{outside}"/></material></{kind}>'
+        if kind == "visual" and mesh != meshes[5] else f"<{kind}><geometry>{mesh}</geometry></{kind}>"
+        for mesh in meshes for kind in ("visual", "collision")
+    )  # fmt: skip
+    material = f'<material name="m"><texture filename="{outside}"/></material>'
+    urdf = URDF.replace('<link name="base"/>', f'{material}<link name="base">{shapes}</link>')
+    (own / "rig.urdf").write_text(f'<!DOCTYPE robot [<!ENTITY f "{outside}">]>{urdf}')
+    return own
+
+
+def test_no_command_puts_what_lies_outside_of_a_recording_into_its_files(tmp_path: Path) -> None:
+    evil, settings = evil_recording(tmp_path), {"say": lambda line: None}
+    model = tmp_path / "identify" / "model.yaml"
+    tactile_cube.compare(evil, "band.simulations=0", **settings).write(tmp_path / "compare")
+    tactile_cube.identify(evil, ["torque_bias@b"], "engine=fast", **settings).write(model.parent)
+    tactile_cube.monitor(evil, model, **settings).write(tmp_path / "monitor")
+    nothing_missing = ["criteria.floor=1e8", "criteria.adequate=1e9"]
+    tactile_cube.diagnose(evil, "engine=fast", *nothing_missing, **settings).write(tmp_path / "diagnose")
+    polars.read_parquet(evil / "first.parquet").write_csv(tmp_path / "log.csv")
+    source = CsvFiles(files=[str(tmp_path / "log.csv")], urdf=str(evil / "rig.urdf"), controller=GAINS)
+    write_whole(tmp_path / "record", source.recordings(0))
+    for command in ("compare", "identify", "monitor", "diagnose", "record"):
+        written = [file for file in (tmp_path / command).rglob("*") if file.is_file()]
+        assert written
+        for file in written:
+            assert SECRET[:40].encode() not in file.read_bytes(), file
+    assert SECRET[::-1][:40].encode() in (tmp_path / "compare" / "comparison.rrd").read_bytes()  # its own mesh is drawn
+    assert any("are not drawn" in line for line in read_recording(evil).warnings)
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose", "monitor", "evaluate", "train"])
+def test_no_command_imports_what_a_model_names(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "stranger.py").write_text("raise SystemExit('imported')")
+    model = ModelFile(joints=["a", "b"], effects=[EffectEstimate(effect="stranger.Drag@a")], errors={"over_noise": 1.0})
+    write_model(model, tmp_path / "model.yaml")
+    first = {"evaluate": ["hold"], "train": ["+experiment=smoke"]}.get(command, [str(write(tmp_path / "r"))])
+    with pytest.raises(InputError, match="stranger"):
+        getattr(tactile_cube, command)(*first, model=tmp_path / "model.yaml")
+
+
+def test_an_imported_log_names_no_file_outside_of_the_recording(tmp_path: Path) -> None:
+    made = RecordingTables(described(gravity=[0, 0, -9.81], rate_hz=100, joints=["a"], controller=GAINS), URDF, [
+        TrialTable(TrialEntry(file="trials/../../owned.parquet"), *(np.zeros((30, 1)),) * 3)
+    ])  # fmt: skip
+    with pytest.raises(InputError, match="lies outside of"):
+        write_recording(tmp_path / "made", made)
+    assert list(tmp_path.iterdir()) == []
 
 
 @few

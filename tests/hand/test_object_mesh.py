@@ -1,5 +1,6 @@
 """A mesh as object: its size, mass and inertia, where fingertips stand, and what is refused."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,7 @@ def test_an_open_mesh_is_refused(tmp_path: Path) -> None:
     [
         ("gone.obj", None, "no such file; a relative name is looked for in"),
         ("object.step", "ISO-10303-21;", r"ending '\.step' is unknown; give a mesh as \.obj or \.stl"),
+        ("pipe.stl", None, "is a pipe; a regular file is needed here"),
         ("broken.obj", "v 0 0 zero\n", "no mesh could be read from it"),
         ("empty.stl", "", "no mesh could be read from it"),
         ("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "no mesh could be read from it"),
@@ -95,6 +97,8 @@ def test_an_open_mesh_is_refused(tmp_path: Path) -> None:
 def test_what_is_no_mesh_is_refused_in_one_line(name: str, content: str | None, message: str, tmp_path: Path) -> None:
     if content is not None:
         (tmp_path / name).write_text(content)
+    if name == "pipe.stl":
+        os.mkfifo(tmp_path / name)
     with pytest.raises(InputError, match=message) as error:
         read_mesh(tmp_path / name)
     assert "\n" not in str(error.value)

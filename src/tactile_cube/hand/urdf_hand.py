@@ -16,8 +16,10 @@ from tactile_cube.hand.hand import Array, FingerBase, Hand
 from tactile_cube.hand.kinematics import grasp_angles
 from tactile_cube.hand.shape import Shape
 from tactile_cube.hand.urdf import ROBOT_ROOT, origin_element, robot_element
+from tactile_cube.hand.urdf_files import package_of, with_own_files
 from tactile_cube.hand.urdf_finger import UrdfFinger, palm_shapes, read_finger
 from tactile_cube.hand.urdf_shapes import visual_elements
+from tactile_cube.untrusted_file import read_text
 
 DESCRIPTIONS = Path(__file__).parent / "descriptions"
 """URDFs that the package ships."""
@@ -181,11 +183,13 @@ def hand_from_urdf(
         InputError: what does not fit, by its key.
     """
     file = urdf_file(urdf)
-    text = file.read_text(encoding="utf-8")
+    text, left_out = with_own_files(read_text(file), file, package_of(file), ("collision",))
+    if left_out:
+        raise InputError(left_out[0])
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     if sha256 not in (None, digest):
         raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
-    chains, bases = _fingers(fingers, text, file.parent)
+    chains, bases = _fingers(fingers, text)
     own = sorted({chains[0].columns.index(column) for column in chains[0].columns})
     limits = np.concatenate([chain.limits[own] for chain in chains])
     lower, upper = _action_limits(action, limits, len(chains))
@@ -202,7 +206,7 @@ def hand_from_urdf(
         drive={key: np.asarray(value) if np.ndim(value) else float(value) for key, value in (drive or {}).items()},  # type: ignore[arg-type]
         label=name,
         chains=chains,
-        palm=tuple(palm_shapes(text, moving, file.parent)),
+        palm=tuple(palm_shapes(text, moving)),
         radius=float(tip_radius),
         file=file.name,
         sha256=digest,
@@ -216,18 +220,18 @@ def urdf_file(urdf: str) -> Path:
     Raises:
         InputError: there is none.
     """
-    file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.is_file()), None)
+    file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.exists()), None)
     if file is None:
         raise InputError(f"hand.urdf={urdf}: no such file, nor one of the package's in {DESCRIPTIONS.name}/")
     return file
 
 
 def _fingers(
-    fingers: Mapping[str, Mapping[str, Any]], text: str, folder: Path
+    fingers: Mapping[str, Mapping[str, Any]], text: str
 ) -> tuple[tuple[UrdfFinger, ...], tuple[FingerBase, ...]]:
     if not fingers:
         raise InputError("hand.fingers is empty; describe at least one finger")
-    chains, bases = zip(*(_finger(str(key), one, text, folder) for key, one in fingers.items()), strict=True)
+    chains, bases = zip(*(_finger(str(key), one, text) for key, one in fingers.items()), strict=True)
     if len({(len(chain.joints), chain.columns) for chain in chains}) > 1:
         counts = ", ".join(f"{base.name} {len(chain.joints)}" for base, chain in zip(bases, chains, strict=True))
         raise InputError(
@@ -236,12 +240,12 @@ def _fingers(
     return chains, bases
 
 
-def _finger(name: str, one: Mapping[str, Any], text: str, folder: Path) -> tuple[UrdfFinger, FingerBase]:
+def _finger(name: str, one: Mapping[str, Any], text: str) -> tuple[UrdfFinger, FingerBase]:
     where = f"hand.fingers.{name}"
     for key in ("joints", "tip", "side"):
         if key not in one:
             raise InputError(f"{where}: lacks '{key}'; give joints, tip and side")
-    chain = read_finger(text, tuple(one["joints"]), str(one["tip"]), folder, where)
+    chain = read_finger(text, tuple(one["joints"]), str(one["tip"]), where)
     side = _vector(f"fingers.{name}.side", one["side"])
     length = float(np.linalg.norm(side[:2]))
     if length < 1e-9:

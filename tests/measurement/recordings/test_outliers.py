@@ -1,7 +1,9 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from tactile_cube.measurement.recordings import outliers
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import write
 
@@ -28,3 +30,13 @@ def test_steps_and_quick_turns_of_the_motion_are_no_outliers(tmp_path: Path) -> 
         columns["a.position"][:] = 0.3 * np.sign(np.sin(8.0 * time)) + 0.1 * np.abs(np.sin(30.0 * time))
 
     assert read_recording(write(tmp_path, spoil=jerky)).trials[0].valid.all()
+
+
+def test_readings_too_many_to_search_are_no_single_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def spoil(columns: dict[str, np.ndarray]) -> None:
+        columns["a.position"][list(ROWS)] += SIZE
+
+    monkeypatch.setattr(outliers, "MANY", 2)
+    assert read_recording(write(tmp_path, spoil=spoil)).trials[0].valid.all()

@@ -16,6 +16,7 @@ from tactile_cube.measurement.recordings.description import Controller, Descript
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
+from tactile_cube.untrusted_file import read_text
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,4 @@ def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[n
 def _urdf_text(urdf: str | Path) -> str:
     if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
         return urdf
-    try:
-        return Path(urdf).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"urdf={urdf}: cannot be read: {error.strerror}") from None
+    return read_text(Path(urdf))

@@ -17,7 +17,7 @@ BEYOND = {0.9: 8.0, 0.99: 5.0}
 Neighbours of outliers differ too, which the first quantile leaves out; it is zero where a coarse encoder rests.
 """
 SPIKE = 0.5  # of the difference from the cubic that a spike differs from the median too
-MOST = 0.01  # share of the readings; more are no single ones
+MOST, MANY = 0.01, 1000  # share and number of the readings; more are no single ones, and looking for them takes hours
 NEAR = 2  # rows on either side
 
 
@@ -47,16 +47,25 @@ def without_outliers(
 def _outliers(values: Array) -> tuple[NDArray[np.int64], Array]:
     """Rows of outliers, and the values with outliers replaced by the cubic through their neighbours."""
     limit = _limit(np.abs(values - _beside(values)[1]))
-    cleaned, found = values.copy(), np.zeros(len(values), dtype=bool)
-    while limit > 0.0 and np.count_nonzero(found) <= MOST * len(values):
-        median, cubic = _beside(cleaned)
-        far = np.abs(cleaned - cubic)
-        far[np.abs(cleaned - median) < SPIKE * far] = 0.0
+    cleaned, far, found = values.copy(), _far(values), set[int]()
+    while limit > 0.0 and len(found) <= min(MOST * len(values), MANY):
         row = int(np.argmax(far))
         if far[row] <= limit:
-            return np.flatnonzero(found), cleaned
-        cleaned[row], found[row] = cubic[row], True
+            return np.array(sorted(found), dtype=np.int64), cleaned
+        first, end = max(0, row - 2 * NEAR), row + 2 * NEAR + 1
+        cleaned[row] = _beside(cleaned[first:end])[1][row - first]
+        changed = slice(max(0, row - NEAR), row + NEAR + 1)
+        far[changed] = _far(cleaned[first:end])[changed.start - first : changed.stop - first]
+        found.add(row)
     return np.zeros(0, dtype=np.int64), values
+
+
+def _far(values: Array) -> Array:
+    """Difference of each reading from the cubic, 0 where it is near the median."""
+    median, cubic = _beside(values)
+    far = np.abs(values - cubic)
+    far[np.abs(values - median) < SPIKE * far] = 0.0
+    return far
 
 
 def _limit(differences: Array) -> float:
