@@ -11,14 +11,14 @@ from types import ModuleType
 
 import numpy as np
 
+from benchmarks.speed.peers import find_peer
+from benchmarks.speed.report import Figure, Section
+from benchmarks.speed.sb3_sac import learning_sac
+from benchmarks.speed.the_task import table_config, table_environment
+from benchmarks.speed.timing import Timing, in_turns
 from tactile_cube.agent.interface import Agent
 from tactile_cube.agent.sac import Sac
 from tactile_cube.agent.sac_fast import FastSac
-from tactile_cube.benchmarking.peers import find_peer
-from tactile_cube.benchmarking.report import Figure, Section
-from tactile_cube.benchmarking.sb3_sac import learning_sac
-from tactile_cube.benchmarking.the_task import table_config, table_environment
-from tactile_cube.benchmarking.timing import Timing, in_turns
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.training.build import build_run
 from tactile_cube.training.environment import Environment

@@ -9,15 +9,15 @@ from typing import Any
 
 import torch
 
+from benchmarks.speed.peers import find_peer
+from benchmarks.speed.products import multiplying, update_products
+from benchmarks.speed.report import Growth, Section, durations, rates
+from benchmarks.speed.sb3_sac import filled_sac
+from benchmarks.speed.timing import in_turns
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.interface import Agent
 from tactile_cube.agent.sac import Sac
 from tactile_cube.agent.sac_fast import FastSac
-from tactile_cube.benchmarking.peers import find_peer
-from tactile_cube.benchmarking.products import multiplying, update_products
-from tactile_cube.benchmarking.report import Growth, Section, durations, rates
-from tactile_cube.benchmarking.sb3_sac import filled_sac
-from tactile_cube.benchmarking.timing import in_turns
 from tactile_cube.training.heap import keep_freed_memory
 from tactile_cube.training.replay import Replay
 

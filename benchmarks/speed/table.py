@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_cube.benchmarking.report import Figure, Growth, Section
+from benchmarks.speed.report import Figure, Growth, Section
 
 
 def table(section: Section) -> str:

@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from tactile_cube.benchmarking.held_cube import Holding, creep, motion, our_world
-from tactile_cube.benchmarking.mujoco_hand import MujocoHand
-from tactile_cube.benchmarking.naive_pybullet import NaivePyBullet
+from benchmarks.speed.held_cube import Holding, creep, motion, our_world
+from benchmarks.speed.mujoco_hand import MujocoHand
+from benchmarks.speed.naive_pybullet import NaivePyBullet
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 
 

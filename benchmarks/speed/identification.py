@@ -11,10 +11,10 @@ from types import ModuleType
 
 import numpy as np
 
-from tactile_cube.benchmarking.command import run_and_watch
-from tactile_cube.benchmarking.mujoco_sysid import fit_finger
-from tactile_cube.benchmarking.peers import find_peer
-from tactile_cube.benchmarking.report import Figure, Section
+from benchmarks.speed.command import run_and_watch
+from benchmarks.speed.mujoco_sysid import fit_finger
+from benchmarks.speed.peers import find_peer
+from benchmarks.speed.report import Figure, Section
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.noise import sensor_noise

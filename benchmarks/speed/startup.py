@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactile_cube.benchmarking.command import Watched, run_and_watch
-from tactile_cube.benchmarking.report import Figure, Section
+from benchmarks.speed.command import Watched, run_and_watch
+from benchmarks.speed.report import Figure, Section
 
 COMMANDS = {
     "--help": (["tactile_cube.train", "--help"], 1.0),

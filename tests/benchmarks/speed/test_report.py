@@ -5,10 +5,10 @@ from pathlib import Path
 
 from PIL import Image
 
-from tactile_cube.benchmarking.picture import write_picture
-from tactile_cube.benchmarking.report import Figure, Growth, Section, durations, rates
-from tactile_cube.benchmarking.table import table
-from tactile_cube.benchmarking.timing import Timing
+from benchmarks.speed.picture import write_picture
+from benchmarks.speed.report import Figure, Growth, Section, durations, rates
+from benchmarks.speed.table import table
+from benchmarks.speed.timing import Timing
 
 TIMINGS = {"ours": Timing(cpu=[0.1, 0.2, 0.3]), "peer": Timing(cpu=[0.4, 0.4, 0.4])}
 

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from tactile_cube.benchmarking.peers import find_peer
+from benchmarks.speed.peers import find_peer
 
 
 def test_a_missing_peer_is_noted_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:

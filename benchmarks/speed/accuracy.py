@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactile_cube.benchmarking.report import Figure, Section
+from benchmarks.speed.report import Figure, Section
 from tactile_cube.simulation import SimulationOptions
 from tactile_cube.simulation.accuracy import REFERENCE, Accuracy, measure_accuracy
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from tactile_cube.benchmarking.report import Growth, Section
+from benchmarks.speed.report import Growth, Section
 
 COLUMNS = 2
 LABEL = 30

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from tactile_cube.benchmarking.timing import Timing
+from benchmarks.speed.timing import Timing
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Section:
     """A group of figures on the same work.
 
     Attributes:
-        name: as in `sections=[...]`.
+        name: as on the command line.
         title: the work in words.
         yardstick: name of the figure that ratios refer to, "" for none.
         figures: what was measured.

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from tactile_cube.benchmarking.timing import Timing, in_turns
+from benchmarks.speed.timing import Timing, in_turns
 
 
 def test_each_case_is_called_once_uncounted_and_then_in_every_round() -> None:

@@ -4,16 +4,15 @@ from functools import partial
 
 import pytest
 
-from tactile_cube.benchmarking.accuracy import accuracy
-from tactile_cube.benchmarking.collector import collector
-from tactile_cube.benchmarking.end_to_end import end_to_end
-from tactile_cube.benchmarking.environment import environment
-from tactile_cube.benchmarking.identification import identification
-from tactile_cube.benchmarking.report import Section
-from tactile_cube.benchmarking.sections import SECTIONS, check_sections
-from tactile_cube.benchmarking.startup import startup
-from tactile_cube.benchmarking.update import update
-from tactile_cube.errors import InputError
+from benchmarks.speed.__main__ import SECTIONS
+from benchmarks.speed.accuracy import accuracy
+from benchmarks.speed.collector import collector
+from benchmarks.speed.end_to_end import end_to_end
+from benchmarks.speed.environment import environment
+from benchmarks.speed.identification import identification
+from benchmarks.speed.report import Section
+from benchmarks.speed.startup import startup
+from benchmarks.speed.update import update
 from tactile_cube.simulation import SimulationOptions
 
 SMALL = {
@@ -39,10 +38,5 @@ def test_a_section_gives_positive_figures_with_quartiles_in_order(name: str) -> 
         assert min(growth.y) > 0.0
 
 
-def test_every_section_of_the_verb_is_tried_here() -> None:
+def test_every_section_is_tried_here() -> None:
     assert set(SMALL) == set(SECTIONS)
-
-
-def test_an_unknown_section_is_refused_with_the_choices() -> None:
-    with pytest.raises(InputError, match=r"sections=speed: no such section; choose among environment, accuracy"):
-        check_sections(["update", "speed"])

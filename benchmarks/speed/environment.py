@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tactile_cube.benchmarking.held_cube import Holding, creep, motion, our_world
-from tactile_cube.benchmarking.mujoco_hand import MujocoHand
-from tactile_cube.benchmarking.naive_pybullet import NaivePyBullet
-from tactile_cube.benchmarking.peers import find_peer
-from tactile_cube.benchmarking.report import Section, rates
-from tactile_cube.benchmarking.timing import in_turns
+from benchmarks.speed.held_cube import Holding, creep, motion, our_world
+from benchmarks.speed.mujoco_hand import MujocoHand
+from benchmarks.speed.naive_pybullet import NaivePyBullet
+from benchmarks.speed.peers import find_peer
+from benchmarks.speed.report import Section, rates
+from benchmarks.speed.timing import in_turns
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 
 YARDSTICK = "PyBullet, one body, a call a joint"
