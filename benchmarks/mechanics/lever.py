@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_cube.simulation.mechanics.case import Answer
-from tactile_cube.simulation.mechanics.pinch import (
+from benchmarks.mechanics.case import Answer
+from benchmarks.mechanics.pinch import (
     GRAVITY,
     ROUND_TIPS,
     box,

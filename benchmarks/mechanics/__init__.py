@@ -1,10 +1,10 @@
 """Cases of contact with an answer from mechanics: how far each engine is from it at each accuracy setting."""
 
-from tactile_cube.simulation.mechanics.case import Answer, Case
-from tactile_cube.simulation.mechanics.creep import creep
-from tactile_cube.simulation.mechanics.impact import impact
-from tactile_cube.simulation.mechanics.lever import slide_and_spin, twist
-from tactile_cube.simulation.mechanics.pendulum import pendulum
+from benchmarks.mechanics.case import Answer, Case
+from benchmarks.mechanics.creep import creep
+from benchmarks.mechanics.impact import impact
+from benchmarks.mechanics.lever import slide_and_spin, twist
+from benchmarks.mechanics.pendulum import pendulum
 
 CASES: dict[str, Case] = {
     "creep": creep,

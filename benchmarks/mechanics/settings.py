@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from tactile_cube.errors import InputError
+from benchmarks.mechanics.case import Answer, Case
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.mechanics import CASES
-from tactile_cube.simulation.mechanics.case import Answer, Case
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.world import World
 
@@ -31,22 +29,6 @@ class Setting:
     name: str
     answers: dict[str, Answer]
     cost: float
-
-
-def chosen(
-    engines: Sequence[str], accuracy: Sequence[str], cases: Sequence[str]
-) -> tuple[dict[str, SimulationOptions], dict[str, Case]]:
-    """Options by name of the setting, and the cases by name.
-
-    Raises:
-        InputError: An unknown accuracy, engine or case.
-    """
-    for key, names, known in (("accuracy", accuracy, ACCURACY), ("cases", cases, CASES)):
-        for name in names:
-            if name not in known:
-                raise InputError(f"{key}={name}: no such one; choose among {', '.join(known)}")
-    options = {f"{engine} {name}": ACCURACY[name](engine) for engine in engines for name in accuracy}  # type: ignore[arg-type]
-    return options, {name: CASES[name] for name in cases}
 
 
 def measure(options: dict[str, SimulationOptions], cases: dict[str, Case], say: Callable[[str], None]) -> list[Setting]:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.mechanics.case import Answer
 from tactile_cube.hand import DLR_HAND2, finger_urdf, grasp_angles, tip_positions
 from tactile_cube.hand.model import JOINTS_PER_FINGER
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.mechanics.case import Answer
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.world import World
 

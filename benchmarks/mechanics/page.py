@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactile_cube.simulation.mechanics.refinement import Refinement
-from tactile_cube.simulation.mechanics.settings import Setting
+from benchmarks.mechanics.refinement import Refinement
+from benchmarks.mechanics.settings import Setting
 
 _EXPLAINED = """What is expected follows from the normal forces that the simulation itself reports, so each figure
 judges the law of contact and not the squeeze. The slip is read off a growing weight, to some 3 %. The cases
-(`src/tactile_cube/simulation/mechanics/`):
+(`benchmarks/mechanics/`):
 
 - creep: the published hand holds the cube at full weight; dry friction holds it without any creep. The way is given.
 - twist: two tips pinch a box whose weight grows at a lever of 40 mm beside their axis, until it spins.

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from tactile_cube.errors import InputError
+from benchmarks.mechanics import CASES, Answer
+from benchmarks.mechanics.page import mechanics_page
+from benchmarks.mechanics.refinement import Outcome, Refinement, refined
+from benchmarks.mechanics.settings import Setting
 from tactile_cube.simulation import SimulationOptions
-from tactile_cube.simulation.mechanics import CASES, Answer
-from tactile_cube.simulation.mechanics.page import mechanics_page
-from tactile_cube.simulation.mechanics.refinement import Outcome, Refinement, refined
-from tactile_cube.simulation.mechanics.settings import Setting, chosen
 
 ENGINES = ("bullet", "mujoco")
 
@@ -28,13 +27,6 @@ def test_sliding_and_spinning_share_one_limit_surface_in_mujoco_but_not_in_bulle
     assert abs(CASES["slide_and_spin"](SimulationOptions.fast("mujoco")).deviation) < 0.05
     # bounded each on its own, a contact bears up to sqrt(2) as much
     assert 0.2 < CASES["slide_and_spin"](SimulationOptions.fast("bullet")).deviation < 0.42
-
-
-def test_unknown_names_are_refused_with_the_known_ones() -> None:
-    with pytest.raises(InputError, match="cases=spin: no such one; choose among creep, twist"):
-        chosen(["bullet"], ["fast"], ["spin"])
-    with pytest.raises(InputError, match="accuracy=best"):
-        chosen(["bullet"], ["best"], ["twist"])
 
 
 def test_the_page_has_a_column_for_each_setting_and_says_where_mechanics_says_zero() -> None:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-from tactile_cube.simulation.mechanics.case import Answer
-from tactile_cube.simulation.mechanics.pinch import GRAVITY, ROUND_TIPS, box, centre_of_mass, grip, pinch, roll_of
+from benchmarks.mechanics.case import Answer
+from benchmarks.mechanics.pinch import GRAVITY, ROUND_TIPS, box, centre_of_mass, grip, pinch, roll_of
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.world import World
 
