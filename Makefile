@@ -61,7 +61,7 @@ example: .venv/installed ## find a hidden effect in a hand and win the lost succ
 	$(BIN)/python examples/circle.py $(ARGS)
 
 benchmark: .venv/installed ## measure the speed of everything on this machine
-	$(BIN)/python -m tactile_cube.benchmark $(ARGS)
+	$(BIN)/python -m benchmarks.speed $(ARGS)
 
 docs: .venv/installed ## the documentation as a site in outputs/site
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 
 import tactile_cube
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording

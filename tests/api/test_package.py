@@ -56,6 +56,6 @@ def test_commands_are_words_of_the_package_too(tmp_path: Path) -> None:
 def test_a_word_that_is_no_command_ends_with_the_commands_there_are(tmp_path: Path) -> None:
     run = package("evalute", folder=tmp_path)
     assert run.returncode == 2
-    assert run.stderr.startswith("error: evalute: no such command; choose one of average, benchmark, compare")
+    assert run.stderr.startswith("error: evalute: no such command; choose one of average, compare, deploy")
     assert run.stderr.endswith("; did you mean evaluate?\n")
     assert run.stderr.count("\n") == 1

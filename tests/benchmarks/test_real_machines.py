@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+
 from benchmarks.real_machines.__main__ import KEY, MACHINES, judged
 from benchmarks.real_machines.bam_xl330 import BamXl330, stiffness
 from benchmarks.real_machines.dfki_double import DfkiDouble
@@ -13,7 +14,6 @@ from benchmarks.real_machines.emps import Emps
 from benchmarks.real_machines.shadow_lfj3 import ShadowLfj3
 from benchmarks.real_machines.so101_sage import So101Sage
 from benchmarks.real_machines.tx40 import Tx40
-
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import noise_floor

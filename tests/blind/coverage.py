@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from scipy import stats
 
 import tactile_cube
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig

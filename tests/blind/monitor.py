@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from scipy import stats
 
 import tactile_cube
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.api.monitoring import MonitorResult
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig

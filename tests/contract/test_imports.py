@@ -53,9 +53,9 @@ def is_there(module: str, name: str) -> bool:
     return file is not None and (at_the_top or name in names_in(file) or file_of(f"{module}.{name}") is not None)
 
 
-def test_whatever_any_file_of_the_package_imports_from_it_is_there() -> None:
+def test_whatever_package_and_benchmarks_import_from_the_package_is_there() -> None:
     wanted: dict[tuple[str, str], Path] = {}
-    for file in sorted((SOURCE / "tactile_cube").rglob("*.py")):
+    for file in sorted([*(SOURCE / "tactile_cube").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]):
         wanted |= dict.fromkeys(imports_of_the_package(file.read_text(encoding="utf-8")), file)
     assert ("tactile_cube.training.run", "POLICY") in wanted
     missing = [f"{wanted[one].relative_to(ROOT)}: {one[0]}.{one[1]}" for one in sorted(wanted) if not is_there(*one)]
