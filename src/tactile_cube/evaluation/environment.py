@@ -15,6 +15,8 @@ from tactile_cube.evaluation.policy_source import PolicySource
 from tactile_cube.transforms import EnvConfig
 
 GROUPS = ("task", "reward", "randomization", "start")
+UNCHOSEN = (None, "null")
+"""What stands for an option where a group is as in the policy's training."""
 PUBLISHED_SPINNING_FRICTION = 0.1
 """What policies were trained at [m] before files stated it: it was the only nominal value then."""
 PARTS = ("curriculum", "env", "randomization", "simulation", "transforms")
@@ -56,10 +58,12 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
         _set_hand_and_object(settings, config)
     if named:
         settings.model, settings.effects = config.model, config.effects or []
+    if config.protocol.worlds == "paper":
+        settings.randomization, settings.start = config.paper.randomization, config.paper.start
     for group in GROUPS:
         if group in config:
-            chosen = choices.get(group) not in (None, "null")
-            settings[group] = config[group] if chosen else OmegaConf.merge(settings[group], config[group])
+            own = choices.get(group) in UNCHOSEN
+            settings[group] = OmegaConf.merge(settings[group], config[group]) if own else config[group]
     settings = OmegaConf.merge(
         settings, config.get("env") or {}, {} if source.stack is None else {"stack": source.stack}
     )
@@ -71,6 +75,16 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
             "leave hand= out for the one it was trained on"
         )
     return made
+
+
+def worlds(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None]) -> dict[str, str]:
+    """Return which options draw worlds and starts; arguments as of `environment`."""
+    own = source.config and config.protocol.worlds == "training"
+    named = {}
+    for group in ("randomization", "start"):
+        unchosen = "as in training" if own else choices[f"{group}@paper.{group}"]
+        named[group] = str(unchosen if choices.get(group) in UNCHOSEN else choices[group])
+    return named
 
 
 def _made(settings: Any, label: str) -> EnvConfig:
