@@ -17,7 +17,7 @@ DIFFERENCES = {
     ),
     "Starts": (
         "In training the cube is turned by up to 43 degrees and the fingers are placed accordingly; the paper's runs "
-        "begin straight, and so do the protocol's. The row of the worlds of its training has those starts and its noise."
+        "begin straight, and so do those of `protocol=paper`. The row of the worlds of its training has the other starts."
     ),
     "Learning": (
         "Discount 0.95 (0.9, when fine-tuning 0.92), three-step returns (one-step), learning rate 1e-3 (not "
