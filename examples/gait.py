@@ -38,7 +38,7 @@ class Finger:
 
 
 def touching(episode: dict[str, NDArray[np.float64]]) -> NDArray[np.bool_]:
-    """Whether each finger touches the cube, with its tip or another link, after each policy step (steps + 1, fingers)."""
+    """Whether each finger, by tip or other link, touches the cube after each policy step, (steps + 1, fingers)."""
     touches = np.zeros((len(episode["theta"]), len(FINGERS)), dtype=bool)
     touches[episode["contacts.step"].astype(int), episode["contacts.finger"].astype(int)] = True
     return touches
