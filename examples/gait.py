@@ -38,7 +38,7 @@ class Finger:
 
 
 def touching(episode: dict[str, NDArray[np.float64]]) -> NDArray[np.bool_]:
-    """Whether each fingertip touches the cube after each policy step, (steps + 1, fingers)."""
+    """Whether each finger, by tip or other link, touches the cube after each policy step, (steps + 1, fingers)."""
     touches = np.zeros((len(episode["theta"]), len(FINGERS)), dtype=bool)
     touches[episode["contacts.step"].astype(int), episode["contacts.finger"].astype(int)] = True
     return touches
@@ -64,7 +64,7 @@ def main() -> None:
         with np.load(path, allow_pickle=False) as data:
             episode = {name: data[name] for name in ("time", "theta", "contacts.step", "contacts.finger")}
         counts = touching(episode)[episode["time"] >= FIRST].sum(axis=1)
-        shares = ", ".join(f"{k} tips {100 * np.mean(counts == k):.0f} %" for k in (4, 3, 2, 1, 0))
+        shares = ", ".join(f"{k} fingers {100 * np.mean(counts == k):.0f} %" for k in (4, 3, 2, 1, 0))
         print(f"{path}: {np.abs(episode['theta'][-1]):.1f} rad; on the cube: {shares}")
         for name, one in zip(FINGERS, gait(episode), strict=True):
             print(

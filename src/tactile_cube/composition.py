@@ -49,7 +49,10 @@ def refuse_unknown_keys(name: str, config: DictConfig) -> None:
     Raises:
         InputError: a key that is none of the command's and no group of conf/.
     """
-    known = {"hydra", *yaml.safe_load((CONFIG / f"{name}.yaml").read_text(encoding="utf-8"))}
+    own = yaml.safe_load((CONFIG / f"{name}.yaml").read_text(encoding="utf-8"))
+    groups = [key for entry in own.get("defaults", []) if isinstance(entry, dict) for key in entry]
+    placed = {key.partition("@")[2].partition(".")[0] for key in groups if "@" in key}
+    known = {"hydra", *own, *placed}
     for key in map(str, config.keys() - known):
         if not (CONFIG / key).is_dir():
             raise InputError(f"{key}: no such setting of {name}; --help lists them")

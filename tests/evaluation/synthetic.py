@@ -15,12 +15,13 @@ SPOTS = 0.04 * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1
 
 
 def contacts(touch: np.ndarray, spots: np.ndarray, force: float = 1.0, distance: float = -1e-4) -> ContactTable:
-    """Contacts for a mask `(n + 1, 4)` at places `(n + 1, 4, 3)`."""
+    """Contacts of fingertips for a mask `(n + 1, 4)` at places `(n + 1, 4, 3)`."""
     step, finger = np.nonzero(touch)
     position = spots[step, finger]
     inwards = -position / np.linalg.norm(position, axis=1, keepdims=True)
     forces = np.full(len(step), force)
-    return ContactTable(step, finger, position, force * inwards, forces, np.full(len(step), distance))
+    tips = np.ones(len(step), dtype=bool)
+    return ContactTable(step, finger, tips, position, force * inwards, forces, np.full(len(step), distance))
 
 
 def episode(

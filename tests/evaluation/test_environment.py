@@ -1,11 +1,13 @@
 import pytest
 from omegaconf import OmegaConf
 
+from tactile_cube.api.job import called_job
 from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed
-from tactile_cube.evaluation.environment import environment
+from tactile_cube.evaluation.environment import environment, worlds
 from tactile_cube.evaluation.policies import HoldPolicy
-from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.policy_source import PolicySource, find_policy
+from tactile_cube.randomization import StartStates
 
 EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))
 
@@ -16,3 +18,29 @@ def test_what_any_experiment_teaches_can_be_tried(experiment: str) -> None:
     made = environment(composed("evaluate", []), PolicySource(HoldPolicy(), experiment, config=trained), {})  # type: ignore[arg-type]
     assert made.task.name == trained["env"]["task"]["name"]  # type: ignore[index,call-overload]
     assert (made.curriculum, made.exploration) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("words", "drawn"),
+    [
+        (["protocol=paper"], {"randomization": "paper", "start": "paper"}),
+        (["protocol=many"], {"randomization": "paper", "start": "paper"}),
+        (["protocol=replay"], {"randomization": "paper", "start": "paper"}),
+        (["protocol=endurance", "randomization=none"], {"randomization": "none", "start": "paper"}),
+        (
+            ["protocol=paper", "protocol.worlds=training"],
+            {"randomization": "as in training", "start": "as in training"},
+        ),
+        (["protocol=standard", "start=wide_yaw"], {"randomization": "as in training", "start": "wide_yaw"}),
+    ],
+)
+def test_protocols_of_the_paper_draw_its_worlds_unless_others_are_named(
+    words: list[str], drawn: dict[str, str]
+) -> None:
+    job, policy = called_job("evaluate", tuple(words)), find_policy("published")
+    made = environment(job.config, policy, job.choices)
+    assert worlds(job.config, policy, job.choices) == drawn
+    noise = {"paper": 0.002, "none": 0.0, "as in training": 0.02}
+    assert made.randomization.sensor_noise == noise[drawn["randomization"]]
+    assert isinstance(made.start, StartStates)
+    assert made.start.poses == (1 if drawn["start"] == "paper" else 27)

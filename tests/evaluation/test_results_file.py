@@ -19,11 +19,16 @@ def test_results_come_back_with_every_episode(tmp_path: Path) -> None:
     results = [judge(episode(angle=angle), number) for number, angle in enumerate((5.0, 2.0))]
     variant = VariantResult(Variant(), results, summarise(results, 0.8), 0.8)
     protocol, source = Protocol("paper", success_share=0.8), PolicySource(HoldPolicy(), "hold")
-    run = Run(protocol, source, Task("full"), "mujoco", 4, "python -m x", 0.1)
+    run = Run(protocol, source, Task("full"), "mujoco", 4, "python -m x", 0.1, {"randomization": "wide"})
     write_results(tmp_path / "results.json", run, [variant])
     data = read_results(tmp_path / "results.json")
     assert (data["protocol"], data["policy"]["label"], data["seed"], data["engine"]) == ("paper", "hold", 4, "mujoco")
-    assert [row["success"] for row in data["variants"][0]["episodes"]] == [True, False]
+    assert data["worlds"] == {"randomization": "wide"}
+    rows = data["variants"][0]["episodes"]
+    assert [(row["kept"], row["success"], row["tip_support"]) for row in rows] == [
+        (True, True, 1.0),
+        (True, False, 1.0),
+    ]
     assert data["variants"][0]["summary"]["best_angle"] == pytest.approx(5.0)
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -15,9 +16,10 @@ from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.replay import NearlyEqualStart
 from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.scripted import ScriptedPolicy
-from tactile_cube.evaluation.variant import Pull
+from tactile_cube.evaluation.touch import TOUCH_FORCE, support
+from tactile_cube.evaluation.variant import Pull, Variant
 from tactile_cube.evaluation.verdict import Verdict
-from tactile_cube.hand import DLR_HAND2
+from tactile_cube.hand import DLR_HAND2, tip_positions
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.simulation import SimulationOptions
 from tactile_cube.transforms import EnvConfig, make_env
@@ -82,6 +84,26 @@ def test_contact_forces_of_a_held_cube_carry_its_weight(env: TransformedEnv) -> 
     np.testing.assert_allclose(total[:2], 0.0, atol=0.15)
 
 
+@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
+@pytest.mark.parametrize("by_tips", [True, False])
+def test_what_bears_the_cube_is_told_in_both_engines(engine: Literal["bullet", "mujoco"], by_tips: bool) -> None:
+    """Without weight: squeezed by the four tips, or pushed up by 2 N between open fingers, which links stop."""
+    task = Task("full", episode_steps=15, gravity_scale=0.0, height_range=0.2)
+    made = make_env(EnvConfig(task, simulation=SimulationOptions(engine)), 1, 0, evaluation=True)
+    policy = HoldPolicy() if by_tips else ReplayPolicy(DLR_HAND2.start_angles[None])
+    push = 0.0 if by_tips else 2.0
+    record = run_episode(
+        made, policy, 0, lambda env, step: env.world.push_cube(np.array([0.0, 0.0, push]), np.zeros(3))
+    )
+    made.close()
+    borne, table = support(record), record.contacts
+    assert (borne.tips >= 0.9, borne.links, borne.link_force) == (by_tips, float(not by_tips), float(not by_tips))
+    assert table.force[table.step == record.steps].sum(axis=0) == pytest.approx([0.0, 0.0, -push], abs=0.03)
+    centres = np.array([tip_positions(DLR_HAND2, q) for q in record.joint_position])[table.step, table.finger]
+    far = np.linalg.norm(table.position - centres, axis=1)[table.normal_force > TOUCH_FORCE]
+    assert far.max() < 0.015 if by_tips else far.min() > 0.03  # the sphere of a tip has a radius of 14.25 mm
+
+
 def test_replaying_an_undisturbed_episode_repeats_it() -> None:
     undisturbed = dataclasses.replace(CONFIG.randomization, sticky_probability=0.0)
     quiet = make_env(dataclasses.replace(CONFIG, randomization=undisturbed), 1, 0, evaluation=True)
@@ -129,6 +151,15 @@ def test_an_evaluation_judges_and_repeats_its_episodes() -> None:
     record = evaluation.record(nominal.variant, nominal.results[1])
     assert record.theta[-1] == nominal.results[1].final_angle
     assert record.steps == 10
+    assert nominal.unresolved == ""
+
+
+def test_worlds_beyond_what_the_solver_resolves_are_named_where_they_are_met() -> None:
+    slippery = Variant("slippery", constants={"tip_spinning_friction": 0.009})
+    published = Variant("published", constants={"tip_spinning_friction": 0.1})
+    protocol = Protocol("x", episodes=1, seconds=0.1, variants=(slippery, published))
+    found = Evaluation(CONFIG, HoldPolicy(), protocol, seed=1).run(lambda name, result: None)
+    assert ["0.1 m" in result.text for result in found] == [False, True]
 
 
 def test_the_nominal_spinning_friction_of_a_map_is_the_environments() -> None:

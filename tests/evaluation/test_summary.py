@@ -9,8 +9,9 @@ def results(*angles: float) -> list[EpisodeResult]:
     return [judge(episode(angle=angle), episode=number) for number, angle in enumerate(angles)]
 
 
-def test_success_is_a_share_of_the_best_run() -> None:
-    assert succeeded(results(15.0, 12.1, 11.9, 3.0), 0.8) == [True, True, False, False]
+def test_success_is_a_share_of_the_best_run_for_those_that_keep_the_cube() -> None:
+    lost = judge(episode(angle=14.0, ending="dropped"))
+    assert succeeded([*results(15.0, 12.1, 11.9, 3.0), lost], 0.8) == [True, True, False, False, False]
 
 
 def test_success_without_a_share_is_regrasping() -> None:
@@ -34,7 +35,16 @@ def test_summary_counts_and_averages() -> None:
     assert summary.mean_angle == pytest.approx(10.1 / 3)
     assert (summary.best_angle, summary.successes, summary.kept) == (pytest.approx(6.0), 2, 3)
     assert summary.verdicts["regrasping"] == 2
-    assert "2/3 successful" in sentence("nominal", summary)
+    assert (summary.tip_support, summary.link_contact, summary.link_force_share) == (1.0, 0.0, 0.0)
+
+
+def test_a_summary_says_kept_successful_and_angle_together_and_what_success_is() -> None:
+    text = sentence("nominal", summarise(results(4.0, 5.0, 0.1), 0.8))
+    assert (
+        "nominal: 3/3 kept, 2/3 successful (95 %: 21 to 94 %; kept to the end and turned at least 80 % as far" in text
+    )
+    assert "3.03 +- 2.11 rad (best 5.00)" in text
+    assert "three or more tips on the cube 100 % of the time, another link 0 %, with 0 % of the normal force" in text
 
 
 def test_a_row_names_what_happened() -> None:

@@ -61,4 +61,10 @@ def test_every_early_ending_loses_the_cube(ending: str) -> None:
 
 def test_a_result_is_plain_data() -> None:
     result = judge(episode(steps=10, touch=np.zeros((11, 4), dtype=bool)))
-    assert json.loads(json.dumps(result.as_dict()))["ending"] == "time_limit"
+    assert json.loads(json.dumps(result.as_dict()))["kept"] is True
+
+
+def test_the_cubes_height_is_that_of_the_last_part() -> None:
+    height = np.zeros((101, 3))
+    height[:, 2] = np.where(np.arange(101) < 60, 0.01, 0.03)
+    assert judge(episode(cube_position=height)).rise == pytest.approx(0.02)

@@ -38,17 +38,8 @@ class EvaluationResult:
 
     @property
     def text(self) -> str:
-        """A sentence for each condition, and in which of its worlds the object is lost most."""
-        from tactile_cube.evaluation.lost_worlds import lost_where
-        from tactile_cube.evaluation.summary import sentence
-
-        lines = []
-        for one in self.variants:
-            lines += [
-                sentence(one.variant.name, one.summary),
-                *(f"  {where.text}" for where in lost_where(one.results)),
-            ]
-        return "\n".join(lines)
+        """What came of each condition, in words."""
+        return "\n".join(one.text for one in self.variants)
 
     def episode(self, number: int, variant: int = 0) -> EpisodeRecord:
         """Every signal of an episode; it runs once more, equal to the bit."""
@@ -104,7 +95,7 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
     import torch
     from hydra.utils import instantiate
 
-    from tactile_cube.evaluation.environment import environment
+    from tactile_cube.evaluation.environment import environment, worlds
     from tactile_cube.evaluation.evaluation import Evaluation
     from tactile_cube.evaluation.policy_source import find_policy
     from tactile_cube.evaluation.results_file import Run
@@ -117,13 +108,14 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
     settings = environment(config, source, job.choices)
     evaluation = Evaluation(settings, source.policy, protocol, config.seed)
     task, engine = settings.task, settings.simulation.engine
-    for approximation in settings.approximations():
-        say(f"approximation: {approximation}")
+    drawn = worlds(config, source, job.choices)
     say(
         f"policy {source.label}, protocol {protocol.name}, seed {config.seed}, task {task.name}: "
-        f"T_s {task.filter_time:g} s, {100 * task.gravity_scale:.0f} % of the weight, engine {engine}\n{HEADER}"
+        f"T_s {task.filter_time:g} s, {100 * task.gravity_scale:.0f} % of the weight, engine {engine}\n"
+        f"worlds: {', '.join(f'{group} {choice}' for group, choice in drawn.items())}\n{HEADER}"
     )
     began = time.process_time()
     variants = evaluation.run(lambda name, result: say(row(result, name)))
     hours = (time.process_time() - began) / 3600
-    return EvaluationResult(Run(protocol, source, task, engine, config.seed, job.command, hours), variants, evaluation)
+    run = Run(protocol, source, task, engine, config.seed, job.command, hours, drawn)
+    return EvaluationResult(run, variants, evaluation)

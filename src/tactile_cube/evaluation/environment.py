@@ -38,6 +38,8 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
     settings: Any = _trained(config, source, choices, named)
     if named:
         settings.model, settings.effects = config.model, config.effects or []
+    if config.protocol.worlds == "paper":
+        settings.randomization, settings.start = config.paper.randomization, config.paper.start
     for group in GROUPS:
         if group in config:
             trained = {} if _chosen(group, choices) else settings.get(group) or {}
@@ -54,6 +56,16 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
             "leave hand= out for the one it was trained on"
         )
     return made
+
+
+def worlds(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None]) -> dict[str, str]:
+    """Return which options draw worlds and starts; arguments as of `environment`."""
+    own = source.config and config.protocol.worlds == "training"
+    named = {}
+    for group in ("randomization", "start"):
+        unchosen = "as in training" if own else choices[f"{group}@paper.{group}"]
+        named[group] = str(choices[group] if _chosen(group, choices) else unchosen)
+    return named
 
 
 def _trained(config: DictConfig, source: PolicySource, choices: Mapping[str, str | None], named: bool) -> DictConfig:

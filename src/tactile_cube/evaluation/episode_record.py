@@ -26,6 +26,7 @@ class ContactTable:
     Attributes:
         step: sample of the episode the row belongs to `(k,)`.
         finger: index into the record's `fingers` `(k,)`.
+        tip: whether it is the fingertip that touches, and no other link `(k,)`.
         position: where the finger touches the cube, world frame `(k, 3)` [m].
         force: contact force on the cube, friction included, world frame `(k, 3)` [N].
         normal_force: its part along the contact normal `(k,)` [N].
@@ -34,6 +35,7 @@ class ContactTable:
 
     step: NDArray[np.int64]
     finger: NDArray[np.int64]
+    tip: NDArray[np.bool_]
     position: Array
     force: Array
     normal_force: Array

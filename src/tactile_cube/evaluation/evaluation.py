@@ -15,10 +15,11 @@ from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.replay import NearlyEqualStart
 from tactile_cube.evaluation.rollout import Interference, run_episode
 from tactile_cube.evaluation.senses import NumbPolicy
-from tactile_cube.evaluation.summary import Summary, succeeded, summarise
+from tactile_cube.evaluation.summary import Summary, sentence, succeeded, summarise
 from tactile_cube.evaluation.variant import Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge
 from tactile_cube.hand import Hand
+from tactile_cube.simulation.resolution import unresolved_among
 from tactile_cube.transforms import EnvConfig, make_env
 
 Report = Callable[[str, EpisodeResult], None]
@@ -33,6 +34,8 @@ class VariantResult:
     results: list[EpisodeResult]
     summary: Summary
     success_share: float | None
+    unresolved: str = ""
+    """Which of its worlds the solver does not resolve; "" where it resolves all."""
 
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
@@ -44,7 +47,18 @@ class VariantResult:
             "summary": self.summary.as_dict(),
             "episodes": [{**row, "world": w, "success": f} for row, w, f in zip(rows, worlds, flags, strict=True)],
             "lost_where": [dataclasses.asdict(one) for one in lost_where(self.results)],
+            "unresolved": self.unresolved,
         }
+
+    @property
+    def text(self) -> str:
+        """The summary in words, which episodes did not succeed, where the object is lost, what is not resolved."""
+        flags = succeeded(self.results, self.success_share)
+        failed = [str(result.episode) for result, success in zip(self.results, flags, strict=True) if not success]
+        lines = [sentence(self.variant.name, self.summary)]
+        lines += [f"  not successful: {', '.join(failed)}"] if failed else []
+        lines += [f"  {where.text}" for where in lost_where(self.results)]
+        return "\n".join([*lines, *([f"  {self.unresolved}"] if self.unresolved else [])])
 
 
 SPINNING_FRICTION = "spinning friction [mm]"
@@ -120,8 +134,9 @@ class Evaluation:
         return self._variant_result(variant, replays)
 
     def _variant_result(self, variant: Variant, results: list[EpisodeResult]) -> VariantResult:
-        share = self.protocol.success_share
-        return VariantResult(variant, results, summarise(results, share), share)
+        share, options = self.protocol.success_share, variant.apply(self._config).simulation
+        frictions = [float(result.world["tip_spinning_friction"]) for result in results]
+        return VariantResult(variant, results, summarise(results, share), share, unresolved_among(frictions, options))
 
     def _closing(
         self, env: TransformedEnv, policy: Policy, seed: int, interference: Interference | None

@@ -16,9 +16,8 @@ DIFFERENCES = {
         "twisted fingers, and a penalty for dragging the cube aside ([air.yaml](../../conf/reward/air.yaml))."
     ),
     "Starts": (
-        "In training and in the protocol's episodes the cube is turned by up to 43 degrees and the fingers are "
-        "placed accordingly; the paper's begin straight. What that makes of the result stands in the row of the "
-        "published start."
+        "In training the cube is turned by up to 43 degrees and the fingers are placed accordingly. The paper's runs "
+        "begin straight, and so does `protocol=paper`; the row of the worlds of its training has the other starts."
     ),
     "Learning": (
         "Discount 0.95 (0.9, when fine-tuning 0.92), three-step returns (one-step), learning rate 1e-3 (not "

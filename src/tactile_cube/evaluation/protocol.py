@@ -18,8 +18,9 @@ class Protocol:
         name: label in tables and files.
         episodes: number of episodes per variant.
         seconds: time limit of an episode [s]; None: the task's own.
-        success_share: an episode succeeds when it reaches this share of the best episode's angle. Source: paper,
-            section IV: 80 %. None: when its verdict is regrasping.
+        worlds: whose randomisation and starts: of the policy's "training", or of the "paper".
+        success_share: an episode succeeds when it keeps the cube and reaches this share of the best episode's angle.
+            Source: paper, section IV: 80 %. None: when its verdict is regrasping.
         variants: conditions, each tried with the same seeds.
         nominal_values: where the nominal condition lies on the axes of the variants.
         catalogue: add a variant for each effect of the drivetrain's catalogue at its typical size.
@@ -31,6 +32,7 @@ class Protocol:
     name: str
     episodes: int = 20
     seconds: float | None = None
+    worlds: str = "training"
     success_share: float | None = None
     variants: Sequence[Variant] = field(default_factory=lambda: (Variant(),))
     nominal_values: Mapping[str, float] = field(default_factory=dict)
@@ -45,6 +47,8 @@ class Protocol:
             raise InputError(f"protocol.episodes is {self.episodes}; give at least 1")
         if self.seconds is not None and not self.seconds > 0:
             raise InputError(f"protocol.seconds is {self.seconds}; give a time above 0 s or null")
+        if self.worlds not in ("training", "paper"):
+            raise InputError(f"protocol.worlds is {self.worlds!r}; choose training or paper")
         if self.success_share is not None and not 0 < self.success_share <= 1:
             raise InputError(f"protocol.success_share is {self.success_share}; give a number in (0, 1] or null")
         if not self.variants:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -33,6 +34,7 @@ class Run:
         seed: of the evaluation.
         command: the words of the command line.
         cpu_hours: processor time it took [h].
+        worlds: which options draw them: "randomization" and "start".
     """
 
     protocol: Protocol
@@ -42,6 +44,7 @@ class Run:
     seed: int
     command: str
     cpu_hours: float
+    worlds: Mapping[str, str]
 
 
 def write_results(path: Path, run: Run, variants: list[VariantResult]) -> None:
@@ -55,6 +58,7 @@ def write_results(path: Path, run: Run, variants: list[VariantResult]) -> None:
         "policy": {"label": run.source.label, **run.source.provenance},
         "task": asdict(run.task),
         "engine": run.engine,
+        "worlds": dict(run.worlds),
         "seed": run.seed,
         "command": run.command,
         "cpu_hours": run.cpu_hours,

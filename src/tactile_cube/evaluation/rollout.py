@@ -57,8 +57,9 @@ class Recorder:
     def __init__(self, task: RotationEnv, joint_offset: Array) -> None:
         self._task, self._joint_offset = task, joint_offset
         self._fingers = tuple(finger.name for finger in task.hand.fingers)
+        self._tips = [task.hand.link_names(finger)[-1] for finger in range(len(self._fingers))]
         self._rows: dict[str, list[Array]] = {name: [] for name in WORLD_SIGNALS}
-        self._contacts: list[tuple[int, int, Array, Array, float, float]] = []
+        self._contacts: list[tuple[int, int, bool, Array, Array, float, float]] = []
         self._trace: list[dict[str, Array]] = []
         self._theta, self._reward = [0.0], list[float]()
         self._terms, self._targets = list[Array](), list[Array]()
@@ -121,15 +122,17 @@ class Recorder:
             if contact.other == "cube" and contact.finger in self._fingers:
                 force = contact.force * contact.normal + contact.friction
                 finger = self._fingers.index(contact.finger)
-                self._contacts.append((sample, finger, contact.position, force, contact.force, contact.distance))
+                tip = contact.link == self._tips[finger]
+                self._contacts.append((sample, finger, tip, contact.position, force, contact.force, contact.distance))
 
     def _contact_table(self) -> ContactTable:
-        step, finger, position, force, normal, distance = (
-            zip(*self._contacts, strict=True) if self._contacts else ((),) * 6
+        step, finger, tip, position, force, normal, distance = (
+            zip(*self._contacts, strict=True) if self._contacts else ((),) * 7
         )
         return ContactTable(
             step=np.array(step, dtype=np.int64),
             finger=np.array(finger, dtype=np.int64),
+            tip=np.array(tip, dtype=np.bool_),
             position=np.array(position, dtype=np.float64).reshape(-1, 3),
             force=np.array(force, dtype=np.float64).reshape(-1, 3),
             normal_force=np.array(normal, dtype=np.float64),

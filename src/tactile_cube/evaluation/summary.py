@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tactile_cube.evaluation.verdict import EpisodeResult, Verdict
+from tactile_cube.evaluation.verdict import REGRASP_ANGLE, EpisodeResult, Verdict
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,16 @@ class Summary:
         std_angle: its standard deviation over the episodes [rad].
         best_angle: largest final angle [rad].
         successes: episodes that succeeded.
+        success_means: what success is, in words.
         success_low: lower end of the 95 % interval of the success rate.
         success_high: upper end.
         kept: episodes that ended with the cube in the hand.
         rate: mean of final angle over duration [rad/s].
         finger_lifts: mean number of finger lifts an episode.
+        tip_support: mean share of the time in which three or more fingertips touch the cube.
+        link_contact: mean share of the time in which another link touches it.
+        link_force_share: mean share of these links in the fingers' normal force.
+        rise: mean height of the cube above its start, late in the episodes [m].
         reward_terms: mean over the episodes of each weighed term's sum.
         verdicts: how often each verdict was given.
         exploits: how often each exploit was found.
@@ -37,11 +42,16 @@ class Summary:
     std_angle: float
     best_angle: float
     successes: int
+    success_means: str
     success_low: float
     success_high: float
     kept: int
     rate: float
     finger_lifts: float
+    tip_support: float
+    link_contact: float
+    link_force_share: float
+    rise: float
     reward_terms: dict[str, float]
     verdicts: dict[str, int]
     exploits: dict[str, int]
@@ -62,11 +72,16 @@ def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> 
         std_angle=float(angles.std()),
         best_angle=float(angles.max()),
         successes=successes,
+        success_means=success_means(success_share),
         success_low=low,
         success_high=high,
         kept=sum(result.kept for result in results),
         rate=float(np.mean([result.final_angle / max(result.duration, 1e-9) for result in results])),
         finger_lifts=float(np.mean([sum(result.finger_lifts) for result in results])),
+        tip_support=float(np.mean([result.tip_support for result in results])),
+        link_contact=float(np.mean([result.link_contact for result in results])),
+        link_force_share=float(np.mean([result.link_force_share for result in results])),
+        rise=float(np.mean([result.rise for result in results])),
         reward_terms={
             name: float(np.mean([result.reward_terms[name] for result in results])) for name in results[0].reward_terms
         },
@@ -76,11 +91,18 @@ def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> 
 
 
 def succeeded(results: Sequence[EpisodeResult], success_share: float | None) -> list[bool]:
-    """Tell which episodes succeeded: the paper's share of the best one, or the verdict regrasping."""
+    """Return which episodes succeeded, as `success_means` says."""
     if success_share is None:
         return [result.verdict == Verdict.REGRASPING for result in results]
     best = max(result.final_angle for result in results)
-    return [best > 0 and result.final_angle >= success_share * best for result in results]
+    return [result.kept and best > 0 and result.final_angle >= success_share * best for result in results]
+
+
+def success_means(success_share: float | None) -> str:
+    """Return the definition of success in words: the paper's share of the best angle, or the verdict regrasping."""
+    if success_share is None:
+        return f"verdict regrasping: kept to the end, beyond {REGRASP_ANGLE:g} rad and still turning"
+    return f"kept to the end and turned at least {100 * success_share:g} % as far as the best episode"
 
 
 def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
@@ -96,7 +118,9 @@ def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float
 
 HEADER = (
     f"{'run':>4} {'angle':>8} {'late':>6} {'time':>7}  {'verdict':<17}{'ending':<12}{'lifts':>6}{'faces':>9}{'tilt':>7}"
-    "  exploits   (angle, and late: its part in the last 40 % [rad]; time [s]; tilt [deg])"
+    f"{'rise':>6}{'tips':>6}{'links':>7}{'force':>7}  exploits\n"
+    "(angle, and late: its part in the last 40 % [rad]; time [s]; tilt [deg]; rise: height above the start then [mm];\n"
+    "contacts at 10 Hz [%]: time with three or more tips on the cube, with another link on it, its part of the force)"
 )
 
 
@@ -104,18 +128,23 @@ def row(result: EpisodeResult, name: str = "nominal") -> str:
     """Return an episode as a line of text; the variant's name is added when it is not the nominal one."""
     faces = "/".join(str(count) for count in result.faces_visited)
     measured = f"{result.final_angle:8.2f} {result.late_angle:6.2f} {result.duration:7.1f}"
-    counted = f"{sum(result.finger_lifts):6d}{faces:>9}{math.degrees(result.max_tilt):7.1f}"
+    ending = "kept" if result.kept else result.ending
+    counted = f"{sum(result.finger_lifts):6d}{faces:>9}{math.degrees(result.max_tilt):7.1f}{1e3 * result.rise:6.1f}"
+    touched = f"{100 * result.tip_support:6.0f}{100 * result.link_contact:7.0f}{100 * result.link_force_share:7.0f}"
     remarks = f"{', '.join(result.exploits) or '-'}{'' if name == 'nominal' else f'   [{name}]'}"
-    return f"{result.episode:4d} {measured}  {result.verdict.value:<17}{result.ending:<12}{counted}  {remarks}"
+    return f"{result.episode:4d} {measured}  {result.verdict.value:<17}{ending:<12}{counted}{touched}  {remarks}"
 
 
 def sentence(name: str, summary: Summary) -> str:
-    """Return a summary in one line."""
+    """Return a summary: kept, successful and angle with what success means, then contacts, verdicts and reward."""
     verdicts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in summary.verdicts.items() if count)
     terms = ", ".join(f"{name} {value:.1f}" for name, value in summary.reward_terms.items() if value)
     return (
-        f"{name}: {summary.mean_angle:.2f} +- {summary.std_angle:.2f} rad (best {summary.best_angle:.2f}), "
-        f"{summary.successes}/{summary.episodes} successful (95 %: {100 * summary.success_low:.0f} to "
-        f"{100 * summary.success_high:.0f} %), {summary.kept} kept the cube, "
-        f"{summary.finger_lifts:.1f} finger lifts; {verdicts}; reward {sum(summary.reward_terms.values()):.0f}: {terms}"
+        f"{name}: {summary.kept}/{summary.episodes} kept, {summary.successes}/{summary.episodes} successful (95 %: "
+        f"{100 * summary.success_low:.0f} to {100 * summary.success_high:.0f} %; {summary.success_means}), "
+        f"{summary.mean_angle:.2f} +- {summary.std_angle:.2f} rad (best {summary.best_angle:.2f})\n"
+        f"  three or more tips on the cube {100 * summary.tip_support:.0f} % of the time, another link "
+        f"{100 * summary.link_contact:.0f} %, with {100 * summary.link_force_share:.0f} % of the normal force; the "
+        f"cube {1e3 * summary.rise:.0f} mm above its start late on; {summary.finger_lifts:.1f} finger lifts\n"
+        f"  {verdicts}; reward {sum(summary.reward_terms.values()):.0f}: {terms}"
     )

@@ -1,4 +1,4 @@
-"""Which finger touched which face of the cube, when it let go, and where it landed again."""
+"""Which finger touched which face of the cube, when it let go, where it landed again, and what bore the cube."""
 
 from __future__ import annotations
 
@@ -40,6 +40,39 @@ def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
     firm = table.normal_force > TOUCH_FORCE
     result[table.step[firm], table.finger[firm]] = True
     return result
+
+
+SUPPORTING_TIPS = 3
+"""Fingertips that must touch the cube for it to count as supported by tips."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """What bears the cube: samples at the ends of the policy steps, so at 10 Hz.
+
+    Attributes:
+        tips: share of the time in which `SUPPORTING_TIPS` fingertips or more touch it.
+        links: share of the time in which a link touches it that is no fingertip.
+        link_force: these links' share of all normal force of the fingers; 0 without any force.
+    """
+
+    tips: float
+    links: float
+    link_force: float
+
+
+def support(record: EpisodeRecord) -> Support:
+    """Sum up the contacts of an episode; a touch is more than `TOUCH_FORCE` from a finger's tip or its other links."""
+    table, fingers = record.contacts, len(record.fingers)
+    force = np.zeros((2, record.steps + 1, fingers))
+    np.add.at(force, (table.tip.astype(np.int64), table.step, table.finger), table.normal_force)
+    links, tips = force[:, 1:]  # without the start, where no force has acted yet
+    total = float(links.sum() + tips.sum())
+    return Support(
+        tips=float(((tips > TOUCH_FORCE).sum(axis=1) >= SUPPORTING_TIPS).mean()),
+        links=float((links > TOUCH_FORCE).any(axis=1).mean()),
+        link_force=float(links.sum()) / total if total > 0.0 else 0.0,
+    )
 
 
 def touched_faces(record: EpisodeRecord) -> NDArray[np.int64]:

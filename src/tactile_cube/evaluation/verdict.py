@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.exploits import exploits, tilt
-from tactile_cube.evaluation.touch import finger_history
+from tactile_cube.evaluation.touch import finger_history, support
 
 REGRASP_ANGLE = 2.0
 """Final angle beyond which four fingers that never let go cannot have turned the cube [rad].
@@ -62,6 +62,10 @@ class EpisodeResult:
         face_changes: how often each finger moved to another side face, ring to thumb.
         faces_visited: different side faces each finger has stood on, ring to thumb.
         max_tilt: largest tilt of the cube [rad].
+        rise: mean height of the cube above its start in the last `LATE_SHARE` of the episode [m].
+        tip_support: share of the time in which three or more fingertips touch the cube.
+        link_contact: share of the time in which another link touches it.
+        link_force_share: these links' share of the fingers' normal force.
         reward_terms: sum of each weighed term of the reward.
         exploits: names of physical exploits found; empty when the turning is honest.
         world: constants of its world, SI units, as `EpisodeRecord.constants` has them.
@@ -78,6 +82,10 @@ class EpisodeResult:
     face_changes: tuple[int, ...]
     faces_visited: tuple[int, ...]
     max_tilt: float
+    rise: float
+    tip_support: float
+    link_contact: float
+    link_force_share: float
     reward_terms: dict[str, float]
     exploits: tuple[str, ...]
     world: dict[str, float | str]
@@ -89,15 +97,16 @@ class EpisodeResult:
 
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
-        return asdict(self)
+        return {**asdict(self), "kept": self.kept}
 
 
 def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResult:
     """Reduce an episode to its row."""
     histories = [finger_history(record, finger) for finger in range(len(record.fingers))]
     angle = float(record.theta[-1] - record.theta[0])
-    late = float(record.theta[-1] - record.theta[round((1.0 - LATE_SHARE) * record.steps)])
-    changes = tuple(history.face_changes for history in histories)
+    begin = round((1.0 - LATE_SHARE) * record.steps)
+    late = float(record.theta[-1] - record.theta[begin])
+    changes, borne = tuple(history.face_changes for history in histories), support(record)
     return EpisodeResult(
         episode=episode,
         seed=seed,
@@ -110,6 +119,10 @@ def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResu
         face_changes=changes,
         faces_visited=tuple(len(set(history.faces)) for history in histories),
         max_tilt=float(np.max(tilt(record))),
+        rise=float(np.mean(record.cube_position[begin:, 2]) - record.cube_position[0, 2]),
+        tip_support=borne.tips,
+        link_contact=borne.links,
+        link_force_share=borne.link_force,
         reward_terms={name: float(np.sum(term)) for name, term in record.reward_terms.items()},
         exploits=tuple(exploits(record)),
         world=dict(record.constants),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tactile_cube.simulation.options import SimulationOptions
 
 RESOLVED = 0.05
@@ -25,3 +27,14 @@ def unresolved(spinning_friction: float, options: SimulationOptions) -> str:
         f"tip_spinning_friction of {spinning_friction:g} m: PyBullet with {options.solver_iterations} iterations of "
         f"{1e3 * options.dt:g} ms resolves up to {RESOLVED:g} m; beyond, finer steps turn and tilt a cube otherwise"
     )
+
+
+def unresolved_among(spinning_frictions: Sequence[float], options: SimulationOptions) -> str:
+    """What to know about worlds that were drawn, with the number of those it concerns; "" where it concerns none.
+
+    Args:
+        spinning_frictions: of the tips, one a world [m].
+        options: of the worlds.
+    """
+    beyond = [friction for friction in spinning_frictions if unresolved(friction, options)]
+    return f"{len(beyond)} of {len(spinning_frictions)} worlds: {unresolved(max(beyond), options)}" if beyond else ""
