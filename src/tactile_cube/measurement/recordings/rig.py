@@ -25,6 +25,8 @@ class RigJoint:
         upper: likewise.
         mimics: the joint that it follows.
         prismatic: it slides.
+        velocity: limit of its speed [rad/s] ([m/s]), inf where it has none.
+        effort: limit of its torque [N m] ([N]), likewise.
     """
 
     name: str
@@ -32,6 +34,8 @@ class RigJoint:
     upper: float
     mimics: str | None
     prismatic: bool = False
+    velocity: float = math.inf
+    effort: float = math.inf
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -107,7 +111,14 @@ def _joint(element: ElementTree.Element) -> RigJoint | None:
     if bounded and limit is not None:
         lower, upper = _number(limit, "lower", name, lower), _number(limit, "upper", name, upper)
     leader = mimic.get("joint") if mimic is not None else None
-    return RigJoint(name, lower, upper, leader, kind == "prismatic")
+    velocity, effort = (_strength(limit, key, name) for key in ("velocity", "effort"))
+    return RigJoint(name, lower, upper, leader, kind == "prismatic", velocity, effort)
+
+
+def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
+    """A limit of speed or torque; exporters write 0 where they know none."""
+    value = math.inf if limit is None else _number(limit, key, joint, math.inf)
+    return value if value > 0.0 else math.inf
 
 
 def _number(limit: ElementTree.Element, key: str, joint: str, default: float) -> float:
