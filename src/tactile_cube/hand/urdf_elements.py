@@ -64,7 +64,10 @@ class Body:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the URDF with the link it carries; `parent` and `link` are link names."""
+    """A joint of the URDF with the link it carries; `parent` and `link` are link names.
+
+    `velocity` [rad/s] and `effort` [N m] are its limits, inf where none is stated.
+    """
 
     name: str
     kind: str
@@ -74,6 +77,8 @@ class Joint:
     axis: Array
     lower: float
     upper: float
+    velocity: float
+    effort: float
     coupling: Coupling | None
     body: Body
 
@@ -101,9 +106,17 @@ def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
         axis=_axis(element, name),
         lower=number(limit, "lower", f"joint '{name}'", 0.0) if bounded else -np.inf,
         upper=number(limit, "upper", f"joint '{name}'", 0.0) if bounded else np.inf,
+        velocity=_strength(limit, "velocity", name),
+        effort=_strength(limit, "effort", name),
         coupling=_mimic(element, name),
         body=bodies[child],
     )
+
+
+def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
+    """A limit of speed or torque; exporters write 0 where they know none."""
+    value = number(limit, key, f"the limit of joint '{joint}'", 0.0)
+    return value if value > 0.0 else float("inf")
 
 
 def _mimic(element: ElementTree.Element, name: str) -> Coupling | None:

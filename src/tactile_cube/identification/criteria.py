@@ -30,6 +30,7 @@ class Criteria:
         stands_out: standard deviations by which it stands out of its scatter.
         few_segments: held-out segments below which a large gain may be unproven.
         alike: difference of two models' predictions below which they are one law in practice.
+        margin: part of a joint's limits (half its range, its speed, its torque) that a proposed command keeps free.
     """
 
     floor: float = 1.1
@@ -52,6 +53,7 @@ class Criteria:
     stands_out: float = 2.6
     few_segments: int = 60
     alike: float = 0.1
+    margin: float = 0.1
 
 
 STANDARD = Criteria()

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.identification.next_experiment import FILE, Experiment
+from tactile_cube.identification.experiment_in_words import next_steps
+from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
 
 OPENING = {
@@ -56,7 +57,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
         f"noise floor {milli(error['noise_floor'], unit)}."
     )
     if experiment is not None:
-        lines += next_steps(experiment)
+        lines += next_steps(experiment, units)
     return "\n".join(lines)
 
 
@@ -89,21 +90,6 @@ def left_over(result: Mapping[str, Any]) -> str:
 def sets_in_words(sets: Sequence[Sequence[str]]) -> str:
     """Sets of effects that explain a recording alike: `backlash@q1 and payload@q2, or elasticity@q1`."""
     return ", or ".join(" and ".join(names) for names in sets)
-
-
-def next_steps(experiment: Experiment) -> list[str]:
-    """What to play to decide, and between what nothing that can be played decides."""
-    lines = [
-        f"No command tried would tell {one} from {other}: the machine moves alike either way."
-        for one, other in experiment.inseparable
-    ]
-    if experiment.decides:
-        lines.append(
-            f"To decide, play {FILE} twice, add both trials and diagnose again: {experiment.name} of "
-            f"{experiment.time[-1]:.0f} s. Each should say {short(experiment.told, 2)} times as much against the wrong "
-            "one, however it is refitted, as it takes to drop it."
-        )
-    return lines
 
 
 def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:

@@ -26,6 +26,8 @@ class RigJoint:
         upper: likewise.
         mimics: the joint that it follows.
         prismatic: it slides.
+        velocity: limit of its speed [rad/s] ([m/s]), inf where it has none.
+        effort: limit of its torque [N m] ([N]), likewise.
     """
 
     name: str
@@ -33,6 +35,8 @@ class RigJoint:
     upper: float
     mimics: str | None
     prismatic: bool = False
+    velocity: float = math.inf
+    effort: float = math.inf
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -93,4 +97,4 @@ def parse_rig(text: str, path: Path) -> Rig:
 
 def _rig_joint(joint: Joint) -> RigJoint:
     leader = None if joint.coupling is None else joint.coupling.joint
-    return RigJoint(joint.name, joint.lower, joint.upper, leader, joint.prismatic)
+    return RigJoint(joint.name, joint.lower, joint.upper, leader, joint.prismatic, joint.velocity, joint.effort)
