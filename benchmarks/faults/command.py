@@ -10,13 +10,13 @@ from pathlib import Path
 
 import psutil
 
-from tests.faults.faulty_worlds import WISH
+from benchmarks.faults.faulty_worlds import WISH
 
-ENV = "env._target_=tests.faults.faulty_worlds.faulty_environment"
+ENV = "env._target_=benchmarks.faults.faulty_worlds.faulty_environment"
 SILENT = 45
 """Seconds after which silent workers count as stuck: on a machine at load 5, too."""
 SERVER = multiprocessing.get_context("forkserver")
-SERVER.set_forkserver_preload(["tests.faults.preloaded"])
+SERVER.set_forkserver_preload(["benchmarks.faults.preloaded"])
 
 
 @dataclass

@@ -12,6 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tactile_cube
+from benchmarks.faults.fuzz import strike
+from benchmarks.faults.readers import GAINS, READERS, Reader, state
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
@@ -27,8 +29,6 @@ from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.training.checkpoint import Checkpoints
 from tactile_cube.training.settings import TrainingSettings
-from tests.faults.fuzz import strike
-from tests.faults.readers import GAINS, READERS, Reader, state
 from tests.measurement.small_rig import URDF, Table, table, write
 
 few = settings(derandomize=True, max_examples=15, deadline=None, database=None)

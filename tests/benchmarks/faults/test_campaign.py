@@ -1,4 +1,4 @@
-"""A few faults of the campaign, on a run as short as it gets; `python -m tests.faults.campaign` strikes with all."""
+"""A few faults, on a run as short as it gets; `python -m benchmarks.faults.campaign` strikes with all kinds."""
 
 import ast
 import random
@@ -8,8 +8,8 @@ import pytest
 
 import tactile_cube.agent
 import tactile_cube.training
-from tests.faults.campaign import SHORT, damaged_checkpoints, results, same, strike, undisturbed
-from tests.faults.kinds import KINDS
+from benchmarks.faults.campaign import SHORT, damaged_checkpoints, results, same, strike, undisturbed
+from benchmarks.faults.kinds import KINDS
 
 
 @pytest.mark.timeout(900)

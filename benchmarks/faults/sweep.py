@@ -1,6 +1,6 @@
 """A sweep whose main process is killed in its second run: does the same command end it, with the same bits?
 
-    python -m tests.faults.sweep --out docs/results/reliability
+    python -m benchmarks.faults.sweep --out docs/results/reliability
 
 Runs of `+experiment=smoke` as short as the campaign's, four seeds one after the other. Writes sweep.md.
 """
@@ -14,9 +14,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from benchmarks.faults.campaign import SHORT, results, same
 from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.training.finished import FILE
-from tests.faults.campaign import SHORT, results, same
 
 SEEDS = 4
 STRUCK = 1
@@ -71,7 +71,7 @@ def page(place: Path) -> tuple[str, bool]:
             f"| {seed} | {before} | {'left in peace' if left else 'run'} | {'the same' if equal else 'other'} |"
         )
         sound = sound and equal and left == (seed in finished)
-    head = f"`python -m tests.faults.sweep`, commit {current_commit()}; status of the second call {status}"
+    head = f"`python -m benchmarks.faults.sweep`, commit {current_commit()}; status of the second call {status}"
     columns = "| seed | when the sweep was killed | by the same command | bits, beside an undisturbed sweep |"
     return "\n".join([head, "", columns, "| --- | --- | --- | --- |", *rows, ""]), sound
 

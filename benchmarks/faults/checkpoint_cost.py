@@ -1,4 +1,4 @@
-"""What a checkpoint of the default recipe costs: `python -m tests.faults.checkpoint_cost FOLDER`."""
+"""What a checkpoint of the default recipe costs: `python -m benchmarks.faults.checkpoint_cost FOLDER`."""
 
 import sys
 import time

@@ -2,7 +2,7 @@
 
 And is a batch done to the last one when a node is lost?
 
-    python -m tests.faults.ray_faults --out docs/results/reliability
+    python -m benchmarks.faults.ray_faults --out docs/results/reliability
 
 The run is a fifth of smoke's. Each fault strikes once it is an iteration past its second barrier. After it the same
 command is given until it ends by itself. Needs pip install '.[ray]'.
@@ -26,9 +26,9 @@ from typing import Any
 import psutil
 import torch
 
+from benchmarks.faults.campaign import SHORT, results
 from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.api.batch import each
-from tests.faults.campaign import SHORT, results
 
 SMOKE = ["+experiment=smoke", "collector.processes=2", "collector.timeout=60", *SHORT, "training.steps=600"]
 STRIKE_AT = 5
@@ -199,7 +199,7 @@ def table(rows: list[list[str]], batch: str = "") -> str:
     head = ["collector, fault", "load of two cores", "seconds from the fault (or start) to the end", "times replaced"]
     head += ["given again", "orphans", "digest of networks, optimisers, replay, metrics and policy"]
     lines = "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---"] * len(head), *rows])
-    return f"`python -m tests.faults.ray_faults`, commit {current_commit()}\n\n{lines}\n{batch}"
+    return f"`python -m benchmarks.faults.ray_faults`, commit {current_commit()}\n\n{lines}\n{batch}"
 
 
 def main() -> None:
@@ -210,7 +210,7 @@ def main() -> None:
     if "RAY_AUTH_TOKEN" not in os.environ:  # for the cluster of two nodes; Ray, which torchrl imports, reads it at once
         private = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
         environment = os.environ | private | {"RAY_AUTH_TOKEN": secrets.token_hex(32)}
-        os.execve(sys.executable, [sys.executable, "-m", "tests.faults.ray_faults", *sys.argv[1:]], environment)
+        os.execve(sys.executable, [sys.executable, "-m", "benchmarks.faults.ray_faults", *sys.argv[1:]], environment)
     place = Path(tempfile.mkdtemp())
     local = ["collector=ray"]
     trials: list[Callable[[], list[str]]] = [

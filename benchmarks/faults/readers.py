@@ -15,6 +15,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 from safetensors.numpy import load
 
+from benchmarks.faults.mutations import VALUES, damaged
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy, sealed
@@ -38,7 +39,6 @@ from tactile_cube.measurement.sources.ros_bag import RosBag
 from tactile_cube.training.checkpoint import FILE, HEAD, Checkpoints, require_same_settings
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 from tactile_cube.transforms import EnvConfig
-from tests.faults.mutations import VALUES, damaged
 from tests.measurement.small_rig import URDF, table, write
 from tests.measurement.sources.small_bag import write_bag
 
@@ -76,7 +76,7 @@ def _csv_recording(folder: Path) -> None:
     columns = polars.read_parquet(folder / "second.parquet")
     import numpy as np
 
-    np.savez(folder / "second.npz", **{name: columns[name].to_numpy() for name in columns.columns})
+    np.savez(folder / "second.npz", **{name: columns[name].to_numpy() for name in columns.columns})  # type: ignore[arg-type]
     (folder / "first.parquet").unlink()
     (folder / "second.parquet").unlink()
 

@@ -2,7 +2,7 @@
 
 A full disk is a limit on the size of files, which gives the process the same kind of error. A file that cannot be
 written is a folder in its place, which stops root too. A jump of the clock is not among them: training goes by the
-monotonic clock alone (tests/faults/test_campaign.py).
+monotonic clock alone (tests/benchmarks/faults/test_campaign.py).
 """
 
 import os
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import psutil
 
-from tests.faults.command import Command
+from benchmarks.faults.command import Command
 
 
 @dataclass(frozen=True)

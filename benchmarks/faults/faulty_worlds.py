@@ -18,7 +18,7 @@ WISH = "TACTILE_CUBE_TEST_WISH"
 """Environment variable that names the file; it holds "raise" or "nan"."""
 
 
-class Wish(Transform):
+class Wish(Transform):  # type: ignore[misc]
     """Grants the wish in the file and deletes it."""
 
     def __init__(self, path: Path):

@@ -1,6 +1,6 @@
 """Damaged files of every kind: is each read or refused in one line, soon, and nothing left half written?
 
-    python -m tests.faults.fuzz --inputs 10000 --seed 0 --out docs/results/reliability
+    python -m benchmarks.faults.fuzz --inputs 10000 --seed 0 --out docs/results/reliability
 
 Readers are called as the commands call them, in one process.
 """
@@ -23,9 +23,9 @@ from pathlib import Path
 from random import Random
 from types import FrameType
 
+from benchmarks.faults.readers import READERS, Reader
 from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.errors import InputError
-from tests.faults.readers import READERS, Reader
 
 LIMIT = 20.0
 """CPU seconds after which a reader counts as hung; sound examples take less than a tenth of one."""
@@ -157,7 +157,7 @@ def main() -> None:
     outcomes = campaign(given.inputs, given.seed)
     faults = [one for found in outcomes.values() for one in found if one.kind not in ("read", "refused")]
     page = (
-        f"`python -m tests.faults.fuzz --inputs {given.inputs} --seed {given.seed}`, commit {current_commit()}: "
+        f"`python -m benchmarks.faults.fuzz --inputs {given.inputs} --seed {given.seed}`, commit {current_commit()}: "
         f"{time.process_time() - began:.0f} s of CPU\n\n{table(outcomes)}\n"
     )
     print(page)

@@ -1,6 +1,6 @@
 """Faults of all kinds at random moments of `+experiment=smoke`: is anything lost, does anything hang or stay behind?
 
-    python -m tests.faults.campaign --faults 100 --seed 0 --out docs/results/reliability
+    python -m benchmarks.faults.campaign --faults 100 --seed 0 --out docs/results/reliability
 
 The run is as short as it can be with three barriers, two workers and learning from a replay; words at the end
 change it.
@@ -22,11 +22,11 @@ from typing import Any
 
 import torch
 
+from benchmarks.faults.command import Command, be_ready
+from benchmarks.faults.kinds import KINDS, Kind
 from tactile_cube.agent.policy_file import current_commit, load_policy
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import BEFORE, FILE, Checkpoints, load_checkpoint
-from tests.faults.command import Command, be_ready
-from tests.faults.kinds import KINDS, Kind
 
 SHORT = (
     "collector.worlds=4",
