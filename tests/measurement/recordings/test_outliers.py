@@ -32,9 +32,7 @@ def test_steps_and_quick_turns_of_the_motion_are_no_outliers(tmp_path: Path) -> 
     assert read_recording(write(tmp_path, spoil=jerky)).trials[0].valid.all()
 
 
-def test_readings_too_many_to_search_are_no_single_ones(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_readings_too_many_to_search_are_no_single_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def spoil(columns: dict[str, np.ndarray]) -> None:
         columns["a.position"][list(ROWS)] += SIZE
 
