@@ -109,6 +109,7 @@ def test_enter_on_the_terminal_confirms_but_not_what_was_typed_before(monkeypatc
     os.write(keyboard, b"\n")
     robot = FollowingRobot(HOME)
     robot.confirms = False
+    robot.in_read[700].append(lambda robot: os.write(keyboard, b"\x04"))  # Ctrl-D
     robot.in_read[1000].append(lambda robot: os.write(keyboard, b"\n"))
     lines: list[str] = []
     run(robot, opened=OPEN, say=lines.append)
@@ -131,6 +132,7 @@ def test_nothing_is_sent_before_measurements_agree_and_without_any_it_ends() -> 
     assert not robot.sent
     stopped = ControlLoop(Counting(HOME[None]), 0.2, LIMITS, RULES, QUICK, 1.0)
     stopped.stop("before the first measurement")
+    stopped.confirm_object()
     assert all(stopped.tick(1e-3 * tick, Reading(1e-3 * tick, HOME)) is None for tick in range(20))
     robot = FollowingRobot(HOME)
     run(robot)
@@ -249,6 +251,12 @@ def test_a_policy_that_gives_no_numbers_stops_the_hand(answer: np.ndarray) -> No
     np.testing.assert_allclose(robot.sent[-1].q_d, HOME, atol=1e-9)
 
 
+def test_an_answer_far_outside_the_range_is_forgotten_as_fast_as_any_other() -> None:
+    robot = FollowingRobot(HOME)
+    assert run(robot, np.array([HOME + 1e300, HOME]), seconds=1.5).reason == "time is over"
+    np.testing.assert_allclose(robot.sent[-1].q_d, HOME, atol=0.01)
+
+
 @pytest.mark.parametrize(
     "change",
     [lambda now: now - 3600.0, lambda now: np.nan, lambda now: np.inf, lambda now: now - 1e-3],
@@ -344,6 +352,18 @@ def test_a_signal_sends_the_hold_and_closes_and_the_run_is_kept(name: str) -> No
     assert ended.interrupted
     assert ended.homed
     assert signal.getsignal(signal.Signals[name]) is handler
+
+
+def test_the_second_signal_ends_a_policy_that_hangs_and_an_ignored_one_ends_nothing() -> None:
+    robot = FollowingRobot(HOME)
+    robot.in_read[RUNNING] += 2 * [lambda robot: os.kill(os.getpid(), signal.SIGINT)]
+    with pytest.raises(KeyboardInterrupt):
+        run(robot)
+    handler = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    robot = FollowingRobot(HOME)
+    robot.in_read[RUNNING].append(lambda robot: os.kill(os.getpid(), signal.SIGHUP))
+    assert run(robot).reason == "time is over"
+    signal.signal(signal.SIGHUP, handler)
 
 
 def test_a_robot_that_cannot_wait_any_more_gets_the_hold_once() -> None:

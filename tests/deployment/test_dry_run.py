@@ -1,6 +1,7 @@
 """The whole loop against the simulated hand: it turns the cube, its log is a recording, faults of the link stop it."""
 
-import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -49,13 +50,16 @@ def test_a_broken_link_stops_the_fingers_and_what_came_before_is_kept() -> None:
     assert "no measurement for" in done.runs[0].reason
 
 
-def test_a_signal_ends_all_runs() -> None:
-    def interrupt(line: str) -> None:
-        if line.startswith("running"):
-            signal.raise_signal(signal.SIGTERM)
-
-    done = tactile_cube.deploy(None, "runs=3", "homing.settle=0.1", say=interrupt)
-    assert [run.reason for run in done.runs] == ["interrupted by SIGTERM"]
+def test_a_signal_ends_all_runs_of_the_command_with_status_130(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "tactile_cube.deploy", "runs=3", "seconds=600", f"hydra.run.dir={tmp_path}"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as command:
+        assert command.stdout is not None
+        assert any(line.startswith("running: ") for line in command.stdout)
+        command.terminate()
+        said = command.stdout.read()
+    assert command.returncode == 130
+    assert said.startswith("stopped: interrupted by SIGTERM\nrun 0: interrupted by SIGTERM; cube turned")
+    assert "run 1" not in said
 
 
 @pytest.mark.parametrize("value", ["-1", ".nan", "inf"])

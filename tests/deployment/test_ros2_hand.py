@@ -152,7 +152,9 @@ def test_ctrl_c_publishes_the_hold_before_the_context_is_closed(node: Node) -> N
         if tick == 200:
             os.kill(os.getpid(), signal.SIGINT)
 
+    handler = signal.getsignal(signal.SIGINT)
     robot = Loopback(node, interrupt)
+    assert signal.getsignal(signal.SIGINT) is handler  # rclpy's own would close the context
     assert run(robot).reason == "interrupted by SIGINT"
     assert len(node.published) > 300
     assert not node.open

@@ -91,7 +91,6 @@ class Ros2Hand:
         if not self._waits:
             self._waits = True
             self._node.get_logger().info(f"wait for object: confirm with std_msgs/Empty on {self._confirm_topic}")
-        self._rclpy.spin_once(self._node, timeout_sec=0.0)
         return self._confirmed
 
     def release(self) -> None:

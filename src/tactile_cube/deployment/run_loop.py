@@ -91,7 +91,7 @@ def _until_stopped(loop: ControlLoop, robot: Robot, say: Say, run: LoopRun, sign
             _announce(loop, robot, say, ", then press Enter" if key.usable and not given else "")
         if given:
             loop.confirm_object()
-        if loop.mode is Mode.WAITING and not now - began <= NO_HAND:
+        if loop.mode is Mode.WAITING and now - began > NO_HAND:
             loop.stop(f"no measurement within {NO_HAND:g} s")
         if signals:
             loop.stop(f"interrupted by {signals[0]}")
