@@ -8,8 +8,8 @@ DEPTH = 50
 """Lists and mappings of a YAML file within each other; a recording has five."""
 TABLE = 1_000_000_000
 """Bytes of a table, an archive or a bag: `NUMBERS` as text."""
-NUMBERS = 50_000_000
-"""Numbers in a table, in an archive, and in all trials of a recording: 0.4 GB, 45 minutes of 12 joints at 500 Hz."""
+NUMBERS = 30_000_000
+"""Numbers in a table, in an archive, and in all trials of a recording: 27 minutes of 12 joints at 500 Hz, read in 1 GB."""
 COLUMNS = 4096
 """Columns of a table, arrays of an archive: 100 joints with 40 signals each."""
 LINE = 1_000_000

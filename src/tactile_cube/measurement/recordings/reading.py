@@ -25,7 +25,7 @@ from tactile_cube.measurement.recordings.plausibility import check_assignment, c
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.statics import swap_warning
-from tactile_cube.measurement.recordings.tables import Table, read_table
+from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.timing import check_time, on_grid
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.untrusted_file import below
@@ -73,9 +73,9 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
             f"{folder / DESCRIPTION}: key 'controller.kd': 0 for {joints_where(gains.kd == 0, joints)}: no damping"
         )
     for index, entry in enumerate(description.trials):
-        table = read_table(below(folder, entry.file, f"{folder / DESCRIPTION}: key 'trials.{index}.file'"), left)
-        left -= sum(column.size for column in table.values())
-        trial = _trial(table, folder / entry.file, entry, description, rig, f"trials.{index}.controller")
+        path = below(folder, entry.file, f"{folder / DESCRIPTION}: key 'trials.{index}.file'")
+        trial = _trial(path, left, entry, description, rig, f"trials.{index}.controller")
+        left -= trial.time.size + 3 * trial.position.size
         trials += without_excluded(trial, entry.exclude, f"{folder / DESCRIPTION}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
     if not trials:
@@ -83,11 +83,11 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
 
 
-def _trial(table: Table, path: Path, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
+def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
     """One trial, checked and on the uniform grid of the recording's rate."""
     joints = tuple(description.joints)
     gains = gains_of(description, entry, key)
-    columns, warnings = pick_columns(table, joints, path)
+    columns, warnings = pick_columns(read_table(path, most), joints, path)
     columns, time_warnings = check_time(columns, description.rate_hz, path)
     ranges = [rig.joints[joint] for joint in joints]
     if description.controller.mode == "position":

@@ -140,7 +140,7 @@ def _one_dimension(array: NDArray[np.generic], name: str, path: Path) -> NDArray
         raise InputError(
             f"{path}: column '{name}' is {array.ndim}-dimensional {array.dtype}, expected (samples,) numbers"
         )
-    return array.astype(np.float64)
+    return np.asarray(array, dtype=np.float64)
 
 
 def _numbers(frame: polars.DataFrame, path: Path) -> Table:
@@ -156,5 +156,5 @@ def _numbers(frame: polars.DataFrame, path: Path) -> Table:
             column = parsed
         if not (column.dtype.is_numeric() or column.dtype == polars.Null):
             raise InputError(f"{path}: column '{name}' holds {column.dtype}, expected numbers")
-        table[name] = column.cast(polars.Float64).fill_null(float("nan")).to_numpy().astype(np.float64)
+        table[name] = column.cast(polars.Float64).fill_null(float("nan")).to_numpy()
     return table
