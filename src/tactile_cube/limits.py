@@ -9,7 +9,7 @@ DEPTH = 50
 TABLE = 1_000_000_000
 """Bytes of a table, an archive or a bag: `NUMBERS` as text."""
 NUMBERS = 30_000_000
-"""Numbers in a table, in an archive, and in all trials of a recording: 27 minutes of 12 joints at 500 Hz, read in 1 GB."""
+"""Numbers in a table, an archive and all trials of a recording: 27 minutes of 12 joints at 500 Hz, read in 1 GB."""
 COLUMNS = 4096
 """Columns of a table, arrays of an archive: 100 joints with 40 signals each."""
 LINE = 1_000_000
