@@ -17,6 +17,7 @@ STATED = 'lower="-0.5" upper="0.5" effort="1" velocity="10"'
         (STATED, 3.0, ("URDF", "URDF", "URDF")),
         ('lower="-0.5" upper="0.5" effort="0" velocity="0"', float("inf"), ("URDF", "trials", "trials")),
         ('lower="0" upper="0" effort="1" velocity="0"', float("inf"), ("trials", "trials", "URDF")),
+        ('lower="-1e9" upper="1e9" effort="1e9" velocity="1e9"', 1.0, ("trials", "trials", "controller")),
     ],
 )
 def test_limits_are_those_that_are_stated_else_what_the_trials_reached(
@@ -33,7 +34,7 @@ def test_limits_are_those_that_are_stated_else_what_the_trials_reached(
     fastest = 0.3 * 2 * np.pi * 0.8
     assert limits.largest.speed[0] == (10.0 if sources[1] == "URDF" else pytest.approx(fastest, rel=0.05))
     asked = max(np.abs(3.0 * (trial.command - trial.position)[:, 0]).max() for trial in recording.trials)
-    assert limits.largest.torque[0] == pytest.approx({"controller": 0.8, "URDF": 1.0, "trials": asked}[sources[2]])
+    assert limits.largest.torque[0] == pytest.approx({"controller": torque, "URDF": 1.0, "trials": asked}[sources[2]])
 
 
 def envelope(low: float, high: float, speed: float, torque: float) -> Envelope:

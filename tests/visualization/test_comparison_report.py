@@ -212,7 +212,7 @@ def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison
     assert "multisine at 64 % of full size, 1 s" in text
     assert "stop beyond: position" in text
     assert "-0.9 to 0.9 rad (URDF)" in text
-    assert "Stop when a joint passes a number above" in text
+    assert "Stop when a joint goes beyond these limits" in text
     assert "actuator_lag@a" in text
     alike = (("command_delay@a", "actuator_lag@a"),)
     experiment = Experiment("multisine", ("a", "b"), time, wave, 0.1, "a", predictions, half_used(2), alike)

@@ -15,6 +15,7 @@ QUANTITIES = ("position", "speed", "torque")
 TRIALS = "trials"
 """Source of a limit that nobody states: no further, faster or harder than the trials already went."""
 ROUNDING = 1e-9
+FILLER = 1000.0  # times what the trials reached: a number that fills a field of a URDF, such as 1e9, and limits nothing
 
 
 @dataclass(frozen=True)
@@ -107,10 +108,10 @@ def limits_of(recording: Recording) -> Limits:
     )
     joints = [recording.rig.joints[joint] for joint in recording.joints]
     low, high = np.array([(joint.lower, joint.upper) for joint in joints]).T
-    speed = np.array([joint.velocity for joint in joints])
-    effort = np.array([joint.effort for joint in joints])
+    speed = _stated([joint.velocity for joint in joints], shown.speed)
+    effort = _stated([joint.effort for joint in joints], shown.torque)
     torque = np.minimum(np.where(recording.gains.torque_limit > 0.0, recording.gains.torque_limit, np.inf), effort)
-    bounded = np.isfinite(high - low) & (high > low)
+    bounded = np.array([joint.bounds == (joint.lower, joint.upper) for joint in joints]) & (high > low)
     largest = Envelope(
         np.where(bounded, low, shown.low),
         np.where(bounded, high, shown.high),
@@ -127,6 +128,11 @@ def limits_of(recording: Recording) -> Limits:
 
 def _asked(recording: Recording, command: Array, position: Array) -> Array:
     return command if recording.torque_controlled else np.asarray(recording.gains.kp * (command - position))
+
+
+def _stated(limits: list[float], shown: Array) -> Array:
+    """Limits (n,), infinite where a number only fills the field."""
+    return np.where(np.array(limits) < FILLER * shown, limits, np.inf)
 
 
 def _sources(chosen: NDArray[np.str_]) -> tuple[str, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tactile_cube.errors import InputError
+
 
 @dataclass(frozen=True)
 class Criteria:
@@ -54,6 +56,15 @@ class Criteria:
     few_segments: int = 60
     alike: float = 0.1
     margin: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuse a margin that would let a command leave the limits.
+
+        Raises:
+            InputError: it is no part of them.
+        """
+        if not 0.0 <= self.margin < 1.0:
+            raise InputError(f"criteria.margin={self.margin}: is no part of a limit; take 0 to below 1, such as 0.1")
 
 
 STANDARD = Criteria()

@@ -88,8 +88,8 @@ def _watch(experiment: Experiment, units: Mapping[str, str]) -> str:
         for joint, value in zip(experiment.joints, experiment.safety.starts[-1], strict=True)
     )
     return (
-        f"Begin at rest at {begin}. Watch all of it, a hand on the emergency stop. Stop when a joint passes a number "
-        "above, moves against its command or shakes: then none of these models is right."
+        f"Begin at rest at {begin}. Watch all of it, a hand on the emergency stop. Stop when a joint goes beyond "
+        "these limits, moves against its command or shakes: then none of these models is right."
     )
 
 
