@@ -1,23 +1,35 @@
 # `make` prints what there is to make. PYTHON names the interpreter that the environment is created with.
 PYTHON ?= python3
+# PyTorch's index of builds for the processor. The usual build brings CUDA, several GB and NVIDIA's licences.
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 BIN := .venv/bin
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: docs help train test check audit show example benchmark clean
+.PHONY: docs help torch train test check audit show example benchmark clean
 
 help: ## print these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 20
+	@echo "  needs Python 3.11 with venv (Debian: python3-venv), make and a C compiler (cc); see docs/install.md"
 	@echo "  ARGS=... adds words to the command, as in: make train ARGS='+experiment=table seed=1'"
 
 # The environment, made again only when what it holds has changed.
 .venv/installed: pyproject.toml requirements.txt
-	@echo "installing into .venv (a few minutes the first time)"
-	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@echo "installing into .venv: 0.8 GB to download, 3 GB on disk; a few minutes, the first time only"
+	@test -x $(BIN)/pip || $(PYTHON) -m venv .venv
+	@$(MAKE) --silent torch
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.txt --editable '.[dev,ros,onnx]'
 	@touch $@
 
-train: .venv/installed ## teach the hand; Ctrl-C saves, the same command goes on
+# Without a GPU torch comes from TORCH_INDEX, if that answers within 5 s; else pip takes what its own index has.
+torch:
+	@nvidia-smi -L > /dev/null 2>&1 || { \
+		$(BIN)/python -c "import signal, urllib.request as web; signal.alarm(5); web.urlopen('$(TORCH_INDEX)/torch/')" && \
+		$(BIN)/python -m pip install -qq --disable-pip-version-check --timeout 10 --retries 1 --no-deps \
+			--index-url $(TORCH_INDEX) "$$(grep ^torch== requirements.txt)"; \
+	} 2> /dev/null || echo "no torch from $(TORCH_INDEX): taking that of pip's own index, maybe with CUDA (several GB)"
+
+train: .venv/installed ## teach the hand; after Ctrl-C the same command goes on from the last checkpoint
 	$(BIN)/python -m tactile_cube.train $(ARGS)
 
 test: .venv/installed ## run the tests
@@ -49,12 +61,12 @@ example: .venv/installed ## find a hidden effect in a hand and win the lost succ
 	$(BIN)/python examples/circle.py $(ARGS)
 
 benchmark: .venv/installed ## measure the speed of everything on this machine
-	$(BIN)/python -m tactile_cube.benchmark $(ARGS)
+	$(BIN)/python -m benchmarks.speed $(ARGS)
 
 docs: .venv/installed ## the documentation as a site in outputs/site
 	$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'
 	$(BIN)/python docs/generate.py
-	$(BIN)/python -m mkdocs build --quiet
+	$(BIN)/python -m mkdocs build --quiet --strict
 
 clean: ## remove the environment and the caches, keep outputs/
 	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache build src/*.egg-info

@@ -6,31 +6,21 @@ python docs/generate.py --pictures # also docs/images/effects/*.png, each effect
 
 from __future__ import annotations
 
-import inspect
-import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 
+from tactile_cube.api.effects import COLUMNS, effects
 from tactile_cube.command_help import CONFIG, commands
-from tactile_cube.drivetrain.effects import Effect, catalogue
+from tactile_cube.drivetrain.effects import catalogue
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "images" / "effects"
 JOINT = "q2"
 ELSEWHERE = {"coupling_error": "q3"}
 """Effects whose picture is of another joint: q2 leads none."""
-STAGES = {
-    "COMMAND": "command",
-    "VELOCITY_SENSOR": "measured velocity",
-    "MOTOR_TORQUE": "motor torque",
-    "DEFLECTION": "transmission",
-    "POSITION_SENSOR": "position sensor",
-    "JOINT_TORQUE": "joint torque",
-    "FRICTION": "friction",
-    "MECHANISM": "mechanism",
-}
 
 
 def main() -> None:
@@ -54,35 +44,28 @@ def effects_page() -> str:
         "seen; grey is the command, scales differ. `python docs/generate.py --pictures` draws them anew.",
         "",
         "Name one as `NAME@JOINT` in `effects=[...]` of [identify](match.md), or a class of your own by its path",
-        "([own effect](own_effect.md)).",
+        "([own effect](own_effect.md)). `python -m tactile_cube.effects name=NAME` shows one in a terminal.",
         "",
         "| effect | acts on | in a line |",
         "|---|---|---|",
     ]
-    lines += [f"| [{name}](#{name}) | {_stage(kind)} | {_summary(kind)} |" for name, kind in catalogue().items()]
-    for name, kind in catalogue().items():
-        lines += ["", f"## {name}", "", _text(kind), ""]
-        lines += ["| parameter | unit | neutral | typical | range searched | source |", "|---|---|---|---|---|---|"]
-        for p in kind.parameters:
-            lines.append(
-                f"| {p.name} | {p.unit} | {p.neutral:g} | {p.typical:g} | {p.low:g} to {p.high:g} | {p.source} |"
-            )
-        if (PICTURES / f"{name}.png").is_file():
-            lines += ["", f"![signature of {name}](images/effects/{name}.png)"]
+    lines += [f"| [{one.name}](#{one.name}) | {one.acts_on} | {_cell(one.summary)} |" for one in effects()]
+    for one in effects():
+        lines += ["", f"## {one.name}", "", one.summary, "", one.law, "", *_table(COLUMNS, one.rows)]
+        for title, note in one.notes.items():
+            lines += ["", f"**{title}**: {note}"]
+        if (PICTURES / f"{one.name}.png").is_file():
+            lines += ["", f"![signature of {one.name}](images/effects/{one.name}.png)"]
     return "\n".join(lines) + "\n"
 
 
-def _stage(kind: type[Effect]) -> str:
-    return STAGES[kind.stage.name]
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    cells = [head, ["---"] * len(head), *rows]
+    return ["| " + " | ".join(map(_cell, row)) + " |" for row in cells]
 
 
-def _text(kind: type[Effect]) -> str:
-    text = inspect.getdoc(kind) or ""
-    return re.split(r"\n\s*\n?(?:Attributes|Example|Args|Source):", text)[0].strip()
-
-
-def _summary(kind: type[Effect]) -> str:
-    return " ".join(_text(kind).split("\n\n")[0].split()).replace("|", "\\|")
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def configuration_page() -> str:

@@ -1,25 +1,25 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
 Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
-`export`, `deploy`, `view` and `monitor`; `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give
-what they work on. Nothing slow is imported before it is used.
+`export`, `deploy`, `view`, `monitor` and `effects`; `make_env`, `load_policy`, `read_recording` and
+`recording_from_arrays` give what they work on. Nothing slow is imported before it is used.
 """
 
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import gymnasium
+
 from tactile_cube.errors import InputError
-from tactile_cube.registration_hook import register_with_gymnasium
 
 if TYPE_CHECKING:
     from tactile_cube.api.batch import diagnose_each
     from tactile_cube.api.comparison import compare
     from tactile_cube.api.deployment import deploy
     from tactile_cube.api.diagnosis import diagnose
+    from tactile_cube.api.effects import effects
     from tactile_cube.api.environment import env_config, make_env
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.api.export import export, load_policy
@@ -37,6 +37,7 @@ _PLACES = {
     "deploy": "api.deployment",
     "diagnose": "api.diagnosis",
     "diagnose_each": "api.batch",
+    "effects": "api.effects",
     "env_config": "api.environment",
     "make_env": "api.environment",
     "evaluate": "api.evaluation",
@@ -60,6 +61,7 @@ __all__ = [
     "deploy",
     "diagnose",
     "diagnose_each",
+    "effects",
     "env_config",
     "evaluate",
     "export",
@@ -84,14 +86,5 @@ def __getattr__(name: str) -> Any:
     return value
 
 
-class _Package(ModuleType):
-    """`tactile_cube.train` stays the function when the command line of that name, a module, is imported."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _PLACES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
-
-register_with_gymnasium()
+# Gymnasium 1 loads no entry points of other packages
+gymnasium.register(id="tactile_cube/Rotation-v0", entry_point="tactile_cube.registration:make_rotation")

@@ -5,12 +5,14 @@ from __future__ import annotations
 import runpy
 import sys
 
-from tactile_cube.cli import fail
+from tactile_cube.cli import fail, quiet_when_nobody_reads
 from tactile_cube.command_help import commands
+from tactile_cube.did_you_mean import suggestion
 
 USAGE_ERROR = 2
 
 
+@quiet_when_nobody_reads()
 def main() -> None:
     """Run the command that the first word names; without one, say which there are."""
     known = commands()
@@ -19,7 +21,7 @@ def main() -> None:
         print(usage(known))
         sys.exit(0 if words else USAGE_ERROR)
     if words[0] not in known:
-        fail(f"{words[0]}: no such command; choose one of {', '.join(known)}")
+        fail(f"{words[0]}: no such command; choose one of {', '.join(known)}{suggestion(words[0], known)}")
     sys.argv = [f"tactile_cube.{words[0]}", *words[1:]]
     runpy.run_module(f"tactile_cube.{words[0]}", run_name="__main__")
 

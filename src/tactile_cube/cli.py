@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from tactile_cube.command_help import CONFIG, RECIPE, help_text
 from tactile_cube.completion import install_script, prepare_query
+from tactile_cube.composition import refuse_unknown_keys
 from tactile_cube.console_log import console_kept_in
 from tactile_cube.did_you_mean import did_you_mean
 from tactile_cube.errors import InputError
-from tactile_cube.run_folder import USAGE_ERROR, configuration_in
-from tactile_cube.sweep import INTERRUPTED, Jobs
+from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 Kinds = type[BaseException] | tuple[type[BaseException], ...]
 UNEXPECTED = re.compile(r"(\w+)\.__init__\(\) got an unexpected keyword argument '(\w+)'.*full_key: ([\w.]+)")
 """How Hydra says that a class does not take a value."""
+PIPE_CLOSED = 141
+"""Exit status of a program that writes to a closed pipe, as shells count it: 128 + SIGPIPE."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NOT_AN_OPTION = Path("hydra", "_internal", "defaults_list.py")
 """Where Hydra fails at `task=1` (a ValueError) and `task=[1]` (a TypeError), with errors that are none of its own."""
@@ -50,6 +52,7 @@ def command(
 
     def decorate(function: Callable[["DictConfig"], None]) -> Callable[[], None]:
         @functools.wraps(function)
+        @quiet_when_nobody_reads()
         def main() -> None:
             if {"--help", "-h"} & set(sys.argv[1:]):
                 print(help_text(name))
@@ -65,6 +68,17 @@ def command(
         return main
 
     return decorate
+
+
+@contextlib.contextmanager
+def quiet_when_nobody_reads() -> Iterator[None]:
+    """End without a traceback when the reader of a pipe leaves, as in `--help | head`."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes once more when it ends
+        sys.exit(PIPE_CLOSED)
 
 
 def with_recipe(name: str, words: list[str]) -> list[str]:
@@ -83,6 +97,8 @@ def with_recipe(name: str, words: list[str]) -> list[str]:
 
 def _run(name: str, function: Callable[["DictConfig"], None], after_sweep: Callable[[list[Path]], None]) -> None:
     import hydra
+
+    from tactile_cube.sweep import Jobs  # imports Hydra
 
     wants_traceback = os.environ.get("HYDRA_FULL_ERROR", "0") != "0"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # else Hydra prints errors in its own way and exits with status 1
@@ -112,6 +128,7 @@ def _guarded(
     log = folder / f"{name}.log"
     configuration = configuration_in(folder, config, log.name)
     with configuration, console_kept_in(log), _errors_in_one_line(wants_traceback):
+        refuse_unknown_keys(name, config)
         function(config)
 
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import yaml
+
+from tactile_cube.command_help import CONFIG
+from tactile_cube.errors import InputError
+
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
@@ -25,8 +30,6 @@ def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False
     from hydra import compose, initialize_config_dir
     from hydra.core.global_hydra import GlobalHydra
 
-    from tactile_cube.command_help import CONFIG
-
     application = GlobalHydra.instance().hydra
     GlobalHydra.instance().hydra = None
     try:
@@ -34,3 +37,22 @@ def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False
             return compose(name, [*settings], return_hydra_config=with_hydra)
     finally:
         GlobalHydra.instance().hydra = application
+
+
+def refuse_unknown_keys(name: str, config: DictConfig) -> None:
+    """Refuse top-level keys that a command does not read: a mistyped `+experiment=` would start another run.
+
+    Args:
+        name: of the command.
+        config: as composed.
+
+    Raises:
+        InputError: a key that is none of the command's and no group of conf/.
+    """
+    own = yaml.safe_load((CONFIG / f"{name}.yaml").read_text(encoding="utf-8"))
+    groups = [key for entry in own.get("defaults", []) if isinstance(entry, dict) for key in entry]
+    placed = {key.partition("@")[2].partition(".")[0] for key in groups if "@" in key}
+    known = {"hydra", *own, *placed}
+    for key in map(str, config.keys() - known):
+        if not (CONFIG / key).is_dir():
+            raise InputError(f"{key}: no such setting of {name}; --help lists them")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from omegaconf import DictConfig
 
 from tactile_cube.cli import command
+from tactile_cube.run_folder import INTERRUPTED
 
 TOUCHED = (
     "fingers touched the object or one another, which this recording does not describe: compare counts that as error. "
@@ -14,8 +15,9 @@ TOUCHED = (
 
 @command("deploy")
 def main(config: DictConfig) -> None:
-    """Home the fingers, let the policy decide, stop; write the loop's log as a recording."""
+    """Open the fingers, wait for the object, let the policy decide, stop; write the loop's log as a recording."""
     import functools
+    import sys
 
     from tactile_cube.api.deployment import run_deployment
     from tactile_cube.api.job import typed_job
@@ -28,6 +30,8 @@ def main(config: DictConfig) -> None:
         print(f"log: {recording}\nnext: python -m tactile_cube.compare recording={recording}")
         if result.touched:
             print(TOUCHED)
+    if result.runs[-1].interrupted:
+        sys.exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

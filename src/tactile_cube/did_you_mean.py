@@ -1,8 +1,8 @@
-"""What a mistyped key or option of the command line may have meant."""
+"""What a mistyped name may have meant: a command, an option, a key, a policy, an effect or a joint."""
 
 import difflib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,25 @@ _OPTION = re.compile(r"Could not find '(?P<group>[\w/]+)/(?P<option>[^'/]+)'")
 _KEY = re.compile(r"Could not override '(?P<key>[^']+)'|^(?P<setting>[\w.]+): no such setting")
 
 
+def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
+    """Return the end of an error message: "; did you mean ...?", or nothing if no known name is near.
+
+    Args:
+        word: as the user wrote it.
+        known: names that there are.
+        prefix: what the user has to write before the name.
+
+    Example:
+        >>> suggestion("evalute", ["evaluate", "export"])
+        '; did you mean evaluate?'
+    """
+    names = [*known]
+    near = difflib.get_close_matches(word, names, 1, 0.75) or [name for name in names if word and word in name]
+    return f"; did you mean {prefix}{near[0]}?" if near else ""
+
+
 def did_you_mean(message: str, tree: Path) -> str:
-    """The end of an error message: "; did you mean ...?", or nothing.
+    """Return the suggestion for an error of the configuration.
 
     Args:
         message: of Hydra or of our settings.
@@ -23,24 +40,17 @@ def did_you_mean(message: str, tree: Path) -> str:
         >>> did_you_mean("Could not override 'agent.gama'.", CONFIG)
         '; did you mean agent.gamma?'
     """
-    option = _OPTION.search(message)
-    if option:
-        options = [path.stem for path in (tree / option["group"]).glob("*.yaml")]
-        near = [f"{option['group']}={name}" for name in difflib.get_close_matches(option["option"], options, 1)]
-    else:
-        key = _KEY.search(message)
-        name = (key["key"] or key["setting"]) if key else ""
-        keys = _keys(tree)
-        near = (
-            _nearest(name, sorted(keys)) if key and name not in keys else []
-        )  # another command may have that very key
-    return f"; did you mean {near[0]}?" if near else ""
-
-
-def _nearest(key: str, keys: list[str]) -> list[str]:
-    name = key.rpartition(".")[2]
-    same_name = [known for known in keys if known.rpartition(".")[2] == name]
-    return difflib.get_close_matches(key, keys, 1, 0.75) or difflib.get_close_matches(key, same_name, 1, 0.0)
+    if option := _OPTION.search(message):
+        options = (path.stem for path in (tree / option["group"]).glob("*.yaml"))
+        return suggestion(option["option"], options, f"{option['group']}=")
+    key, keys = _KEY.search(message), _keys(tree)
+    name = (key["key"] or key["setting"]) if key else ""
+    if not name or name in keys:  # another command may have that very key
+        return ""
+    last = name.rpartition(".")[2]
+    same_name = [known for known in sorted(keys) if known.rpartition(".")[2] == last]
+    near = difflib.get_close_matches(name, sorted(keys), 1, 0.75) or difflib.get_close_matches(name, same_name, 1, 0.0)
+    return suggestion(near[0], near) if near else ""
 
 
 def _keys(tree: Path) -> set[str]:

@@ -1,27 +1,16 @@
-"""The environment's name in Gymnasium's registry: "tactile_cube/Rotation-v0".
-
-Gymnasium 1 loads no entry points of other packages. `import tactile_cube` registers the name, before or after
-`import gymnasium`; without it `gymnasium.make("tactile_cube.registration:tactile_cube/Rotation-v0")` does.
-"""
+"""What `gymnasium.make("tactile_cube/Rotation-v0")` calls."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import gymnasium
+from tactile_cube.api.input_errors import as_input_errors
 
 if TYPE_CHECKING:
     from tactile_cube.gymnasium_env import GymnasiumRotation
 
-NAME = "tactile_cube/Rotation-v0"
 
-
-def register() -> None:
-    """Makes `gymnasium.make(NAME)` work."""
-    if NAME not in gymnasium.registry:
-        gymnasium.register(id=NAME, entry_point="tactile_cube.registration:make_rotation")
-
-
+@as_input_errors
 def make_rotation(
     task: str = "table",
     reward: str = "early",
@@ -33,7 +22,7 @@ def make_rotation(
     overrides: tuple[str, ...] = (),
     render_mode: str | None = None,
 ) -> GymnasiumRotation:
-    """The environment of the named options of `conf/`.
+    """Return the environment of the named options of `conf/`.
 
     Args:
         task: option of the group of that name.
@@ -45,6 +34,9 @@ def make_rotation(
         object: option of the group of that name.
         overrides: further settings as on the command line, e.g. "task.filter_time=0.25".
         render_mode: "rgb_array", or None for no pictures.
+
+    Raises:
+        InputError: an option that there is not.
     """
     from hydra.utils import instantiate
 
@@ -63,6 +55,3 @@ def make_rotation(
     chosen = [f"+{group}={option}" for group, option in groups.items()]
     config = composed(None, [*chosen, "+model=null", f"+engine={engine}", *overrides])
     return GymnasiumRotation(instantiate(config.env), render_mode)
-
-
-register()

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 CONFIGURATION = ".hydra"
 USAGE_ERROR = 2
 """Exit status of a command that was refused."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
 
 
 @contextlib.contextmanager

@@ -7,14 +7,27 @@ import json
 import secrets
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
-if TYPE_CHECKING:
-    from omegaconf import DictConfig
+from hydra.core.hydra_config import HydraConfig
+from hydra.experimental.callback import Callback
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
 
-INTERRUPTED = 130
+from tactile_cube.run_folder import INTERRUPTED
+
 LONGEST = 180
 """Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
+
+
+class SweepFolder(Callback):
+    """Tells the process that begins a sweep its folder; Hydra calls it, see conf/hydra/default.yaml."""
+
+    path: ClassVar[Path | None] = None
+
+    def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
+        """Keep the folder."""
+        SweepFolder.path = Path(config.hydra.sweep.dir)
 
 
 class Jobs:
@@ -26,7 +39,7 @@ class Jobs:
 
     def __init__(self, job: Callable[[DictConfig, Path], None]):
         self._job = job
-        self._record = Path.cwd() / f".sweep-{secrets.token_hex(8)}"  # machines that share a sweep share the folder
+        self._record = f".sweep-{secrets.token_hex(8)}"  # in the sweep's folder, which its machines share
         register_sweep_folder()
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
@@ -36,11 +49,8 @@ class Jobs:
 
     def __call__(self, config: DictConfig) -> None:
         """Run one job; in a sweep, one that fails does not keep the others from running."""
-        from hydra.core.hydra_config import HydraConfig
-        from hydra.types import RunMode
-
-        folder = Path(HydraConfig.get().runtime.output_dir)
-        sweeping = HydraConfig.get().mode == RunMode.MULTIRUN
+        hydra = HydraConfig.get()
+        folder, sweeping = Path(hydra.runtime.output_dir), hydra.mode == RunMode.MULTIRUN
         good = True
         try:
             self._job(config, folder)
@@ -49,22 +59,21 @@ class Jobs:
                 raise
             good = False
         if sweeping:
-            with self._record.open("a") as file:
+            with Path(hydra.sweep.dir, self._record).open("a") as file:
                 file.write(json.dumps([str(folder), good]) + "\n")
 
     def ended(self) -> dict[Path, bool]:
         """Folder -> whether its job succeeded, of all that ended; asked once, when all have."""
-        if not self._record.is_file():
+        record = SweepFolder.path and SweepFolder.path / self._record
+        if not record or not record.is_file():
             return {}
-        lines = [json.loads(line) for line in self._record.read_text().splitlines()]
-        self._record.unlink()
+        lines = [json.loads(line) for line in record.read_text().splitlines()]
+        record.unlink()
         return {Path(folder): good for folder, good in lines}
 
 
 def register_sweep_folder() -> None:
     """Let configurations say `${sweep_folder:...}`."""
-    from omegaconf import OmegaConf
-
     OmegaConf.register_new_resolver("sweep_folder", sweep_folder, replace=True)
 
 

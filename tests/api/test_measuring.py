@@ -8,6 +8,8 @@ import pytest
 
 import tactile_cube
 from tactile_cube import InputError, TrialArrays
+from tactile_cube.api.comparison import opened
+from tactile_cube.api.job import called_job
 from tests.measurement.small_rig import URDF, table, write
 
 RIG = ["source=rig", "source.duration=4", "source.initialisations=2", "source.kinds=[ramps,multisine]"]
@@ -39,6 +41,13 @@ def test_a_recording_from_arrays_compares_as_the_one_on_disk(tmp_path: Path) -> 
     errors = [tactile_cube.compare(one, *settings, say=quiet).error for one in (made, on_disk)]
     assert errors[0] == pytest.approx(errors[1], rel=1e-4)
     assert errors[0] > 1e-3
+
+
+@pytest.mark.parametrize("name", ["2026", "nan"])
+def test_a_folder_may_be_called_like_a_number(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    assert opened(called_job("compare", [f"recording={name}"]).config.recording).joints == ("a", "b")
 
 
 @pytest.mark.parametrize(

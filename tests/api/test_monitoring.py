@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 import tactile_cube
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
-from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 
 
 def recorded(folder: Path, name: str, seed: int, *hidden: str) -> Recording:

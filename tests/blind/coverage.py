@@ -23,10 +23,10 @@ import yaml
 from scipy import stats
 
 import tactile_cube
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
-from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 
 EFFECTS = ("viscous_friction", "stribeck_friction", "command_delay", "payload", "torque_gain", "coulomb_friction")
 CONTROLLER = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0}

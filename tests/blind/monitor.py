@@ -19,10 +19,10 @@ import numpy as np
 from scipy import stats
 
 import tactile_cube
+from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.api.monitoring import MonitorResult
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
-from tactile_cube.measurement.sources.single_joint_urdf import single_joint_urdf
 
 CONTROLLER = {"kp": 3.69, "kd": 0.25, "torque_limit": 1.0}
 NOMINAL = {"stiffness": 25.0, "static_friction": 0.02, "reflected_inertia": 0.003}

@@ -20,9 +20,3 @@ def test_a_source_has_the_settings_of_its_class(source: str) -> None:
     settings = OmegaConf.to_container(config.source, resolve=False)
     cls = get_class(settings.pop("_target_"))
     assert set(settings) == set(inspect.signature(cls).parameters)
-
-
-@pytest.mark.parametrize("command", ["compare", "record"])
-def test_the_commands_compose(command: str) -> None:
-    with initialize_config_dir(str(Path(CONFIG).resolve()), version_base="1.3"):
-        assert compose(command).seed == 0

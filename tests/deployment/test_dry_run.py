@@ -1,5 +1,7 @@
 """The whole loop against the simulated hand: it turns the cube, its log is a recording, faults of the link stop it."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,8 @@ from hydra.utils import instantiate
 
 import tactile_cube
 from tactile_cube.composition import composed
-from tactile_cube.deployment.control_loop import Homing
-from tactile_cube.deployment.run_log import RunLog
+from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.limits import RATE
 from tactile_cube.deployment.stop_rules import StopRules
 
 
@@ -48,19 +50,27 @@ def test_a_broken_link_stops_the_fingers_and_what_came_before_is_kept() -> None:
     assert "no measurement for" in done.runs[0].reason
 
 
-def test_ticks_without_a_measurement_leave_a_gap_in_the_log() -> None:
-    log = RunLog()
-    log.add(None, np.zeros(12))
-    assert log.time == []
+def test_a_signal_ends_all_runs_of_the_command_with_status_130(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "tactile_cube.deploy", "runs=3", "seconds=600", f"hydra.run.dir={tmp_path}"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as command:
+        assert command.stdout is not None
+        assert any(line.startswith("running: ") for line in command.stdout)
+        command.terminate()
+        said = command.stdout.read()
+    assert command.returncode == 130
+    assert said.startswith("stopped: interrupted by SIGTERM\nrun 0: interrupted by SIGTERM; cube turned")
+    assert "run 1" not in said
 
 
-@pytest.mark.parametrize("settings", [["motion=jumps"], ["seconds=0"]])
-def test_what_cannot_be_run_is_an_input_error(settings: list[str]) -> None:
-    with pytest.raises(tactile_cube.InputError):
-        tactile_cube.deploy(None, *settings, say=quiet)
+@pytest.mark.parametrize("value", ["-1", ".nan", "inf"])
+@pytest.mark.parametrize("key", ["rate_limit", "seconds", "filter_time", "robot.rate", "stop.silence", "homing.speed"])
+def test_what_cannot_be_run_is_an_input_error_that_names_the_key(key: str, value: str) -> None:
+    with pytest.raises(tactile_cube.InputError, match=f"{key} is {value}; give a finite number"):
+        tactile_cube.deploy(None, f"{key}={value}", say=quiet)
 
 
-def test_the_contract_states_the_stop_rules_and_the_homing_that_the_loop_takes() -> None:
+def test_the_contract_states_the_rules_the_rate_and_the_homing_that_the_loop_takes() -> None:
     config = composed("deploy", [])
     assert instantiate(config.stop) == StopRules()
     assert instantiate(config.homing) == Homing()
+    assert config.rate_limit == RATE

@@ -5,16 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.deployment.control_loop import ControlLoop, Homing
+from tactile_cube.deployment import export
+from tactile_cube.deployment.control_loop import ControlLoop
 from tactile_cube.deployment.controller import Controller
 from tactile_cube.deployment.export import export_policy
+from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.interface_contract import interface_contract
 from tactile_cube.deployment.limits import Limits
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2
+from tactile_cube.hand import DLR_HAND2, hand_urdf, tip_positions
 
 
 @pytest.fixture
@@ -57,6 +59,32 @@ def test_the_contract_says_what_a_robot_must_know(network: Network, tmp_path: Pa
     assert "config" not in contract["policy"]
 
 
+def test_the_contract_says_which_hand_it_is_and_how_it_is_held(network: Network) -> None:
+    """A robot is set up from this alone: the tips are where its own kinematics put them, gravity where it pulls."""
+    contract = interface_contract(network)["hand"]
+    assert contract["urdf"]["sha256"] == hashlib.sha256(hand_urdf(DLR_HAND2).encode()).hexdigest()
+    assert contract["coupled_joints"][0] == {"joint": "ring_q4", "follows": "ring_q3", "ratio": 1.0}
+    rotation = np.array(contract["palm"]["rotation"])
+    np.testing.assert_allclose(rotation @ contract["palm"]["gravity"]["value"], [0.0, 0.0, -9.81], atol=1e-12)
+    at_start = np.array([tip["at_start"] for tip in contract["fingertips"]])
+    in_world = contract["palm"]["position"]["value"] + at_start @ rotation.T
+    np.testing.assert_allclose(in_world, tip_positions(DLR_HAND2, DLR_HAND2.start_angles), atol=1e-9)
+    sides = np.array([finger.face for finger in DLR_HAND2.fingers])
+    gaps = (in_world * sides).sum(axis=1) - 0.04 - [tip["radius"] for tip in contract["fingertips"]]
+    np.testing.assert_allclose(gaps, 0.001, atol=1e-3)  # 1 mm off a cube of 8 cm, by angles rounded to 0.1 deg
+
+
+def test_every_exported_file_has_a_contract_of_its_own(
+    network: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(export, "_write_onnx", lambda network, contract, path: path.write_bytes(b"a graph"))
+    beside = [export_policy(network, tmp_path / name) for name in ("policy.npz", "policy.onnx")]
+    assert [path.name for path in beside] == ["policy.npz.contract.json", "policy.onnx.contract.json"]
+    for path in beside:
+        file = path.with_name(path.name.removesuffix(".contract.json"))
+        assert json.loads(path.read_text())["sha256"][file.name] == hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 def test_an_unknown_ending_is_refused(network: Network, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.pt"):
         export_policy(network, tmp_path / "policy.pt")
@@ -88,7 +116,7 @@ def test_the_onnx_file_carries_the_contract(network: Network, tmp_path: Path) ->
 def test_a_loop_written_from_the_contract_alone_sends_what_ours_sends(network: Network, tmp_path: Path) -> None:
     """Everything below reads the two files; of the package only the loop it is compared with."""
     export_policy(network, tmp_path / "policy.npz")
-    contract = json.loads((tmp_path / "policy.contract.json").read_text())
+    contract = json.loads((tmp_path / "policy.npz.contract.json").read_text())
     arrays = np.load(tmp_path / "policy.npz")
     lower, upper = (np.array(contract["action"][key]) for key in ("lower", "upper"))
     low, high = (np.array(contract["joint_range"][key]) for key in ("lower", "upper"))
@@ -108,10 +136,11 @@ def test_a_loop_written_from_the_contract_alone_sends_what_ours_sends(network: N
     gains = (np.full(12, kp), np.full(12, kd))
     limits = Limits(DLR_HAND2.lower, DLR_HAND2.upper, rate, torque, *gains)
     loop = ControlLoop(Controller(network), 0.5, limits, StopRules(), Homing(settle=1e-3), seconds=1.0)
-    loop.tick(0.0, Reading(0.0, home, np.zeros(12)))
+    for tick in range(-4, 1):  # five that agree before the first command
+        loop.tick(1e-3 * tick, Reading(1e-3 * tick, home))
     stack, q_f, q_d, q_m = None, home, home, home
     for tick in range(1, 500):
-        ours = loop.tick(1e-3 * tick, Reading(1e-3 * tick, q_m, np.zeros(12)))
+        ours = loop.tick(1e-3 * tick, Reading(1e-3 * tick, q_m))
         if (tick - 1) % 100 == 0:
             reading = np.concatenate([q_m, q_f - q_m])
             stack = np.tile(reading, readings) if stack is None else np.concatenate([stack[24:], reading])

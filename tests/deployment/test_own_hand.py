@@ -1,5 +1,6 @@
 """A policy of a hand with other numbers of fingers and joints, from its file to the log of the loop."""
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,11 @@ import tactile_cube
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
+from tactile_cube.api.deployment import limits_of
 from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.errors import InputError
+from tactile_cube.hand.urdf_hand import DESCRIPTIONS
+from tests.meshes import CUBE, write_obj
 from tests.own_hands import description
 
 HAND = {"_target_": "tactile_cube.hand.hand_from_urdf", **description(("left", "right"), name="two_fingers")}
@@ -58,7 +62,7 @@ def test_a_dry_run_has_its_object_and_table_and_its_log_is_one_that_compare_read
     assert done.runs[0].reason == "time is over"
     assert np.isfinite(done.turned).all()
     assert done.touched
-    assert "running: the policy decides" in lines
+    assert "running: the policy decides; let go of the object" in lines
     moved = ["motion=multisine", "seconds=1.5", "homing.settle=0.1", "robot.cube=false", "runs=2"]
     alone = tactile_cube.deploy(policy, *moved, say=lines.append)
     assert not alone.touched
@@ -81,6 +85,51 @@ def test_a_hand_moves_without_a_policy_but_not_with_that_of_another() -> None:
     assert done.runs[0].homed
     with pytest.raises(InputError, match="hand=three_finger: the policy was trained on dlr_hand2"):
         tactile_cube.deploy(None, "hand=three_finger", say=quiet)
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A policy of a hand and an object in files of its owner's, in the folder where commands are typed."""
+    monkeypatch.chdir(tmp_path)
+    urdf = (DESCRIPTIONS / "three_finger.urdf").read_bytes()
+    Path("mine.urdf").write_bytes(urdf)
+    write_obj(tmp_path, 0.07 * CUBE)
+    hand = HAND | description() | {"urdf": "mine.urdf", "sha256": hashlib.sha256(urdf).hexdigest()}
+    constants = {"object": {"shape": "mesh", "file": "object.obj", "mass": 0.05}}
+    actor = Actor(Sizes(120, 0, 12), (8,))
+    info = PolicyInfo.describe(actor, time_constant=0.2, config={"env": {"hand": hand, "constants": constants}})
+    save_policy(Path("policy.safetensors"), actor, info)
+    return Path("policy.safetensors")
+
+
+def test_a_policy_of_files_elsewhere_wants_them_named_and_knows_its_urdf(elsewhere: Path) -> None:
+    hand, object_ = ["hand=three_finger", "hand.urdf=mine.urdf"], ["object=mesh", "object.file=object.obj"]
+    with pytest.raises(InputError, match=r"env\.hand\.urdf is 'mine\.urdf'.* name it yourself: hand="):
+        tactile_cube.export(elsewhere, "own.npz", *object_)
+    with pytest.raises(InputError, match=r"env\.constants\.object\.file is .* name it yourself: object="):
+        tactile_cube.export(elsewhere, "own.npz", *hand)
+    contract = json.loads(tactile_cube.export(elsewhere, "own.npz", *hand, *object_).read_text())
+    assert contract["hand"]["urdf"] == {
+        "file": "mine.urdf",
+        "sha256": hashlib.sha256(Path("mine.urdf").read_bytes()).hexdigest(),
+    }
+    assert contract["task"]["object"]["shape"].startswith("mesh")
+    Path("mine.urdf").write_text(Path("mine.urdf").read_text() + "\n")
+    with pytest.raises(InputError, match="its URDF has the SHA-256"):
+        tactile_cube.deploy(elsewhere, "seconds=0.1", *hand, *object_, say=lambda line: None)
+
+
+@pytest.mark.parametrize("drives", [{"torque_limit": 1.1}, {"kp": 1e-9}, {"kp": 9.0}, {"kd": [0.3] * 7 + [1e3]}])
+def test_a_file_cannot_widen_the_limits_of_a_hand(drives: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=rf"env\.constants\.{next(iter(drives))} is .*, the hand's is"):
+        training_setting({"config": {"env": ENV | {"constants": ENV["constants"] | drives}}})
+
+
+def test_the_limits_of_a_softer_training_are_the_hands() -> None:
+    soft = {"kp": 2.0, "torque_limit": 0.8}
+    setting = training_setting({"config": {"env": ENV | {"constants": ENV["constants"] | soft}}})
+    limits = limits_of(setting, 6.0)
+    assert (limits.kp.min(), limits.torque) == (3.0, 0.8)
 
 
 def test_a_file_that_names_what_is_no_constant_is_refused() -> None:

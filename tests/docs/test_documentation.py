@@ -5,7 +5,7 @@ import importlib.util
 import re
 import shlex
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 import yaml
@@ -91,11 +91,19 @@ def test_every_test_that_guards_a_point_of_the_first_hour_is_there() -> None:
     assert named - set(re.findall(r"^def (test_\w+)", written, flags=re.MULTILINE)) == set()
 
 
-def test_every_page_in_the_table_of_contents_is_there() -> None:
+def test_the_table_of_contents_has_every_page() -> None:
     text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").replace("!!python/name:", "")
     entries = re.findall(r"[\w/]+\.md", yaml.safe_dump(yaml.safe_load(text)["nav"]))
-    for entry in entries:
-        assert entry in GENERATED or (ROOT / "docs" / entry).is_file(), entry
+    pages = {str(page.relative_to(ROOT / "docs")) for page in (ROOT / "docs").rglob("*.md")}
+    assert sorted(entries) == sorted(pages | GENERATED)
+
+
+def test_on_the_site_a_link_that_leaves_the_docs_is_text_and_a_dead_one_stays_for_the_strict_build() -> None:
+    hook = script("site_links")
+    page = SimpleNamespace(file=SimpleNamespace(abs_src_path=str(ROOT / "docs/results/paper.md")))
+    text = "[a](../learn.md) [b](../../conf/train.yaml) [c](../gone.md) [d](../../gone.yaml#x) ![e](../images/e.png)"
+    shown = hook.on_page_markdown(text, page=page, config=SimpleNamespace(docs_dir=str(ROOT / "docs")))
+    assert shown == text.replace("[b](../../conf/train.yaml)", "b")
 
 
 def test_python_in_the_docs_parses_and_uses_names_that_exist() -> None:
@@ -113,9 +121,9 @@ def test_python_in_the_docs_parses_and_uses_names_that_exist() -> None:
     assert {"train", "compare", "recording_from_arrays", "make_env"} <= used <= set(tactile_cube.__all__)
 
 
-@pytest.fixture(scope="module")
-def generator() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+def script(name: str) -> ModuleType:
+    """A file of docs/, imported."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -123,12 +131,17 @@ def generator() -> ModuleType:
     return module
 
 
+@pytest.fixture(scope="module")
+def generator() -> ModuleType:
+    return script("generate")
+
+
 def test_the_glossary_names_every_effect_with_its_parameters_and_its_picture(generator: ModuleType) -> None:
     page = generator.effects_page()
-    for name, kind in catalogue().items():
-        section = page.split(f"\n## {name}\n")[1].split("\n## ")[0]
-        assert all(f"| {parameter.name} |" in section for parameter in kind.parameters)
-        assert f"images/effects/{name}.png" in section
+    for one in tactile_cube.effects():
+        section = page.split(f"\n## {one.name}\n")[1].split("\n## ")[0]
+        assert all(f"\n| {parameter} | " in section for parameter, *_ in one.rows)
+        assert (f"images/effects/{one.name}.png" in section) == (one.name in catalogue())
     rows = [line for line in page.splitlines() if line.startswith("| [")]
     assert all(re.sub(r"\\\|", "", row).count("|") == 4 for row in rows)
 

@@ -26,6 +26,15 @@ def pendulum(length: float = 0.1, mass: float = 0.2) -> RigidBodyTree:
     return RigidBodyTree.from_urdf(f'<robot name="pendulum"><link name="base"/>{link}{joint}</robot>')
 
 
+def pendulums() -> RigidBodyTree:
+    """Joints `a`, `b`, `c` side by side and one that follows `c`: each 0.2 kg at 0.1 m, 4e-3 kg m^2 about its axis."""
+    text = ""
+    for name, more in (("a", ""), ("b", ""), ("c", ""), ("d", '<mimic joint="c"/>')):
+        text += _LINK.format(name=f"bob_{name}", com="0 0 -0.1", mass=0.2, i=2e-3)
+        text += _JOINT.format(name=name, parent="base", child=f"bob_{name}", origin="0 0 0", axis="0 1 0", more=more)
+    return RigidBodyTree.from_urdf(f'<robot name="pendulums"><link name="base"/>{text}</robot>')
+
+
 def finger_text(distal_mass: float = 0.035) -> str:
     """A finger q1, q2, q3 with q4 = q3, hanging down."""
     sizes = (("knuckle", 0.0, 0.04), ("proximal", 0.0366, 0.11), ("middle", 0.0177, 0.055))

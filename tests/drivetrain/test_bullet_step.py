@@ -14,7 +14,6 @@ SPIN = np.array([1.5e-3, 1e-3, 1e-3, 0.5e-3])
 START = np.array([0.1, 0.3, 0.2])
 GRAVITY = (1.0, 2.0, -9.81)
 DT = 0.002
-NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
 
 
 class BulletFinger:
@@ -114,19 +113,6 @@ def test_a_force_on_the_fingertip_is_felt_with_the_inertia_of_the_rotors(bullet)
     np.testing.assert_allclose(q[:3], plant.view(free, "q"), atol=3e-3)
     np.testing.assert_allclose(plant.view(memory, "contact"), load, atol=2e-3)
     assert np.max(np.abs(load)) > 0.02
-
-
-def test_fingers_keep_their_weight_where_the_engine_s_gravity_is_off(bullet) -> None:
-    plant = Plant([finger()], DT)
-    memory = prepared(plant, DrivetrainConstants())
-    free, torque = memory.copy(), np.zeros(4)
-    pybullet.setGravity(0, 0, 0, physicsClientId=bullet.client)
-    plant.view(memory, "engine_gravity")[:] = 0.0
-    for _ in range(200):
-        plant.kernel.control_step(0, *bullet.state(), torque, memory)
-        bullet.step(torque)
-        plant.kernel.step(START, free)
-    np.testing.assert_allclose(plant.signal(memory, MOTOR_POSITION), plant.signal(free, MOTOR_POSITION), atol=1e-9)
 
 
 def test_the_target_filter_runs_at_the_rate_of_the_physics() -> None:

@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
@@ -51,7 +52,17 @@ def test_name_and_joint_of_an_effect() -> None:
         ("joints: &a [*a]", "aliases"),
         ("\n".join(f"k{n}: &k{n} [{', '.join([f'*k{n - 1}' if n else 'x'] * 9)}]" for n in range(9)), "aliases"),
         (f"joints: {'[' * 3000}", "not usable YAML"),
-        (f"format: {'9' * 5000}", "not usable YAML"),
+        (f"format: {'9' * 5000}", "larger than any number"),
+        ("joints: [q1, q1]", "joints names 'q1' more than once"),
+        ("joints: [q1]\njoints: [q2]", "line 2: not valid YAML: the key 'joints' stands twice"),
+        (
+            "joints: [q1]\neffects: [{effect: backlash@q1}, {effect: backlash@q1}]",
+            "effects names 'backlash@q1' more than",
+        ),
+        ("joints: [q1]\nvalues: {kp: {q1: .inf}}", "values.kp.q1 is inf in [inf, inf]; give finite numbers, 0 or more"),
+        ("joints: [q1]\nvalues: {kd: {q1: -1}}", "values.kd.q1 is -1"),
+        ("joints: [q1]\nvalues: {kp: {q1: 1e300}}", "key 'values.kp.q1': Value error, 1e+300 is beyond 1e+09"),
+        ("joints: [q1]\noffsets: {q1: {value: 0, low: -.inf, high: .inf}}", "offsets.q1 is 0 in [-inf, inf]"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
@@ -61,6 +72,12 @@ def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str)
     assert said in str(caught.value)
     assert "m.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_rigid_drive_is_infinitely_stiff(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text("joints: [q1]\nvalues: {stiffness: {q1: .inf}, torque_limit: {q1: 1e5}}")
+    values = read_model(tmp_path / "m.yaml").values
+    assert (values["stiffness"]["q1"].value, values["torque_limit"]["q1"].value) == (np.inf, 1e5)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

@@ -32,9 +32,14 @@ def test_theta_is_unwrapped_step_by_step_over_several_turns() -> None:
     assert theta > 4 * math.pi
 
 
-@pytest.mark.parametrize("axis", ["x", "y", (1.0, 2.0, -0.5)])
-def test_a_turn_about_the_tasks_axis_is_theta_and_any_other_is_tilt(axis: str | tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    ("axis", "along"), [("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1)), ((3.0, 4.0, -12.0), (3, 4, -12))]
+)
+def test_a_turn_about_the_tasks_axis_is_theta_and_any_other_is_tilt(
+    axis: str | tuple[float, ...], along: tuple[float, ...]
+) -> None:
     vector = Task("table", axis=axis).axis_vector()
+    np.testing.assert_allclose(vector, np.array(along) / np.linalg.norm(along))
     turned = seen_along(frame_along(vector), Rotation.from_rotvec(0.7 * vector).as_quat().tolist())
     pose = cube_pose((0, 0, 0), turned)
     assert (pose.theta, pose.tilt) == pytest.approx((0.7, 0.0), abs=1e-7)

@@ -17,8 +17,8 @@ def test_spin_counts_in_the_rewarded_direction_and_is_clipped_there_only() -> No
 
 
 def test_motion_terms_measure_the_change_of_a_step() -> None:
-    before = CubePose(0.1, 0.1, 0.1, 0, 0.1, 0.1, 0)
-    after = CubePose(0.103, 0.096, 0.098, 0, 0.15, 0.08, 0)
+    before = CubePose(0.1, 0.1, 0.1, 0, 0.15, 0.1, 0)
+    after = CubePose(0.103, 0.096, 0.098, 0, 0.1, 0.08, 0)
     assert terms.plane(before, after) == pytest.approx(0.005)
     assert terms.height(before, after) == pytest.approx(0.002)
     assert terms.tilt(before, after) == pytest.approx(0.07)
@@ -32,20 +32,24 @@ def test_proximal_term_sums_the_fourth_power_of_each_fingers_first_joint() -> No
 
 
 def test_off_centre_is_the_squared_horizontal_distance_from_the_start() -> None:
-    assert terms.off_centre(STILL._replace(x=0.1), STILL._replace(x=0.13, y=-0.04, z=0.5)) == pytest.approx(0.0025)
+    assert terms.off_centre(STILL._replace(x=0.1, y=0.1), STILL._replace(x=0.13, y=0.06, z=0.5)) == pytest.approx(
+        0.0025
+    )
 
 
 def test_advance_counts_fingers_that_go_back_and_not_those_that_turn_with_the_object() -> None:
     tips = np.array([-1.5, 0.0, 1.5, 3.1])
     assert terms.advance(0.1, -1, tips, tips - 0.1) == pytest.approx(0.0)
-    assert terms.advance(0.0, -1, tips, tips + np.array([0.0, 0.0, 0.0, 0.3])) == pytest.approx(0.3)
     assert terms.advance(0.0, 1, tips, tips + np.array([0.3, 0.0, 0.0, 0.0])) == pytest.approx(-0.3)
     assert terms.advance(0.05, 1, tips, tips) == pytest.approx(0.2)
+    assert terms.advance(0.0, -1, np.array([3.1]), np.array([3.1]) + 0.3 - 2 * np.pi) == pytest.approx(0.3)
+    assert terms.advance(0.0, -1, np.array([-3.1]), np.array([-3.1]) - 0.3 + 2 * np.pi) == pytest.approx(-0.3)
     assert terms.advance(0.0, -1, np.zeros(0), np.zeros(0)) == 0.0
 
 
 def test_published_weights_and_their_signs() -> None:
     assert Reward().weights().tolist() == [16, -100, -300, -50, -25, 0, -10, 0]
+    assert Reward().fastest == 1.0, "[rad/s]"
 
 
 def test_penalty_scale_changes_the_motion_weights_only() -> None:

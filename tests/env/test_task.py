@@ -7,25 +7,30 @@ from tactile_cube.env.conditions import Conditions
 from tactile_cube.errors import InputError
 from tactile_cube.simulation import EpisodeConstants
 
-START = CubePose(0, 0, 0.002, 0, 0, 0, 0)
+START = CubePose(0.1, -0.2, 0.3, 0.5, 0.0, 0.0, 0.6)
 
 
 @pytest.mark.parametrize(
-    ("pose", "step", "expected"),
+    ("moved", "step", "expected"),
     [
-        (START, 5, "running"),
-        (START, 100, "time_limit"),
-        (START._replace(z=-0.05), 5, "dropped"),
-        (START._replace(z=0.05), 5, "lifted"),
-        (START._replace(x=-0.04), 5, "left_range"),
-        (START._replace(y=0.04), 5, "left_range"),
-        (START._replace(tilt=0.9), 5, "tilted"),
-        (START._replace(z=-0.05), 100, "dropped"),
-        (START._replace(theta=20.0), 5, "running"),
+        ({}, 99, "running"),
+        ({}, 100, "time_limit"),
+        ({"z": -0.039}, 5, "running"),
+        ({"z": -0.041}, 5, "dropped"),
+        ({"z": 0.039}, 5, "running"),
+        ({"z": 0.041}, 5, "lifted"),
+        ({"x": -0.036}, 5, "left_range"),
+        ({"y": 0.036}, 5, "left_range"),
+        ({"x": 0.034, "y": -0.034}, 5, "running"),
+        ({"tilt": 0.19}, 5, "running"),
+        ({"tilt": 0.21}, 5, "tilted"),
+        ({"z": -0.041}, 100, "dropped"),
+        ({"theta": 20.0}, 5, "running"),
     ],
 )
-def test_outcome_names_why_an_episode_ends(pose: CubePose, step: int, expected: str) -> None:
-    assert OUTCOMES[Task("full").outcome(START, pose, step)] == expected
+def test_outcome_names_why_an_episode_ends(moved: dict[str, float], step: int, expected: str) -> None:
+    now = START._replace(**{key: getattr(START, key) + way for key, way in moved.items()})
+    assert OUTCOMES[Task("full").outcome(START, now, step)] == expected
 
 
 def test_table_stands_under_the_cube_of_this_episode() -> None:

@@ -6,7 +6,7 @@ import torch
 from torchrl.envs.utils import check_env_specs, step_mdp
 
 from tactile_cube.curriculum import LinearCurriculum
-from tactile_cube.env import OUTCOMES, Conditions, RotationEnv, Task
+from tactile_cube.env import OUTCOMES, Conditions, RotationEnv
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.randomization import Randomization, Uniform
 
@@ -42,15 +42,6 @@ def test_what_a_world_draws_does_not_depend_on_its_neighbours(rotation_task: Mak
     first, second = few.reset()["joint_position"], many.reset()["joint_position"]
     assert torch.equal(first, second[:2])
     assert not torch.equal(first[0], first[1])
-
-
-def test_set_seed_starts_the_same_sequence_again(rotation_task: MakeTask) -> None:
-    env = WorldsEnv([rotation_task(randomization=VARIED, task=Task("full", episode_steps=4)) for _ in range(2)])
-    runs = []
-    for _ in range(2):
-        env.set_seed(9)
-        runs.append(env.rollout(9, break_when_any_done=False)["joint_position"])
-    assert torch.equal(*runs)
 
 
 def test_faulty_world_is_marked_and_truncated(scripted_world: Any, rotation_task: MakeTask) -> None:

@@ -36,6 +36,18 @@ def test_the_constant_that_tells_kept_from_lost_is_named() -> None:
     assert where.text.startswith("kept by cube_mass: 20 of 20 at 0.0")
 
 
-def test_nothing_is_named_where_nothing_tells_or_too_little_was_lost() -> None:
+def test_the_more_constants_were_drawn_the_less_one_of_them_tells() -> None:
+    rng, two = np.random.default_rng(1), results(True)
+    ten = [replace(one, world=one.world | {f"noise {k}": rng.normal() for k in range(8)}) for one in two]
+    assert lost_where(ten)[0].p_value == pytest.approx(5 * lost_where(two)[0].p_value)
+
+
+def test_nothing_is_named_where_nothing_tells() -> None:
     assert lost_where(results(False)) == []
-    assert lost_where(results(True, count=8)) == []
+
+
+@pytest.mark.parametrize(("lost", "named"), [(4, 0), (5, 1), (55, 1), (56, 0)])
+def test_fewer_than_five_lost_or_kept_tell_nothing(lost: int, named: int) -> None:
+    lightest_first = sorted(results(True), key=lambda one: one.world["cube_mass"])
+    marked = [replace(one, ending="time_limit" if k < 60 - lost else "dropped") for k, one in enumerate(lightest_first)]
+    assert len(lost_where(marked)) == named

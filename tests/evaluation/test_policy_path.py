@@ -18,8 +18,8 @@ def test_an_empty_run_folder_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_unknown_policy_is_refused_with_the_choices() -> None:
-    with pytest.raises(InputError, match=r"policy=nobody.*hold, random, scripted"):
-        policy_path("nobody")
+    with pytest.raises(InputError, match=r"policy=defalt.*hold, random, scripted.*did you mean policy=default\?$"):
+        policy_path("defalt")
 
 
 def test_the_shipped_policy_is_named_without_the_place_of_the_package() -> None:

@@ -2,6 +2,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tactile_cube.evaluation.verdict import Verdict, judge, verdict
 from tests.evaluation.synthetic import episode
@@ -36,6 +37,15 @@ def test_judging_a_regrasping_episode() -> None:
     assert result.face_changes == (3, 3, 3, 3)
     assert result.faces_visited == (4, 4, 4, 4)
     assert result.kept
+
+
+def test_angle_and_time_count_from_the_start_and_the_largest_tilt_is_told() -> None:
+    rock = np.outer(0.6 * np.sin(np.linspace(0.0, np.pi, 101)), [1.0, 0.0, 0.0])
+    begun = {"theta": 7.0 + np.linspace(0.0, 0.2, 101), "time": 2.0 + 0.1 * np.arange(101)}
+    result = judge(episode(cube_quaternion=Rotation.from_rotvec(rock).as_quat(), **begun))
+    assert (result.final_angle, result.late_angle, result.duration) == pytest.approx((0.2, 0.08, 10.0))
+    assert result.max_tilt == pytest.approx(0.6)
+    assert (result.verdict, result.exploits) == (Verdict.HOLDING, ())
 
 
 def test_judging_fingers_that_twist_with_the_cube() -> None:

@@ -1,3 +1,6 @@
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -48,3 +51,11 @@ def test_ranges_that_no_gait_can_have_are_refused() -> None:
         GaitRanges(low={"stride": 0.1}, high={"stride": 0.2})
     with pytest.raises(InputError, match=r"low 0\.9 is above high 0\.8"):
         GaitRanges(low={"swing": 0.9}, high={"swing": 0.8})
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"swing": "far"}, {"period": 0}, {"air_share": 1.0}, {"phases": (0.0, [1])}, {"height": math.inf}]
+)
+def test_what_no_clock_can_follow_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=f"gait.*{next(iter(wrong))}"):
+        Gait(**wrong)

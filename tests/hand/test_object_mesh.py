@@ -1,5 +1,6 @@
 """A mesh as object: its size, mass and inertia, where fingertips stand, and what is refused."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -63,11 +64,18 @@ def test_a_mesh_in_another_unit_is_noticed(unit: float, hint: str, tmp_path: Pat
         read_mesh(write_obj(tmp_path, 0.08 * unit * CUBE))
 
 
-def test_a_hollow_mesh_is_refused_until_its_hull_is_asked_for(tmp_path: Path) -> None:
+def test_a_hollow_mesh_is_refused_until_its_hull_is_asked_for_and_keeps_its_own_inertia(tmp_path: Path) -> None:
     file = write_hollow(tmp_path)
     with pytest.raises(InputError, match=r"fills 86 % of its convex hull.*object\.hull=true"):
         read_mesh(file)
-    assert read_mesh(file, hull=True)[0].volume < 0.8
+    mesh, size = read_mesh(file, hull=True)
+    assert mesh.volume == pytest.approx(0.75, rel=1e-6)
+    np.testing.assert_allclose(mesh.com * size, [-0.02 / 3, -0.02 / 3, 0.0], atol=1e-6)
+    bars = np.array([[-0.02, -0.02], [0.02, -0.02], [-0.02, 0.02]]) + 0.02 / 3  # about the centre of mass
+    apart = (bars[:, :, None] * bars[:, None, :]).mean(axis=0)
+    moments = np.diag([0.04**2, 0.04**2, 0.08**2]) / 12  # of one bar
+    moments[:2, :2] += apart
+    np.testing.assert_allclose(unit_inertia(mesh, size), np.trace(moments) * np.eye(3) - moments, atol=1e-9)
 
 
 def test_an_open_mesh_is_refused(tmp_path: Path) -> None:
@@ -80,6 +88,7 @@ def test_an_open_mesh_is_refused(tmp_path: Path) -> None:
     [
         ("gone.obj", None, "no such file; a relative name is looked for in"),
         ("object.step", "ISO-10303-21;", r"ending '\.step' is unknown; give a mesh as \.obj or \.stl"),
+        ("pipe.stl", None, "is a pipe; a regular file is needed here"),
         ("broken.obj", "v 0 0 zero\n", "no mesh could be read from it"),
         ("empty.stl", "", "no mesh could be read from it"),
         ("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "no mesh could be read from it"),
@@ -88,6 +97,8 @@ def test_an_open_mesh_is_refused(tmp_path: Path) -> None:
 def test_what_is_no_mesh_is_refused_in_one_line(name: str, content: str | None, message: str, tmp_path: Path) -> None:
     if content is not None:
         (tmp_path / name).write_text(content)
+    if name == "pipe.stl":
+        os.mkfifo(tmp_path / name)
     with pytest.raises(InputError, match=message) as error:
         read_mesh(tmp_path / name)
     assert "\n" not in str(error.value)

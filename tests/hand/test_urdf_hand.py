@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 from typing import Any
 
@@ -5,9 +6,10 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand import hand_from_urdf, tip_positions
+from tactile_cube.hand import UrdfHand, hand_from_urdf, tip_positions
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
+from tests.meshes import CUBE, write_obj
 from tests.own_hands import description, own_hand
 
 TEXT = (DESCRIPTIONS / "three_finger.urdf").read_text()
@@ -73,6 +75,7 @@ def test_a_joint_that_mimics_another_is_coupled(tmp_path: Path) -> None:
     ("changes", "message"),
     [
         ({"urdf": "nowhere.urdf"}, "hand.urdf=nowhere.urdf: no such file"),
+        ({"urdf": "/dev/zero"}, "/dev/zero: is a device; a regular file is needed here"),
         ({"action": {"lower": [0.1], "upper": [0.2]}}, "hand.action.lower has 1 numbers; give 4"),
         ({"start": [0.0]}, "hand.start has 1 angles; the hand has 12 joints"),
         ({"position": [0.0, 1.0]}, "hand.position is"),
@@ -106,3 +109,65 @@ def test_a_joint_without_limits_is_refused(tmp_path: Path) -> None:
     text = TEXT.replace('<joint name="left_q2" type="revolute">', '<joint name="left_q2" type="continuous">')
     with pytest.raises(InputError, match="joint 'left_q2' has no limits"):
         own_hand(urdf=written(tmp_path, text))
+
+
+MATERIAL = "newmtl m\nmap_Kd -bm 1 {}\n"
+
+
+def with_mesh(folder: Path, name: str) -> UrdfHand:
+    """The pattern in `folder/hand/urdf` with a mesh as a finger's shape; there are meshes in and outside of `hand`."""
+    inner = folder / "hand" / "urdf"
+    inner.mkdir(parents=True)
+    for place in (folder, inner, folder / "hand"):
+        write_obj(place, 0.01 * CUBE)
+    (folder / "picture.png").write_bytes(b"secret")
+    for file, part in (("own", "tile.png"), ("far", "../../picture.png"), ("pipe", str(folder / "picture.png"))):
+        (inner / f"{file}.mtl").write_text(MATERIAL.format(part))
+        (inner / f"{file}.obj").write_text(f"mtllib {file}.mtl\n" + (folder / "object.obj").read_text())
+    (inner / "out.obj").write_text("mtllib ../../picture.png\n" + (folder / "object.obj").read_text())
+    (inner / "link.obj").symlink_to(folder / "object.obj")
+    (inner / "mesh.dae").write_text("<COLLADA/>")
+    os.mkfifo(inner / "pipe.stl")
+    shape = f'<collision><geometry><mesh filename="{name.format(folder)}"/></geometry></collision>'
+    drawn = '<visual><geometry><mesh filename="/nowhere/drawn.dae"/></geometry></visual>'
+    text = TEXT.replace('<link name="left_distal">', f'<link name="left_distal">{drawn}{shape}')
+    assert text != TEXT
+    return own_hand(urdf=written(inner, text))
+
+
+@pytest.mark.parametrize("name", ["object.obj", "own.obj", "package://any/object.obj", "file://object.obj"])
+def test_a_mesh_below_the_urdf_is_taken(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "hand" / "urdf" / name.rpartition("/")[2]
+    assert [shape.file for shape in with_mesh(tmp_path, name).shapes(0)[-1] if shape.file] == [str(file)]
+
+
+@pytest.mark.parametrize("name", ["../object.obj", "package://any/object.obj"])
+def test_a_package_xml_above_the_urdf_says_what_its_folder_is(tmp_path: Path, name: str) -> None:
+    (tmp_path / "hand").mkdir()
+    (tmp_path / "hand" / "package.xml").touch()
+    file = str(tmp_path / "hand" / "object.obj")
+    assert [shape.file for shape in with_mesh(tmp_path, name).shapes(0)[-1] if shape.file] == [file]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("{}/object.obj", "lies outside of"),
+        ("file://{}/object.obj", "lies outside of"),
+        ("../object.obj", "lies outside of"),
+        ("package://../../object.obj", "lies outside of"),
+        ("package://any/../../object.obj", "lies outside of"),
+        ("link.obj", "lies outside of"),
+        ("out.obj", "out.obj: '../../picture.png' lies outside of"),
+        ("far.obj", "far.mtl: '../../picture.png' lies outside of"),
+        ("pipe.obj", "pipe.mtl: '/.*/picture.png' lies outside of"),
+        ("pipe.stl", "pipe.stl: is a pipe"),
+        ("/dev/zero", "lies outside of"),
+        ("none.stl", "none.stl: no such file"),
+        ("mesh.dae", "convert it to .obj or .stl"),
+    ],
+)
+def test_a_mesh_from_elsewhere_is_refused(tmp_path: Path, name: str, said: str) -> None:
+    with pytest.raises(InputError, match=said) as error:
+        with_mesh(tmp_path, name)
+    assert "\n" not in str(error.value)

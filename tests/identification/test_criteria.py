@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import pytest
 import yaml
 
 from tactile_cube.command_help import CONFIG
+from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 
 
@@ -12,3 +14,9 @@ def test_the_standard_criteria_are_those_of_the_configuration_each_with_its_reas
     text = (Path(CONFIG) / "criteria" / "standard.yaml").read_text()
     assert Criteria(**yaml.safe_load(text)) == STANDARD
     assert all(" # " in line for line in text.splitlines()[1:])
+
+
+@pytest.mark.parametrize("margin", [-0.1, 1.0, float("nan")])
+def test_a_margin_that_lets_a_command_leave_the_limits_is_refused(margin: float) -> None:
+    with pytest.raises(InputError, match=r"criteria\.margin"):
+        Criteria(margin=margin)

@@ -1,13 +1,20 @@
 """Every way in which a recording can be bad has a clear error or a stated warning: file, column, row, value."""
 
+import gzip
+import io
+import os
+import stat
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
+import polars
 import pytest
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.measurement.small_rig import URDF, Table, write
+from tests.measurement.small_rig import URDF, Table, table, write
 
 
 def error_of(folder: Path) -> str:
@@ -149,10 +156,6 @@ def test_a_urdf_that_lacks_the_joint_is_named(tmp_path: Path) -> None:
     assert "rig.urdf" in message
 
 
-def test_a_urdf_that_is_no_xml(tmp_path: Path) -> None:
-    assert "not a URDF" in error_of(write(tmp_path, urdf="<robot"))
-
-
 def test_columns_of_a_joint_that_is_not_listed_are_a_warning(tmp_path: Path) -> None:
     def spoil(columns: Table) -> None:
         columns["wrist.position"] = columns["a.position"]
@@ -224,84 +227,235 @@ def test_a_trial_of_three_samples_is_an_error(tmp_path: Path) -> None:
     assert "has 3 samples, last row 2" in message
 
 
+def with_first(folder: Path, name: str) -> Path:
+    """A recording whose first trial is in another file, and that file, which is not there yet."""
+    write(folder, lambda data: data["trials"][0].update(file=name))
+    return folder / name
+
+
 def test_a_truncated_parquet_file_is_an_error(tmp_path: Path) -> None:
     path = write(tmp_path) / "first.parquet"
     path.write_bytes(path.read_bytes()[:-100])
-    assert "first.parquet: not a complete Parquet file" in error_of(tmp_path)
+    assert "first.parquet: not a complete .parquet file" in error_of(tmp_path)
 
 
 def test_a_truncated_npz_file_is_an_error(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["trials"][0]["file"] = "first.npz"
-
-    write(tmp_path, change)
-    np.savez(tmp_path / "first.npz", time=np.arange(100.0))
-    path = tmp_path / "first.npz"
+    path = with_first(tmp_path, "first.npz")
+    np.savez(path, time=np.arange(100.0))
     path.write_bytes(path.read_bytes()[:-50])
     assert "not a complete NPZ file" in error_of(tmp_path)
 
 
 def test_an_npz_file_with_objects_is_never_unpickled(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["trials"][0]["file"] = "first.npz"
-
-    write(tmp_path, change)
-    np.savez(tmp_path / "first.npz", time=np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    np.savez(with_first(tmp_path, "first.npz"), time=np.array([{"a": 1}], dtype=object), allow_pickle=True)
     assert "NPZ file of plain arrays" in error_of(tmp_path)
 
 
-@pytest.mark.parametrize("gain", ["kp", "torque_limit"])
-def test_gains_of_zero_are_an_error(tmp_path: Path, gain: str) -> None:
-    def change(data: dict) -> None:
-        data["controller"][gain] = [3.0, 0.0]
-
-    message = error_of(write(tmp_path, change))
-    assert f"'controller.{gain}': received 0 for b" in message
-
-
 def test_damping_of_zero_is_a_warning(tmp_path: Path) -> None:
+    folder = write(tmp_path, lambda data: data["controller"].update(kd=0.0))
+    assert any("kd" in line and "no damping" in line for line in read_recording(folder).warnings)
+
+
+HELD = {"size": 0.08, "mass": 0.2}
+GRASP = {"position": [0.0, 0.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        (
+            "rate_hz",
+            "fast",
+            "key 'rate_hz': Input should be a valid number, unable to parse string as a number, received 'fast'",
+        ),
+        ("rate_hz", 1e9, "key 'rate_hz'"),
+        ("controler", {}, "key 'controler'"),
+        ("gravity", [np.nan, 0.0, -9.81], "key 'gravity.0'"),
+        ("gravity", [0.0, 0.0, -1e300], "key 'gravity.2'"),
+        ("joints", ["a", "a"], "joints names ['a'] more than once"),
+        ("controller.kp", [3.0, 0.0], "'controller.kp': received 0 for b"),
+        ("controller.torque_limit", [1.0, 0.0], "'controller.torque_limit': received 0 for b"),
+        ("controller.kp", [3.0, 3.0, 3.0], "one number for all joints or 2"),
+        ("controller.kp", 1e300, "key 'controller.kp': received 1e+300 for a"),
+        ("controller.kd", np.inf, "kd [inf, inf]; expected finite gains"),
+        ("nominal.stiffness", [1e300, 25.0], "key 'nominal.stiffness': received 1e+300 for a"),
+        ("nominal.reflected_inertia", np.inf, "key 'nominal.reflected_inertia'"),
+        ("nominal.static_friction", np.nan, "key 'nominal.static_friction': received nan for a"),
+        ("sensors.position_noise", np.inf, "key 'sensors.position_noise'"),
+        ("object", HELD | {"mass": 1e300}, "key 'object.mass'"),
+        ("object", HELD | {"mass": -1.0}, "key 'object.mass'"),
+        ("object", HELD | {"com": [0.0, 0.0, np.inf]}, "key 'object.com.2'"),
+        ("trials.0.object", GRASP | {"quaternion": [0, 0, 0, 0]}, "key 'trials.0.object'"),
+        (
+            "trials.0.force",
+            {"joint": "a", "point": [0, 0, 0], "vector": [0, 0, np.nan]},
+            "key 'trials.0.force.vector.2'",
+        ),
+        ("trials.0.touch", {"joint": "a", "angle": np.inf}, "key 'trials.0.touch.angle'"),
+        ("coupled", {"b": {"joint": "a", "ratio": np.nan}}, "key 'coupled.b.ratio'"),
+    ],
+)
+def test_a_wrong_value_is_named_with_its_key(tmp_path: Path, key: str, value: object, said: str) -> None:
     def change(data: dict) -> None:
-        data["controller"]["kd"] = 0.0
-
-    assert any("kd" in line and "no damping" in line for line in read_recording(write(tmp_path, change)).warnings)
-
-
-def test_gains_for_the_wrong_number_of_joints_are_an_error(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["controller"]["kp"] = [3.0, 3.0, 3.0]
-
-    assert "one number for all joints or 2" in error_of(write(tmp_path, change))
-
-
-def test_an_executable_yaml_tag_is_refused_and_not_run(tmp_path: Path) -> None:
-    write(tmp_path)
-    target = tmp_path / "owned"
-    text = (tmp_path / "recording.yaml").read_text()
-    (tmp_path / "recording.yaml").write_text(text + f"source: !!python/object/apply:os.system ['touch {target}']\n")
-    message = error_of(tmp_path)
-    assert "only plain data is read" in message
-    assert "line" in message
-    assert not target.exists()
-
-
-def test_a_misspelt_key_is_named(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["controler"] = data.pop("controller")
-
-    assert "controler" in error_of(write(tmp_path, change)) or "controller" in error_of(tmp_path)
-
-
-def test_a_trial_file_outside_the_folder_is_refused(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["trials"][0]["file"] = "../first.parquet"
-
-    assert "outside the recording's folder" in error_of(write(tmp_path / "inner", change))
-
-
-def test_a_wrong_value_is_named_with_key_and_value(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["rate_hz"] = "fast"
+        *groups, last = key.split(".")
+        for group in groups:
+            data = data[int(group) if group.isdigit() else group]
+        data[last] = value
 
     message = error_of(write(tmp_path, change))
-    assert "'rate_hz'" in message
-    assert "'fast'" in message
+    assert said in message
+    assert str(tmp_path / "recording.yaml") in message
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("source: !!python/object/apply:os.system ['touch owned']", "only plain data is read"),
+        ("rate_hz: 200", "the key 'rate_hz' stands twice"),
+        ("object: {mass: 1e400}", "1e400 is larger than any number"),
+        ("object: {mass: 1.0e+400}", "1.0e+400 is larger than any number"),
+        ("source: " + "1:" * 100_000 + "1", "is larger than any number"),  # base 60, minutes of arithmetic
+        ("object: {<<: [{mass: 1}, {mass: 1}]}", "'<<' is not read"),  # 10 levels of 10 fill any memory
+        (f"source: [{'1,' * 220_000}]", "more than 200000 keys and values"),
+        (f"source: {'[' * 100_000}", "50 within each other"),
+        (f"source: {'x' * 2_000_000}", "MB; up to 2 MB are read here"),
+    ],
+)
+def test_a_description_that_is_a_trap_is_refused_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+    file = write(tmp_path) / "recording.yaml"
+    file.write_text(f"{file.read_text()}{text}\n")
+    assert said in error_of(tmp_path)
+    assert not (tmp_path / "owned").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("</robot>", "", "not well-formed XML"),
+        ('mass value="0.1"', 'mass value="-0.1"', "link 'upper' has mass -0.1 kg"),
+        ('mass value="0.1"', 'mass value="1e300"', "the mass of link 'upper' has value=\"1e300\""),
+        ('mass value="0.1"', 'mass value="1e6"', "link 'upper' has mass 1e+06 kg"),
+        ('ixx="1e-5"', 'ixx="3e-5"', "link 'upper' has principal moments of inertia 1e-05, 1e-05, 3e-05"),
+        ('ixy="0"', 'ixy="2e-5"', "link 'upper' has principal moments of inertia -1e-05, 1e-05, 3e-05"),
+        ('ixx="1e-5"', 'ixx="nan"', "the inertia of link 'upper' has ixx=\"nan\""),
+        ('xyz="0 0 -0.05"', 'xyz="0 0 1e300"', "it takes three numbers"),
+        ('joint name="b"', 'joint name="a"', "two joints are called 'a'"),
+        ('link name="lower"', 'link name="upper"', "two links are called 'upper'"),
+        ('child link="lower"', 'child link="upper"', "link 'upper' has more than one parent joint"),
+        ("<link ", "<a>" * 5000 + "</a>" * 5000 + "<link ", "nested too deeply"),
+        ("<link ", '<joint name="x"/>' * 1001 + "<link ", "it has 1003 joints"),
+    ],
+)
+def test_a_urdf_that_no_machine_has_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in URDF
+    message = error_of(write(tmp_path, urdf=URDF.replace(old, new, 1)))
+    assert said in message
+    assert "rig.urdf" in message
+
+
+def test_rounded_moments_of_a_thin_rod_and_a_mass_without_extent_are_bodies(tmp_path: Path) -> None:
+    rod = URDF.replace('ixx="1e-5" iyy="1e-5" izz="1e-5"', 'ixx="0.334" iyy="0.333" izz="0.000"', 1)
+    assert read_recording(write(tmp_path, urdf=rod.replace("1e-5", "0"))).warnings == ()
+
+
+@pytest.mark.parametrize("name", ["recording.yaml", "rig.urdf", "first.parquet"])
+@pytest.mark.parametrize("way", ["link", "loop", "pipe", "socket", "folder"])
+def test_a_place_without_a_regular_file_in_the_folder_is_refused(tmp_path: Path, name: str, way: str) -> None:
+    folder = write(tmp_path / "recording")
+    (folder / name).rename(tmp_path / name)
+    said = {"pipe": "is a pipe", "folder": "is a folder", "socket": "is a socket", "link": "lies outside of"}
+    if way in ("link", "loop"):
+        (folder / name).symlink_to(tmp_path / name if way == "link" else folder / name)
+    elif way == "folder":
+        (folder / name).mkdir()
+    else:
+        os.mkfifo(folder / name) if way == "pipe" else os.mknod(folder / name, stat.S_IFSOCK | 0o600)
+    message = error_of(folder)
+    assert said.get(way, "is no name of a file") in message
+    assert name in message
+
+
+@pytest.mark.parametrize("name", ["../{}", "{outside}/{}", "file://{outside}/{}", "trials/../../{}", "{}\0"])
+@pytest.mark.parametrize("file", ["rig.urdf", "first.parquet"])
+def test_a_name_that_leads_out_of_the_folder_is_refused(tmp_path: Path, name: str, file: str) -> None:
+    write(tmp_path)
+
+    def change(data: dict) -> None:
+        where = data["trials"][0] if file == "first.parquet" else data
+        where["file" if file == "first.parquet" else "rig"] = name.format(file, outside=tmp_path)
+
+    message = error_of(write(tmp_path / "inner", change))
+    assert "lies outside of" in message or "is no name of a file" in message
+
+
+def claiming(rows: int) -> bytes:
+    """An array as NPZ files hold it whose header claims more numbers than there are."""
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (rows,)})
+    return header.getvalue() + bytes(800)
+
+
+def test_an_npz_file_is_refused_by_the_size_that_it_claims(tmp_path: Path) -> None:
+    with ZipFile(with_first(tmp_path, "first.npz"), "w", ZIP_DEFLATED) as archive:
+        archive.writestr("time.npy", claiming(2_000_000_000))
+    assert "claims 1.6e+04 MB, 1.6e+04 of them for 'time'" in error_of(tmp_path)
+
+
+@pytest.mark.parametrize("ending", ["parquet", "csv", "npz"])
+def test_a_table_is_refused_by_its_size_before_it_is_read(
+    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, columns = with_first(tmp_path, f"first.{ending}"), table()
+    if ending == "npz":
+        np.savez(path, **columns)
+    else:
+        getattr(polars.DataFrame(columns), f"write_{ending}")(path)
+    assert read_recording(tmp_path).trials[0].position.shape == (300, 2)
+    monkeypatch.setattr(limits, "NUMBERS", 2 * 300 * 7)  # both trials
+    assert len(read_recording(tmp_path).trials) == 2
+    monkeypatch.setattr(limits, "NUMBERS", 2 * 300 * 7 - 1)
+    assert "second.parquet: holds 7 columns, 2100 numbers" in error_of(tmp_path)
+    monkeypatch.setattr(limits, "NUMBERS", 300 * 7 - 1)
+    for reader in ("LazyFrame.collect", "read_csv"):
+        monkeypatch.setattr(f"polars.{reader}", None)
+    assert ("claims" if ending == "npz" else "holds 7 columns") in error_of(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"time," * 300_000, "a line is longer than 1 MB"),
+        (b"time\n" + b"1" * 1_100_000, "a line is longer than 1 MB"),
+        (b"time" + b",x" * 5000 + b"\n1\n", "holds 5001 columns"),
+        (gzip.compress(b"time,a.command\n" + b"1,2\n" * 100), "is compressed; unpack it"),
+    ],
+    ids=["header", "row", "columns", "compressed"],
+)
+def test_a_csv_file_that_is_a_trap_is_refused(tmp_path: Path, content: bytes, said: str) -> None:
+    with_first(tmp_path, "first.csv").write_bytes(content)
+    assert said in error_of(tmp_path)
+
+
+def test_a_name_with_an_asterisk_is_no_pattern(tmp_path: Path) -> None:
+    """Polars would look for `*/first.parquet` in links that lead elsewhere too."""
+    (tmp_path / "*").mkdir()
+    polars.DataFrame(table()).write_parquet(with_first(tmp_path, "*/first.parquet"))
+    (tmp_path / "link").symlink_to(write(tmp_path / "elsewhere"))
+    assert read_recording(tmp_path).trials[0].position.shape == (300, 2)
+
+
+def test_more_missing_samples_than_there_are_is_an_error(tmp_path: Path) -> None:
+    """Gaps of 0.2 s at 100 kHz: 300 rows would become millions."""
+
+    def spoil(columns: Table) -> None:
+        columns["time"] = np.arange(300) * 1e-5 + 0.2 * (np.arange(300) // 4)
+
+    folder = write(tmp_path, lambda data: data.update(rate_hz=1e5), spoil)
+    assert "samples at rate_hz 100000 it has 300" in error_of(folder)
+
+
+def test_a_number_that_no_sensor_gives_is_named_with_its_row(tmp_path: Path) -> None:
+    def spoil(columns: Table) -> None:
+        columns["a.torque"][9] = 1e300
+
+    assert "'a.torque', row 9: received 1e+300" in error_of(write(tmp_path, spoil=spoil))

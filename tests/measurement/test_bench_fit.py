@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.measurement.bench import without_bench
 from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -44,7 +43,7 @@ def found(recording: Recording) -> BenchEstimates:
 def test_bench_tests_survive_writing_and_are_told_from_free_motion(recording: Recording) -> None:
     kinds = [trial.kind for trial in recording.trials]
     assert (kinds.count("known_force"), kinds.count("clamped"), kinds.count("touch")) == (12, 3, 6)
-    assert {trial.kind for trial in without_bench(recording).trials} == {"holds"}
+    assert {trial.kind for trial in recording.trials if not trial.is_bench} == {"holds"}
 
 
 @pytest.mark.parametrize("joint", ["a", "b"])
@@ -78,7 +77,10 @@ def test_the_estimates_go_into_a_model_file(found: BenchEstimates) -> None:
 
 
 def test_without_bench_tests_nothing_is_estimated(recording: Recording) -> None:
-    assert bench_estimates(without_bench(recording)) == BenchEstimates()
+    assert (
+        bench_estimates(recording.with_trials([one for one in recording.trials if not one.is_bench]))
+        == BenchEstimates()
+    )
 
 
 def test_the_model_file_with_bench_values_is_valid(found: BenchEstimates, tmp_path: Path) -> None:

@@ -20,7 +20,6 @@ from tactile_cube.randomization import Constant, LogUniform, Uniform
 
 Row = tuple[str, Any, str]
 PAPER, FINETUNE, FOLLOW_UP = "train +experiment=paper", "train +experiment=finetune", "train randomization=followup"
-RECIPE = "train +experiment=curriculum"
 
 
 def within(half_width: float) -> Uniform:
@@ -142,22 +141,6 @@ OWN: dict[str, list[Row]] = {
         ("env.randomization.factors.reflected_inertia", Uniform(0.8, 1.3), "estimate"),
         ("agent.learning_rate", 3e-4, "not published"),
         ("agent.tau", 0.005, "not published"),
-    ],
-    RECIPE: [
-        ("env.task.gravity_scale", 1.0, "full weight"),
-        ("env.exploration.demonstrations", 0.3, "README: a gait acts in 30 % of the episodes"),
-        ("env.exploration.episodes", 0.0, "nothing else acts"),
-        ("agent.demonstration_weight", 2, "imitates the gait where critics hold it for better"),
-        ("agent.n_step", 3, "regrasping is learned sooner"),
-        ("agent.gamma", 0.95, "a regrasp takes some twenty steps"),
-        (
-            "env.start.yaw_range",
-            0.0,
-            "the published start: the gait that demonstrates loses cubes that are turned [rad]",
-        ),
-        ("env.simulation.engine", "mixed", "neither engine's peculiarities are learned"),
-        ("env.randomization.values.tip_spinning_friction.low", 5e-4, "contacts that fingertips have [m]"),
-        ("env.randomization.values.tip_spinning_friction.high", 2e-2, "contacts that fingertips have [m]"),
     ],
 }
 

@@ -92,7 +92,7 @@ def test_grasps_that_do_not_fit_are_refused(tmp_path: Path, changed: dict[str, o
 def test_what_is_no_file_of_grasps_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text.npz").write_text("nothing")
     np.savez(tmp_path / "other.npz", angles=np.zeros((1, 12)))
-    told = {"none.npz": "no such file", "text.npz": "no file of grasps", "other.npz": "no file of grasps"}
+    told = {"none.npz": "no such file", "text.npz": "not a complete NPZ file", "other.npz": "no file of grasps"}
     for name, said in told.items():
         with pytest.raises(InputError, match=said):
             GraspStarts(str(tmp_path / name)).of(DLR_HAND2)

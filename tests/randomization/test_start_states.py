@@ -1,12 +1,10 @@
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, tip_positions
-from tactile_cube.randomization import Constant, Randomization, StartStates, Uniform
+from tactile_cube.randomization import Constant, Randomization, StartStates
 from tactile_cube.simulation import EpisodeConstants
 
 MOVED = Randomization(
@@ -47,11 +45,23 @@ def test_wide_starts_have_no_fingertip_inside_the_cube_and_all_near_it() -> None
     assert np.ptp(poses.yaws) == pytest.approx(1.5)
 
 
-def test_start_angles_vary_within_the_hardware_limits() -> None:
-    wild = dataclasses.replace(Randomization(), start_angles=Uniform(-5.0, 5.0))
-    start = StartStates().of(DLR_HAND2).sample(wild, EpisodeConstants(), np.random.default_rng(0))
-    assert np.all(start.angles >= DLR_HAND2.lower)
-    assert np.all(start.angles <= DLR_HAND2.upper)
+def test_the_only_pose_for_another_object_stands_off_its_own_faces() -> None:
+    poses = StartStates().of(DLR_HAND2, EpisodeConstants(cube_size=(0.08, 0.07, 0.08)))
+    start = poses.sample(Randomization(), EpisodeConstants(), np.random.default_rng(0))
+    assert np.asarray(start.cube_quaternion) == pytest.approx([0, 0, 0, 1])
+    ring, middle = tip_positions(DLR_HAND2, start.angles)[:2]
+    assert ring[1] == pytest.approx(-0.035 - DLR_HAND2.tip_radius - 1e-3, abs=1e-5)
+    assert middle[0] == pytest.approx(0.040 + DLR_HAND2.tip_radius + 1e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize(("by", "upper"), [(0.02, False), (5.0, True)])
+def test_start_angles_are_displaced_within_the_hardware_limits(by: float, upper: bool) -> None:
+    start = (
+        StartStates()
+        .of(DLR_HAND2)
+        .sample(Randomization(start_angles=Constant(by)), EpisodeConstants(), np.random.default_rng(0))
+    )
+    np.testing.assert_allclose(start.angles, DLR_HAND2.upper if upper else DLR_HAND2.start_angles + by)
 
 
 def test_yaw_range_beyond_the_cubes_symmetry_is_refused() -> None:

@@ -1,20 +1,24 @@
-"""What friction does in the engine: forces at sliding contacts, and what holds a cube against sliding and spinning."""
+"""What friction does in both engines: forces at sliding contacts, what holds a cube against sliding and spinning."""
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from tactile_cube.hand import DLR_HAND2, grasp_angles
-from tactile_cube.simulation import Contact, EpisodeConstants, Start, World
+from tactile_cube.simulation import Contact, EpisodeConstants, SimulationOptions, Start, World
+from tactile_cube.simulation.surface import Surface
 
 ALL, OPPOSING = (0, 1, 2, 3), (0, 2)
 SETTLED, WEIGHT = 15, 0.05 * 9.81
 
 
-@pytest.fixture(scope="module")
-def world() -> World:
-    return World()
+@pytest.fixture(scope="module", params=["bullet", "mujoco"])
+def world(request: pytest.FixtureRequest) -> Iterator[World]:
+    world = World(options=SimulationOptions(request.param))
+    yield world
+    world.close()
 
 
 def held(world: World, constants: EpisodeConstants, fingers: tuple[int, ...]) -> np.ndarray:
@@ -35,14 +39,23 @@ def normal_force(world: World) -> float:
     return sum(contact.force for contact in on_the_cube(world))
 
 
-@pytest.mark.parametrize("tip_friction", [0.9, 0.4])
-def test_tips_hold_the_cube_up_to_friction_times_normal_force(world: World, tip_friction: float) -> None:
-    constants = EpisodeConstants(tip_friction=tip_friction, filter_time=0.1, gravity_onset=1000)
+def test_what_two_surfaces_are_together_does_not_depend_on_which_is_named_first() -> None:
+    skin, hard = Surface(0.9, 0.003, 3e-4), Surface(0.5, 0.001)
+    assert skin.on(hard) == hard.on(skin)
+
+
+@pytest.mark.parametrize(("tip_friction", "cube_friction"), [(0.9, 1.0), (0.4, 1.0), (0.9, 0.5)])
+def test_tips_hold_the_cube_up_to_friction_times_normal_force(
+    world: World, tip_friction: float, cube_friction: float
+) -> None:
+    constants = EpisodeConstants(
+        tip_friction=tip_friction, cube_friction=cube_friction, filter_time=0.1, gravity_onset=1000
+    )
     lifted = []
     for share in (0.8, 1.3):
         target = held(world, constants, ALL)
         before = world.cube_position[2]
-        world.push_cube(np.array([0.0, 0.0, share * tip_friction * normal_force(world)]), np.zeros(3))
+        world.push_cube(np.array([0.0, 0.0, share * tip_friction * cube_friction * normal_force(world)]), np.zeros(3))
         for _ in range(3):
             world.step(target)
         lifted.append(world.cube_position[2] - before)
@@ -68,14 +81,20 @@ def test_a_sliding_cube_is_braked_by_the_friction_of_the_part_that_it_slides_on(
     assert max(ratios[False]) == pytest.approx(link_friction, rel=0.01)
 
 
-@pytest.mark.parametrize("spinning_friction", [0.001, 0.003])
+@pytest.mark.parametrize(("spinning_friction", "cube_friction"), [(0.001, 1.0), (0.003, 1.0), (0.003, 0.6)])
 def test_two_tips_hold_a_weight_at_a_lever_up_to_spinning_friction_times_normal_force(
-    world: World, spinning_friction: float
+    world: World, spinning_friction: float, cube_friction: float
 ) -> None:
     turned = []
-    grip = EpisodeConstants(tip_spinning_friction=spinning_friction, filter_time=0.1, gravity_onset=SETTLED)
+    grip = EpisodeConstants(
+        tip_spinning_friction=spinning_friction,
+        tip_friction=0.9,
+        cube_friction=cube_friction,
+        filter_time=0.1,
+        gravity_onset=SETTLED,
+    )
     held(world, grip, OPPOSING)
-    limit = spinning_friction * normal_force(world)
+    limit = spinning_friction * cube_friction * normal_force(world)
     for share in (0.7, 1.4):
         constants = dataclasses.replace(grip, cube_com=(share * limit / WEIGHT, 0.0, 0.0))
         target = held(world, constants, OPPOSING)

@@ -22,4 +22,7 @@ def test_sizes_follow_the_given_distributions() -> None:
     assert abs(force.mean() - 0.04) < 0.001
     assert abs(force.std() - 0.008) < 0.001
     assert abs(torque.mean() - 0.002) < 5e-5
-    assert np.abs(drawn[:, :3].mean(axis=0)).max() < 0.003
+    assert abs(torque.std() - 0.0004) < 5e-5
+    ways = np.hstack([drawn[:, :3] / force[:, None], drawn[:, 3:] / torque[:, None]])
+    assert np.abs(ways.mean(axis=0)).max() < 0.07
+    assert np.abs(np.corrcoef(ways.T) - np.eye(6)).max() < 0.15, "every way is as likely, those of the torque apart"

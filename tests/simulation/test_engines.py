@@ -9,12 +9,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tactile_cube.drivetrain import DrivetrainConstants
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
 from tactile_cube.hand.model import FingerBase
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.simulation import EpisodeConstants, RigWorld, SimulationOptions, Start, World, mujoco_model
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, mujoco_model
 
 ENGINES = ("bullet", "mujoco")
 NOWHERE, FLOATS = (0.0, 0.0, 9.0), 10**6
@@ -77,7 +76,6 @@ def test_free_fingers_move_alike_in_both_engines(dt: float) -> None:
     assert np.abs(bullet - other).max() < 0.5e-3
 
 
-needs_recordings = pytest.mark.skipif(not PLAIN.exists(), reason="the recordings are not beside the repository")
 OF_PLAIN = {
     "kd": (0.23595, 0.22932, 0.22615),
     "static_friction": (0.02432, 0.02429, 0.01524),
@@ -85,7 +83,7 @@ OF_PLAIN = {
 }
 
 
-@needs_recordings
+@pytest.mark.skipif(not PLAIN.exists(), reason="the recordings are not beside the repository")
 def test_mujoco_follows_a_measured_finger_to_a_milliradian(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four trials of finger_plain at once, one by each finger of a hand whose fingers are that finger."""
     rig = (PLAIN / "rig.urdf").read_text()
@@ -103,18 +101,6 @@ def test_mujoco_follows_a_measured_finger_to_a_milliradian(monkeypatch: pytest.M
             world.step(row)
             error[k] = world.q_m - measured[k]
         assert milliradians(error).max() < 1.0, paths[first : first + 4]
-    world.close()
-
-
-@needs_recordings
-def test_bullet_follows_a_measured_finger_to_a_milliradian() -> None:
-    world = RigWorld.from_urdf((PLAIN / "rig.urdf").read_text(), dt=5e-4)
-    constants = DrivetrainConstants(kp=3.69, stiffness=25.0, **OF_PLAIN)
-    for path in sorted((PLAIN / "trials").glob("*.parquet")):
-        command, measured, torque = columns([path])
-        start = measured[0] - torque[0] / 25.0
-        position, _ = world.replay(command, start, constants, np.array([0.0, 0.0, -9.81]), substeps=4)
-        assert milliradians(position - measured).max() < 1.0, path
     world.close()
 
 

@@ -1,7 +1,4 @@
-from pathlib import Path
-
 import numpy as np
-import polars
 import pybullet
 import pytest
 
@@ -12,14 +9,7 @@ from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation import RigWorld
 
-RECORDING = Path(__file__).parents[3] / "shared" / "recordings" / "finger_plain"
 SIGNALS = np.array([MOTOR_POSITION, TORQUE])
-# the true constants of finger_plain, from the notes that came with it
-TRUE = DrivetrainConstants(
-    kd=(0.23595, 0.22932, 0.22615),
-    static_friction=(0.02432, 0.02429, 0.01524),
-    reflected_inertia=(0.00281, 0.00315, 0.00318),
-)
 
 
 def commands(rows: int, joints: int) -> np.ndarray:
@@ -95,24 +85,3 @@ def test_a_hand_of_several_chains_is_refused() -> None:
     tree = RigidBodyTree.from_urdf(finger_urdf(DLR_HAND2))
     with pytest.raises(InputError, match="moves one chain, this plant has 2"):
         RigWorld(Plant([tree, tree], 0.002))
-
-
-@pytest.mark.skipif(not RECORDING.exists(), reason="the shared recordings are not here")
-@pytest.mark.parametrize(("dt", "bound"), [(0.0005, 1e-3), (0.002, 1.5e-3)])
-@pytest.mark.parametrize("kind", ["ramps_0", "multisine_1", "policy_2", "holds_0"])
-def test_a_finger_follows_the_recording_of_a_second_engine(kind: str, dt: float, bound: float) -> None:
-    trial = polars.read_parquet(RECORDING / "trials" / f"{kind}.parquet")
-    command, position, torque = (
-        trial.select([f"q{j}.{name}" for j in (1, 2, 3)]).to_numpy().astype(float)
-        for name in ("command", "position", "torque")
-    )
-    world = RigWorld.from_urdf((RECORDING / "rig.urdf").read_text(), dt)
-    memory = world.plant.memory(TRUE)
-    world.plant.reset(memory, position[:5].mean(axis=0) - torque[:5].mean(axis=0) / 25.0)
-    world.plant.view(memory, "reading")[:] = 0.0
-    out = np.empty((len(command), 1, 3))
-    world.rollout(command, 0, round(0.002 / dt), memory, SIGNALS[:1], out)
-    error = out[1:, 0] - position[:-1]  # a sample is taken when its command has acted for a period
-    error -= error.mean(axis=0)
-    assert np.sqrt((error**2).mean(axis=0)).max() < bound
-    world.close()

@@ -1,9 +1,11 @@
+from typing import Literal
+
 import numpy as np
 import pybullet
 import pytest
 
 from tactile_cube.hand import DLR_HAND2, grasp_angles
-from tactile_cube.simulation import EpisodeConstants, Start, World
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 
 HAND = DLR_HAND2
 
@@ -40,14 +42,16 @@ def test_links_that_are_spared_the_broadphase_have_no_shape() -> None:
     world.close()
 
 
-def test_fingers_touch_the_table_and_each_other_but_not_themselves() -> None:
-    world, pairs, away = World(), set(), Start(HAND.start_angles, (0.0, 0.0, 3.0))
+@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
+def test_fingers_touch_the_table_and_each_other_but_not_themselves(engine: Literal["bullet", "mujoco"]) -> None:
+    world, pairs, away = World(options=SimulationOptions(engine)), set(), Start(HAND.start_angles, (0.0, 0.0, 3.0))
     world.reset(EpisodeConstants(table_height=-0.01, filter_time=0.1, gravity_onset=99), away)
     crossing = HAND.start_angles.copy()
     crossing[[3, 6]] = np.radians([-28.0, 28.0])
     for _ in range(12):
         world.step(crossing)
         pairs |= {frozenset((contact.finger, contact.other)) for contact in world.contacts()}
-    assert {frozenset(("fore", "table")), frozenset(("fore", "middle"))} <= pairs
+    assert frozenset(("fore", "middle")) in pairs
+    assert any("table" in pair for pair in pairs)
     assert all(len(pair) == 2 for pair in pairs)
     world.close()

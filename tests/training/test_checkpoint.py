@@ -1,7 +1,6 @@
 """Checkpoints are whole or not there, cost what is new, and the one before serves when the newest is damaged."""
 
 import errno
-import os
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import torch
 
 from tactile_cube.errors import InputError
 from tactile_cube.training import checkpoint, replay_files
-from tactile_cube.training.checkpoint import BEFORE, FILE, load_checkpoint
+from tactile_cube.training.checkpoint import BEFORE, FILE
 from tests.training.test_loop import finish
 from tests.training.tiny_run import tiny_run
 
@@ -108,25 +107,3 @@ def test_a_crash_between_two_renames_goes_on_from_the_one_before(tmp_path: Path,
     resumed = tiny_run(tmp_path)
     assert resumed.learner.steps == 80
     assert torch.equal(finish(resumed), reference)
-
-
-def test_a_checkpoint_runs_no_code(tmp_path: Path) -> None:
-    class Harmful:
-        def __reduce__(self) -> tuple[Any, ...]:
-            return os.mkdir, (str(tmp_path / "harm"),)
-
-    torch.save({"learner": Harmful()}, tmp_path / FILE)
-    with pytest.raises(InputError, match="damaged checkpoint"):
-        load_checkpoint(tmp_path / FILE)
-    assert not (tmp_path / "harm").exists()
-
-
-def test_a_checkpoint_without_checksum_from_before_there_were_any_is_read(tmp_path: Path) -> None:
-    run = tiny_run(tmp_path / "a", steps=80)
-    finish(run)
-    (tmp_path / "b").mkdir()
-    state = {"learner": run.learner.state_dict(), "best_angle": 0.0, "config": run.config}
-    torch.save(state, tmp_path / "b" / FILE)
-    resumed = tiny_run(tmp_path / "b", steps=80)
-    assert resumed.learner.steps == 80
-    assert torch.equal(resumed.learner.replay.rows, run.learner.replay.rows)

@@ -46,25 +46,21 @@ def collect(collection: MultiSyncCollection, blocks: int = 1) -> None:
         collection.take()
 
 
-def test_killed_worker_is_reported_within_seconds() -> None:
+def test_killed_worker_is_reported_without_waiting_for_the_timeout() -> None:
     collection = start(processes=2)
     collection.restart(0, (0, 0.0))
     collect(collection)
-    began = time.perf_counter()
     os.kill(collection._processes[0].pid, signal.SIGKILL)
-    with pytest.raises(CollectionError, match="worker"):
+    with pytest.raises(CollectionError, match=r"^simulation worker failed to"):  # not: no answer within the timeout
         collect(collection, blocks=3)
     collection.close()
-    assert time.perf_counter() - began < 20.0
 
 
 def test_stuck_worker_is_reported_after_the_timeout() -> None:
     collection = start(make=StuckEnv, timeout=2.0)
-    began = time.perf_counter()
     with pytest.raises(CollectionError, match=r"collector\.timeout=2 s"):
         collect(collection, blocks=3)
     collection.close()
-    assert time.perf_counter() - began < 20.0
 
 
 def test_a_cold_start_is_not_taken_for_a_stuck_worker() -> None:

@@ -1,12 +1,12 @@
 """What a run costs."""
 
 import json
-import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from tactile_cube.training.ledger import LEDGER, Ledger
+from tactile_cube.training.ledger import LEDGER, Costs, Ledger
 
 
 def test_costs_add_up_over_sessions(tmp_path: Path) -> None:
@@ -16,20 +16,14 @@ def test_costs_add_up_over_sessions(tmp_path: Path) -> None:
         assert json.loads((tmp_path / LEDGER).read_text())["seconds"]["simulating"] == pytest.approx(expected)
 
 
-def test_reserved_time_without_work_is_waiting(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path / LEDGER, processes=3, simulating=lambda: 0.0, in_process=False)
-    time.sleep(0.2)
-    costs = ledger.costs()
-    assert costs.learning < 0.1
-    assert costs.waiting == pytest.approx(3 * costs.wall - costs.learning, rel=0.05)
-
-
-def test_simulation_in_this_process_is_not_booked_as_learning(tmp_path: Path) -> None:
-    began = time.process_time()
-    ledger = Ledger(tmp_path / LEDGER, processes=1, simulating=lambda: time.process_time() - began, in_process=True)
-    while time.process_time() - began < 0.1:
-        pass
-    assert ledger.costs().learning < 0.02
+@pytest.mark.parametrize(("in_process", "learning", "waiting"), [(False, 2.0, 20.0), (True, 1.5, 20.5)])
+def test_what_neither_workers_nor_learner_used_of_the_cores_is_waiting(
+    tmp_path: Path, in_process: bool, learning: float, waiting: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clocks = SimpleNamespace(perf_counter=iter([100.0, 107.5]).__next__, process_time=iter([30.0, 32.0]).__next__)
+    monkeypatch.setattr("tactile_cube.training.ledger.time", clocks)
+    costs = Ledger(tmp_path / LEDGER, processes=3, simulating=lambda: 0.5, in_process=in_process).costs()
+    assert costs == Costs(simulating=0.5, learning=learning, waiting=waiting, wall=7.5)
 
 
 def test_damaged_ledger_counts_as_empty(tmp_path: Path) -> None:

@@ -12,9 +12,9 @@ from hydra.utils import instantiate
 
 from tactile_cube.command_help import CONFIG
 from tactile_cube.curriculum import LinearCurriculum
-from tactile_cube.env import Reward
+from tactile_cube.env import Reward, Task
 from tactile_cube.errors import InputError
-from tactile_cube.randomization import LogUniform, StartStates
+from tactile_cube.randomization import StartStates
 from tactile_cube.transforms import EnvConfig, make_env
 from tests.meshes import CUBE, write_obj
 
@@ -85,25 +85,11 @@ def test_grasps_are_refused_where_the_object_lies_on_a_table() -> None:
 
 
 def test_published_options_equal_the_published_defaults_of_the_code() -> None:
-    config = configured(curriculum="linear")
+    config = configured(task="full", curriculum="linear")
+    assert config.task == Task("full")
     assert config.reward == Reward()
     assert config.start == StartStates()
     assert config.curriculum == LinearCurriculum()
-    assert (config.randomization.sensor_noise, config.randomization.sticky_probability) == (0.002, 0.1)
-    assert config.stack == 5
-
-
-def test_early_reward_makes_motion_cheap_and_twisted_fingers_dear() -> None:
-    early, paper = configured(reward="early").reward, Reward()
-    for term in ("height", "plane", "tilt"):
-        assert getattr(early, term) == pytest.approx(0.2 * getattr(paper, term))
-    assert (early.spin, early.proximal, early.leaving) == (16, 8, 20)
-
-
-def test_followup_has_the_published_spinning_friction_and_forces() -> None:
-    values = configured(randomization="followup").randomization.values
-    assert values["tip_spinning_friction"] == LogUniform(2e-4, 2e-2)
-    assert (values["force_mean"].value, values["force_std"].value) == (0.04, 0.008)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 import torch
 from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import check_env_specs, step_mdp
+from torchrl.envs.utils import step_mdp
 
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
@@ -38,17 +39,23 @@ def test_single_fingers_move_one_at_a_time(transformed: MakeEnv) -> None:
     assert moved.any(dim=(0, 1)).all()
 
 
-def test_whole_fingers_hold_a_target_for_two_to_seven_steps(transformed: MakeEnv) -> None:
+def test_one_two_or_all_fingers_hold_a_random_target_for_two_to_seven_steps(transformed: MakeEnv) -> None:
     env = transformed(FingerExploration(Exploration(episodes=1.0, probability=0.06)), worlds=60)
-    taken = run(env, 60, 80)
-    moved = (taken != 0.0).all(-1)
-    assert torch.equal(moved, (taken != 0.0).any(-1))
-    assert set(moved.sum(-1).unique().tolist()) == {0, 1, 2, 4}
-    lengths = []
+    taken, lengths, held = run(env, 60, 80).flatten(2), [], []
     for world in range(60):
-        runs, count = torch.unique_consecutive(taken[:, world].flatten(1), dim=0, return_counts=True)
-        lengths += count[(runs != 0.0).any(-1)][:-1].tolist()
+        runs, count = torch.unique_consecutive(taken[:, world], dim=0, return_counts=True)
+        holds = (runs != 0.0).any(-1)
+        lengths += count[holds][:-1].tolist()
+        held.append(runs[holds].unflatten(-1, (4, 3)))
+    targets = torch.cat(held)
+    moved = (targets != 0.0).all(-1)
+    assert torch.equal(moved, (targets != 0.0).any(-1))
+    shares = torch.bincount(moved.sum(-1), minlength=5) / len(moved)
+    assert shares.tolist() == pytest.approx([0.0, 0.5, 0.25, 0.0, 0.25], abs=0.08)
     assert set(lengths) == {2, 3, 4, 5, 6, 7}
+    angles = targets[moved]
+    assert (angles.min(), angles.max()) == pytest.approx((-1.0, 1.0), abs=0.02)
+    assert float(angles.mean()) == pytest.approx(0.0, abs=0.05)
 
 
 def test_what_was_taken_reaches_the_world(transformed: MakeEnv) -> None:
@@ -95,11 +102,6 @@ def test_noise_on_demonstrations_stays_in_the_action_range(transformed: MakeEnv)
     assert float(taken.mean()) == pytest.approx(0.83, abs=0.03)
 
 
-def test_more_than_all_episodes_are_refused() -> None:
-    with pytest.raises(InputError, match="more than all"):
-        Exploration(episodes=0.6, demonstrations=0.5)
-
-
 def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> None:
     env = transformed(FingerExploration(Exploration(episodes=1.0, probability=1.0, shortest=7)), worlds=2)
     data = step_mdp(env.step(env.reset().set("action", torch.zeros(2, 12))))
@@ -110,15 +112,17 @@ def test_partial_reset_keeps_the_other_worlds_targets(transformed: MakeEnv) -> N
     assert not torch.equal(after[0], before[0])
 
 
-def test_impossible_settings_are_refused() -> None:
-    with pytest.raises(InputError, match=r"exploration\.episodes is 1\.5"):
-        Exploration(episodes=1.5)
-    with pytest.raises(InputError, match="shortest"):
-        Exploration(shortest=8)
-
-
-def test_specs_hold(transformed: MakeEnv) -> None:
-    check_env_specs(transformed(FingerExploration(Exploration())))
+def test_a_gait_begins_anew_in_the_worlds_that_are_reset(transformed: MakeEnv) -> None:
+    gait = (torch.arange(9.0) / 10.0)[None, :, None].expand(1, 9, 12)
+    explore = Exploration(episodes=0.0, probability=0.0, demonstrations=1.0, noise=0.0)
+    env = transformed(FingerExploration(explore, gait))
+    data = env.reset()
+    for _ in range(3):
+        data = step_mdp(env.step(data.set("action", torch.zeros(2, 12))))
+    data = env.reset(data.set("_reset", torch.tensor([[True], [False]])))
+    assert data["demonstrated"].flatten().tolist() == [False, True]
+    taken = env.step(data.set("action", torch.zeros(2, 12)))["next", "action_taken"]
+    torch.testing.assert_close(taken, torch.tensor([[0.0], [0.3]]).expand(2, 12))
 
 
 def test_a_teacher_acts_on_what_it_observes() -> None:
@@ -137,6 +141,18 @@ def test_a_teacher_acts_on_what_it_observes() -> None:
     assert torch.equal(torch.stack(seen, 1), rollout["observation"])
 
 
-def test_gaits_and_a_teacher_at_once_are_refused() -> None:
-    with pytest.raises(InputError, match=r"exploration\.teacher=default beside exploration\.gaits"):
-        Exploration(demonstrations=0.3, gaits=GaitRanges(low={}, high={}), teacher="default")
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"episodes": 1.5}, r"exploration\.episodes is 1\.5"),
+        ({"episodes": 0.6, "demonstrations": 0.5}, "more than all"),
+        ({"shortest": 8}, "shortest"),
+        (
+            {"gaits": GaitRanges(low={}, high={}), "teacher": "default"},
+            r"exploration\.teacher=default beside exploration\.gaits",
+        ),
+    ],
+)
+def test_impossible_settings_are_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Exploration(**wrong)

@@ -1,4 +1,3 @@
-import pickle
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,7 @@ from torchrl.envs.utils import check_env_specs, step_mdp
 
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
-from tactile_cube.randomization import Randomization, StartStates, Uniform
+from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.simulation import SimulationOptions
 from tactile_cube.transforms import EnvConfig, Exploration, make_env
 from tactile_cube.transforms.make_env import rotation_env
@@ -71,10 +70,6 @@ def test_evaluation_leaves_out_the_extra_exploration() -> None:
     keys = make_env(config(), worlds=1, seed=0, evaluation=True).rollout(1).keys(True)
     assert "exploring" not in keys
     assert ("next", "action_taken") not in keys
-
-
-def test_configuration_can_be_sent_to_another_process() -> None:
-    assert pickle.loads(pickle.dumps(config(start=StartStates(poses=3, yaw_range=0.5)))).start.poses == 3
 
 
 def test_no_worlds_are_refused() -> None:

@@ -1,23 +1,15 @@
-from collections.abc import Callable
-
+import pytest
 import torch
-from torchrl.envs import TransformedEnv
-from torchrl.envs.utils import check_env_specs
+from tensordict import TensorDict
 
 from tactile_cube.transforms import PrivilegedState
-from tactile_cube.transforms.privileged_state import SCALE
 
-MakeEnv = Callable[..., TransformedEnv]
+USUAL = [0.01] * 3 + [1.0] * 2 + [0.1] * 2 + [0.05] * 3 + [1.0] * 15
+"""Centimetres, sin and cos, tilt [rad], velocity [m/s], angular velocity [rad/s], q_f [rad]."""
 
 
-def test_privileged_is_the_object_state_in_its_scale(transformed: MakeEnv) -> None:
-    env = transformed(PrivilegedState())
-    data = env.reset()
-    raw = torch.tensor(env.base_env._moments[0].object_state).float()
-    assert torch.allclose(data["privileged"][0], raw * torch.tensor(SCALE))
+@pytest.mark.parametrize("visible", [True, False])
+def test_numbers_of_the_usual_size_become_ones_if_visible(visible: bool) -> None:
+    data = PrivilegedState(visible=visible)._call(TensorDict({"object_state": torch.tensor([USUAL] * 2)}, [2]))
+    torch.testing.assert_close(data["privileged"], torch.full((2, 25), float(visible)))
     assert "object_state" not in data
-    assert len(SCALE) == 25
-
-
-def test_specs_hold(transformed: MakeEnv) -> None:
-    check_env_specs(transformed(PrivilegedState()))

@@ -24,6 +24,7 @@ from tactile_cube.visualization.diagnosis_report import diagnosis_report, identi
 from tactile_cube.visualization.diagnosis_sections import staircase_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report
 from tactile_cube.visualization.svg import MEASURED
+from tests.identification.easy_safety import half_used
 from tests.measurement.small_rig import URDF, write
 
 VOID = {"meta", "br", "line", "rect", "circle", "path", "input", "link"}
@@ -122,14 +123,6 @@ def test_compare_and_diagnose_state_one_floor(comparison: Comparison) -> None:
     assert any(line.startswith("beside it: the simulator's own time step") for line in lines)
 
 
-def test_the_diagnosis_draws_traces_before_and_after(comparison: Comparison, tmp_path: Path) -> None:
-    before = compare(comparison.recording, floor=comparison.floor)
-    text = page(diagnosis_report(DIAGNOSIS, before, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
-    assert "Measured and simulated, before and after what was found" in text
-    for name in ("simulated before", "simulated after", "error before", "error after"):
-        assert name in text
-
-
 def test_a_sliding_joint_is_shown_in_millimetres_and_newtons(tmp_path: Path) -> None:
     urdf = URDF.replace('name="a" type="revolute"', 'name="a" type="prismatic"')
     recording = read_recording(write(tmp_path / "r", urdf=urdf))
@@ -179,10 +172,13 @@ DIAGNOSIS = {
 }
 
 
-def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals(
+def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals_and_draws_traces_before_and_after(
     comparison: Comparison, tmp_path: Path
 ) -> None:
-    text = page(diagnosis_report(DIAGNOSIS, comparison, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
+    before = compare(comparison.recording, floor=comparison.floor)
+    text = page(diagnosis_report(DIAGNOSIS, before, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
+    for name in ("before and after", "simulated before", "simulated after", "error before", "error after"):
+        assert name in text
     assert "The missing effect was found: command_delay at a." in text
     assert "0.02 s [0.015, 0.025]" in text
     assert "cannot be told from actuator_lag" in text
@@ -207,17 +203,27 @@ def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison
     time = np.linspace(0, 1, 50)
     wave = np.sin(time)[:, None] * [1.0, 1.0]
     predictions = {"command_delay@a": wave, "actuator_lag@a": 1.01 * wave}
-    experiment = Experiment("multisine", ("a", "b"), time, wave, 4.0, "a", predictions)
+    experiment = Experiment("multisine", ("a", "b"), time, wave, 4.0, "a", predictions, half_used(2))
     report = diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment)
     text = page(report, tmp_path / "d.html")
     assert "What to record next" in text
     assert "next_experiment.csv" in text
     assert "Each should say 4 times as much" in text
+    assert "multisine at 64 % of full size, 1 s" in text
+    assert "stop beyond: position" in text
+    assert "-0.9 to 0.9 rad (URDF)" in text
+    assert "Stop when a joint goes beyond these limits" in text
     assert "actuator_lag@a" in text
     alike = (("command_delay@a", "actuator_lag@a"),)
-    experiment = Experiment("multisine", ("a", "b"), time, wave, 0.1, "a", predictions, alike)
+    experiment = Experiment("multisine", ("a", "b"), time, wave, 0.1, "a", predictions, half_used(2), alike)
     text = page(diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
     assert "No command tried would tell command_delay@a from actuator_lag@a" in text
+    assert "To decide" not in text
+    unsafe = replace(half_used(2), margin=0.6)
+    experiment = Experiment("multisine", ("a", "b"), time, wave, 0.0, "a", {}, unsafe)
+    text = page(diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
+    assert "No safe command was found" in text
+    assert "allowed: position" in text
     assert "To decide" not in text
 
 
@@ -241,7 +247,7 @@ def test_what_the_trials_do_not_prove_is_named_and_more_is_asked_for(comparison:
     unsure = DIAGNOSIS | {"verdict": "unknown_effect", "effects": [], "unproven_effects": [maybe]}
     time = np.arange(3) * 0.1
     predictions = {"none of them": np.zeros((3, 2)), "backlash@a": np.ones((3, 2))}
-    experiment = Experiment("slow triangles", ("a", "b"), time, np.ones((3, 2)), 4.0, "a", predictions)
+    experiment = Experiment("slow triangles", ("a", "b"), time, np.ones((3, 2)), 4.0, "a", predictions, half_used(2))
     asked = unsure | {"next_experiment": "next_experiment.csv"}
     text = page(diagnosis_report(asked, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
     assert "these trials do not suffice to prove what" in text

@@ -50,6 +50,10 @@ class Actor(nn.Module):
         mean, raw = self.body(observation).chunk(2, -1)
         return mean, log_scale(raw).exp()
 
+    def layers(self) -> list[nn.Linear]:
+        """The linear layers, the first one first."""
+        return [layer for layer in self.body if isinstance(layer, nn.Linear)]
+
     def deterministic(self, observation: Tensor) -> Tensor:
         """The policy without exploration: tanh of the mean, (batch, action)."""
         mean: Tensor = self.forward(observation)[0]

@@ -3,29 +3,43 @@
 Tensors are named `actor.<layer>.weight` (out, in) and `actor.<layer>.bias` (out,), layer 0 first, ReLU between layers;
 the last layer gives mean and raw log sigma side by side, and the action is tanh(mean).
 The metadata's `sha256` is the digest of the whole file with 64 zeros in the digest's own place: any changed byte shows.
+
+Every command reads a policy with `read_policy`, which needs no torch: checksum, sizes and numbers are checked in it.
 """
 
+from __future__ import annotations
+
 import hashlib
+import itertools
 import json
 import subprocess
-import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
-import torch
-from pydantic import BaseModel, ConfigDict, Field, PositiveInt
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
-from torch import Tensor, nn
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
 from tactile_cube.whole_file import write_whole
 
+if TYPE_CHECKING:
+    from tactile_cube.agent.networks import Actor
+
 FORMAT = "tactile_cube policy 2"
-WITHOUT_CHECKSUM = "tactile_cube policy 1"
 NO_DIGEST = b"0" * 64
+LARGEST, LARGEST_HEADER = 1 << 28, 1 << 22
+"""Bytes of a file and of its header; the shipped policies have 1.4 million and some thousand."""
+WIDEST, DEEPEST = 1 << 16, 32
+Width = Annotated[int, Field(gt=0, le=WIDEST)]
+"""Number of units of a layer."""
+Array = NDArray[np.float32]
+Layer = tuple[Array, Array]
+"""Weight (out, in) and bias (out,)."""
 
 
 class PolicyInfo(BaseModel):
@@ -48,15 +62,15 @@ class PolicyInfo(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    observation_size: PositiveInt
-    action_size: PositiveInt
+    observation_size: Width
+    action_size: Width
     action_low: float = -1.0
     action_high: float = 1.0
-    hidden: tuple[PositiveInt, ...]
-    time_constant: float | None = None
+    hidden: tuple[Width, ...] = Field(max_length=DEEPEST)
+    time_constant: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     seed: int = 0
     steps: int = 0
-    commit: str = "unknown"
+    commit: str = Field(default="unknown", pattern=r"^[\w.-]{1,64}$")
     performance: float | None = None
     averaged: tuple[int, ...] = ()
     config: dict[str, Any] = Field(default_factory=dict)
@@ -64,52 +78,68 @@ class PolicyInfo(BaseModel):
     @classmethod
     def describe(cls, actor: Actor, **provenance: Any) -> Self:
         """Sizes read off the actor, the rest as given."""
-        widths = [layer.out_features for layer in _linears(actor)]
+        widths = [layer.out_features for layer in actor.layers()]
         return cls(
-            observation_size=_linears(actor)[0].in_features,
+            observation_size=actor.layers()[0].in_features,
             action_size=widths[-1] // 2,
             hidden=tuple(widths[:-1]),
             **provenance,
         )
 
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """The tensors of the file by name."""
+        widths = itertools.pairwise((self.observation_size, *self.hidden, 2 * self.action_size))
+        layers = {f"actor.{k}": pair for k, pair in enumerate(widths)}
+        weights = {f"{name}.weight": (fan_out, fan_in) for name, (fan_in, fan_out) in layers.items()}
+        return {**weights, **{f"{name}.bias": (fan_out,) for name, (_, fan_out) in layers.items()}}
+
 
 def save_policy(path: Path, actor: Actor, info: PolicyInfo) -> None:
     """Write a policy file; readers never see it half written."""
-    tensors: dict[str, Tensor] = {}
-    for index, layer in enumerate(_linears(actor)):
-        tensors[f"actor.{index}.weight"] = layer.weight.detach().cpu().contiguous()
-        tensors[f"actor.{index}.bias"] = layer.bias.detach().cpu().contiguous()
+    tensors: dict[str, Array] = {}
+    for index, layer in enumerate(actor.layers()):
+        tensors[f"actor.{index}.weight"] = layer.weight.detach().cpu().numpy()
+        tensors[f"actor.{index}.bias"] = layer.bias.detach().cpu().numpy()
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, sealed(tensors, info.model_dump_json()))
 
 
-def sealed(tensors: dict[str, Tensor], info: str) -> bytes:
+def sealed(tensors: Mapping[str, Array], info: str) -> bytes:
     """The contents of a policy file: tensors, and metadata with the checksum of all of it."""
-    content = save(tensors, {"sha256": NO_DIGEST.decode(), "format": FORMAT, "info": info})
+    content = save(dict(tensors), {"sha256": NO_DIGEST.decode(), "format": FORMAT, "info": info})
     return content.replace(NO_DIGEST, _digest(content), 1)
 
 
-def load_policy(path: Path | str) -> tuple[Actor, PolicyInfo]:
-    """Read a policy file.
+def read_policy(path: Path) -> tuple[PolicyInfo, list[Layer]]:
+    """Read a policy file: what it says of itself, and its layers, the first one first.
 
     Raises:
-        InputError: the file is missing, damaged, no policy, or its tensors do not have the sizes it states.
-
-    A file from before there were checksums is read with a warning.
+        InputError: the file is missing, too large, damaged, no policy, of other sizes than it states, or holds numbers
+            that are not finite.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: no such policy file; train one or give policy=<file>.safetensors")
+    content = _content(path)
+    info = _read_info(path, _verified(path, content))
     try:
-        with safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    except (SafetensorError, OSError, RuntimeError) as error:
-        raise InputError(f"{path}: damaged or not a safetensors file ({error})") from error
-    _verify(path, metadata)
-    info = _read_info(path, metadata)
+        tensors = load(content)
+    except (SafetensorError, KeyError, ValueError) as error:
+        raise InputError(f"{path}: damaged or not a policy file ({error})") from error
+    _require(path, tensors, info.shapes())
+    layers = range(len(info.hidden) + 1)
+    return info, [(tensors[f"actor.{k}.weight"], tensors[f"actor.{k}.bias"]) for k in layers]
+
+
+def load_policy(path: Path | str) -> tuple[Actor, PolicyInfo]:
+    """Read a policy file as torch's network; raises what `read_policy` does."""
+    import torch  # imports slowly, and the robot's computer does without it
+
+    from tactile_cube.agent.batch import Sizes
+    from tactile_cube.agent.networks import Actor
+
+    info, layers = read_policy(Path(path))
     actor = Actor(Sizes(info.observation_size, 0, info.action_size), info.hidden).requires_grad_(False)
-    _fill(path, actor, tensors)
+    for own, (weight, bias) in zip(actor.layers(), layers, strict=True):
+        own.weight.copy_(torch.from_numpy(weight))
+        own.bias.copy_(torch.from_numpy(bias))
     return actor, info
 
 
@@ -132,41 +162,60 @@ def current_commit() -> str:
     return run.stdout.strip() or "unknown"
 
 
-def _linears(actor: Actor) -> list[nn.Linear]:
-    return [layer for layer in actor.body if isinstance(layer, nn.Linear)]
+def _content(path: Path) -> bytes:
+    if not path.is_file():
+        raise InputError(f"{path}: no such policy file; train one or give policy=<file>.safetensors")
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{path}: {path.stat().st_size} bytes; a policy file has at most {LARGEST}")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _digest(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest().encode()
 
 
-def _verify(path: Path, metadata: dict[str, str]) -> None:
-    """Refuse another format, and contents that the checksum in them does not fit."""
-    if metadata.get("format") == WITHOUT_CHECKSUM:
-        print(f"warning: {path}: from before there were checksums; damage would go unseen", file=sys.stderr)
-        return
+def _verified(path: Path, content: bytes) -> dict[str, Any]:
+    """The metadata, after making sure that their format is this one and that the checksum in them fits the file."""
+    size = int.from_bytes(content[:8], "little")
+    if not size <= min(LARGEST_HEADER, len(content) - 8):
+        raise InputError(f"{path}: damaged or not a policy file (a header of {size} bytes)")
+    try:
+        metadata = dict(json.loads(content[8 : 8 + size])["__metadata__"])
+        stated = str(metadata.get("sha256")).encode()
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        reason = f"{type(error).__name__} in its header"
+        raise InputError(f"{path}: damaged or not a policy file ({reason})") from error
     if metadata.get("format") != FORMAT:
-        raise InputError(f"{path}: not a policy file (format {metadata.get('format')!r}, expected {FORMAT!r})")
-    stated = metadata.get("sha256", "").encode()
-    if len(stated) != len(NO_DIGEST) or _digest(path.read_bytes().replace(stated, NO_DIGEST, 1)) != stated:
+        raise InputError(
+            f"{path}: not a policy file (format {str(metadata.get('format'))[:40]!r}, expected {FORMAT!r})"
+        )
+    if len(stated) != len(NO_DIGEST) or _digest(content.replace(stated, NO_DIGEST, 1)) != stated:
         raise InputError(f"{path}: damaged, its checksum does not fit its contents; take another copy of the file")
+    return metadata
 
 
-def _read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
+def _read_info(path: Path, metadata: Mapping[str, Any]) -> PolicyInfo:
     try:
         return PolicyInfo.model_validate(json.loads(metadata["info"]))
-    except (KeyError, ValueError, RecursionError) as error:  # no JSON, huge numbers, deep lists, another schema
+    except ValidationError as error:
+        raise InputError(f"{path}: metadata of the policy: {describe(error)}") from error
+    except (KeyError, TypeError, ValueError, RecursionError) as error:  # no JSON, huge numbers, deep lists
         raise InputError(f"{path}: metadata of the policy cannot be read ({type(error).__name__})") from error
 
 
-def _fill(path: Path, actor: Actor, tensors: dict[str, Tensor]) -> None:
-    wanted = {f"actor.{i}.{name}": p for i, layer in enumerate(_linears(actor)) for name, p in layer.named_parameters()}
-    if set(tensors) != set(wanted):
-        raise InputError(f"{path}: has tensors {sorted(tensors)}, expected {sorted(wanted)}")
-    for key, parameter in wanted.items():
-        if tensors[key].shape != parameter.shape:
-            shapes = f"{tuple(tensors[key].shape)}, expected {tuple(parameter.shape)}"
-            raise InputError(f"{path}: {key} has shape {shapes} for the sizes in its metadata")
-        if not torch.isfinite(tensors[key]).all():
+def _require(path: Path, tensors: Mapping[str, Array], shapes: Mapping[str, Sequence[int]]) -> None:
+    """Refuse other tensors than float32 numbers of the stated sizes, all of them finite."""
+    odd = sorted(set(tensors) ^ set(shapes))
+    if odd:
+        raise InputError(f"{path}: {odd[0][:60]} is missing or too much for the sizes in its metadata")
+    for key, wanted in shapes.items():
+        found = tensors[key]
+        if found.shape != wanted:
+            raise InputError(f"{path}: {key} has shape {found.shape}, expected {wanted} for the sizes in its metadata")
+        if found.dtype != np.float32:
+            raise InputError(f"{path}: {key} holds {found.dtype}, expected float32")
+        if not np.isfinite(found).all():
             raise InputError(f"{path}: {key} holds values that are not finite")
-        parameter.copy_(tensors[key])

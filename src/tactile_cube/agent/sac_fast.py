@@ -227,8 +227,8 @@ class FastSac:
 
     def load_networks(self, state: dict[str, Any]) -> None:
         """Warm start: networks and targets of a state, fresh optimiser and temperature."""
-        self.networks.master.copy_(state["parameters"])
-        self.networks.target_master.copy_(state["targets"])
+        for own, saved in ((self.networks.master, "parameters"), (self.networks.target_master, "targets")):
+            own.copy_(state[saved].view_as(own))  # a single number would be copied to all
         self.networks.refresh()
 
     def load_actor(self, actor: Actor) -> None:

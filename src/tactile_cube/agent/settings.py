@@ -5,6 +5,7 @@ from typing import Literal
 import torch
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
 
+from tactile_cube.agent.policy_file import DEEPEST, Width
 from tactile_cube.errors import InputError
 
 
@@ -39,7 +40,7 @@ class AgentSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    hidden: tuple[PositiveInt, ...] = Field(default=(512, 512), min_length=1)
+    hidden: tuple[Width, ...] = Field(default=(512, 512), min_length=1, max_length=DEEPEST)
     layer_norm: bool = False
     gamma: float = Field(default=0.9, gt=0.0, lt=1.0)
     learning_rate: PositiveFloat = 3e-4

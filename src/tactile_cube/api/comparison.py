@@ -119,10 +119,11 @@ def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say:
 def opened(recording: Recording | PathLike) -> Recording:
     """The recording, read if it is a folder's name; what is odd about it goes to stderr."""
     from tactile_cube.measurement.recordings.reading import read_recording
+    from tactile_cube.measurement.recordings.recording import Recording
 
-    if not isinstance(recording, str | Path):
+    if isinstance(recording, Recording):
         return recording
-    read = read_recording(recording)
+    read = read_recording(str(recording))  # on the command line 2026 is a number
     for line in read.warnings:
         print(f"warning: {line}", file=sys.stderr)
     return read

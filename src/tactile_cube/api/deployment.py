@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_cube.api.export import load_policy
+from tactile_cube.api.export import load_policy, setting_of
 from tactile_cube.api.input_errors import as_input_errors
 from tactile_cube.api.job import Job, PathLike, Say, called_job
 
@@ -91,66 +91,53 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
     from tactile_cube.deployment.simulated_hand import SimulatedHand
 
     config, network = job.config, load_policy(job.config.policy)
-    setting = setting_of(job, network)
-    limits = limits_of(setting, float(config.rate_limit))
+    setting = setting_of(config, network, config.motion == "policy")
+    limits = limits_of(setting, config.rate_limit)
     target = str(config.robot._target_)
     simulated = target.endswith(".SimulatedHand")
     own = {"setting": setting} if simulated else {"hand": setting.hand} if target.startswith("tactile_cube.") else {}
     runs, turned = [], []
     for number in range(config.runs):
         seed = {"seed": config.seed + number} if simulated else {}
+        loop = control_loop(job, network, setting, limits)
         # partial: hydra would make a dictionary of a hand that it is given
         robot: Robot = instantiate(config.robot, _partial_=True, **seed)(**own)
-        try:
-            runs.append(run_loop(control_loop(job, network, setting.hand, limits), robot, say))
-            if isinstance(robot, SimulatedHand) and robot.has_cube:
-                turned.append(robot.turned)
-        finally:
-            robot.close()
+        runs.append(run_loop(loop, robot, say))
+        if isinstance(robot, SimulatedHand) and robot.has_cube:
+            turned.append(robot.turned(runs[-1].ended))
+        if runs[-1].interrupted:
+            break
     return DeploymentResult(runs, turned, limits, job, setting.hand)
 
 
-def setting_of(job: Job, network: Network) -> TrainingSetting:
-    """What the policy was trained with; with an excitation in place of a policy, the hand that was asked for.
-
-    Raises:
-        InputError: a policy on another hand than its own.
-    """
-    from hydra.utils import instantiate
-
-    from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
-
-    config = job.config
-    if config.get("hand") is None:
-        return training_setting(network.info)
-    hand: Hand = instantiate(config.hand, _convert_="all")
-    return training_setting(network.info, hand) if config.motion == "policy" else TrainingSetting.of(hand)
-
-
-def control_loop(job: Job, network: Network, hand: Hand, limits: Limits) -> ControlLoop:
+def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: Limits) -> ControlLoop:
     """A new loop as a job describes it."""
     from hydra.utils import instantiate
 
     from tactile_cube.deployment.control_loop import ControlLoop
     from tactile_cube.deployment.controller import Controller
+    from tactile_cube.deployment.homing import open_angles
     from tactile_cube.deployment.played_targets import excited_targets
     from tactile_cube.errors import InputError
 
-    config = job.config
+    config, hand = job.config, setting.hand
     trained: Any = network.info.get("time_constant")
     time_constant = trained if config.filter_time is None else config.filter_time
     if time_constant is None:
         raise InputError("the policy file does not say its filter time T_s; give filter_time=SECONDS")
+    rules, homing, seconds = instantiate(config.stop), instantiate(config.homing), config.seconds
+    decides: Controller | PlayedTargets
     if config.motion == "policy":
-        decides: Controller | PlayedTargets = Controller(network, hand)
+        decides, opened = Controller(network, hand), open_angles(setting, homing.clearance)
     else:  # every run the same commands: repeats show the noise floor
-        decides = excited_targets(config.motion, float(config.reach), float(config.seconds), config.seed, hand)
-    rules, homing = instantiate(config.stop), instantiate(config.homing)
-    return ControlLoop(decides, float(time_constant), limits, rules, homing, float(config.seconds), hand)
+        decides, opened = excited_targets(config.motion, float(config.reach), seconds, config.seed, hand), None
+    return ControlLoop(decides, time_constant, limits, rules, homing, seconds, hand, opened)
 
 
 def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     """The limits of the interface contract: the hand's range, the gains and the torque of the training.
+
+    A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.
 
     Args:
         setting: of the training.
@@ -159,7 +146,8 @@ def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     import numpy as np
 
     from tactile_cube.deployment.limits import Limits
+    from tactile_cube.simulation import constants_of
 
     hand, constants = setting.hand, setting.constants
-    gains = (np.asarray(constants.kp), np.asarray(constants.kd))
+    gains = (np.maximum(constants.kp, constants_of(hand).kp), np.asarray(constants.kd))
     return Limits(hand.lower, hand.upper, rate, constants.torque_limit, *gains)

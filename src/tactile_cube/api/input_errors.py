@@ -23,11 +23,9 @@ def as_input_errors(function: Callable[Parameters, Result]) -> Callable[Paramete
     def told(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
         try:
             return function(*args, **kwargs)
-        except InputError:
-            raise
         except Exception as error:
             message = usage_error(error)
-            if message is None:
+            if message is None or (isinstance(error, InputError) and message == str(error)):
                 raise
             raise InputError(message) from error
 

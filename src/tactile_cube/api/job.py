@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_cube.cli import with_recipe
-from tactile_cube.composition import composed
+from tactile_cube.composition import composed, refuse_unknown_keys
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -74,6 +74,7 @@ def called_job(command: str, settings: tuple[str, ...], folder: PathLike | None 
 
     words = list(settings)
     config = composed(command, with_recipe(command, words), with_hydra=True)
+    refuse_unknown_keys(command, config)
     for key, value in given.items():
         if value is not None:
             OmegaConf.update(config, key, value)

@@ -132,6 +132,7 @@ def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> 
     """
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.identification import identify
+    from tactile_cube.drivetrain.effects import resolve
     from tactile_cube.identification.drift import changed, drifts
     from tactile_cube.identification.identification import judge_known
     from tactile_cube.identification.search.evidence import worse
@@ -141,9 +142,11 @@ def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> 
     config = job.config
     then = error_over_noise(before)
     require_same_joints(recording, before)
+    effects = [one.effect for one in before.drive_effects]
+    resolve(effects, recording.joints)  # before they are named as if by the user, whose own are imported
     newest = newest_trials(recording, config.last)
     settings = [f"engine={config.engine}", f"step={config.step}", f"seed={config.seed}"]
-    refitted = identify(newest, [one.effect for one in before.drive_effects], *settings, say=say)
+    refitted = identify(newest, effects, *settings, say=say)
     assert refitted.free is not None  # it was asked for effects of the drive
     now, kept = refitted.free.judgement, judge_known(without_touches(newest), before, config.seed)
     found = drifts(before, refitted.model)

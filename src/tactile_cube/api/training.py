@@ -95,6 +95,7 @@ def training_run(job: Job) -> Run:
     from hydra.utils import instantiate
     from omegaconf import OmegaConf
 
+    from tactile_cube.agent.policy_file import read_policy
     from tactile_cube.evaluation.policy_path import networks_path, policy_path
     from tactile_cube.training.build import build_run
     from tactile_cube.training.environment import as_environment
@@ -103,8 +104,9 @@ def training_run(job: Job) -> Run:
     config: Any = job.config
     plain = _plain(job)
     if teacher := config.exploration.get("teacher"):
-        file = str(policy_path(teacher, "exploration.teacher"))
-        config = OmegaConf.merge(config, {"exploration": {"teacher": file}})
+        file = policy_path(teacher, "exploration.teacher")
+        read_policy(file)  # a damaged one is the user's error here, a worker's later
+        config = OmegaConf.merge(config, {"exploration": {"teacher": str(file)}})
     return build_run(
         folder=job.folder,
         seed=RunSettings(name=config.name, seed=config.seed).seed,
@@ -121,15 +123,21 @@ def training_run(job: Job) -> Run:
 
 
 def _plain(job: Job) -> dict[str, Any]:
-    """The resolved configuration, a model's contents in the place of its file, so that a policy needs no other file."""
+    """The resolved configuration: with a model's contents in the place of its file, and the checksum of a URDF."""
+    import hashlib
+
     from omegaconf import OmegaConf
 
     from tactile_cube.drivetrain.model_file import read_model
+    from tactile_cube.hand.urdf_hand import urdf_file
 
     plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
     plain.pop("visualization", None)  # a run is the same whether or not somebody looks on
     if job.config.model is not None:
         plain["env"]["model"] = read_model(job.config.model).model_dump()
+    hand = plain["env"].get("hand") or {}
+    if "urdf" in hand:
+        hand["sha256"] = hashlib.sha256(urdf_file(hand["urdf"]).read_bytes()).hexdigest()
     return _without_published(plain)
 
 

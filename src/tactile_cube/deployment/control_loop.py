@@ -1,16 +1,18 @@
-"""The robot's side in one place: a fast loop that homes the fingers, asks the policy at 10 Hz, and stops by itself."""
+"""The robot's side in one place: a fast loop that opens, waits for the object, asks the policy and stops by itself."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
+from math import inf, isfinite
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.controller import POLICY_RATE, Controller, TargetFilter
-from tactile_cube.deployment.limits import Limits
+from tactile_cube.deployment.homing import Homing, Move
+from tactile_cube.deployment.limits import Limits, require_positive
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.stop_rules import StopRules, Watchdog
 from tactile_cube.errors import InputError
@@ -23,14 +25,18 @@ ROUNDING = 1e-9  # [s] of clocks that add up ticks
 class Mode(StrEnum):
     """What the loop is doing.
 
-    - `waiting`: no measurement has come yet; nothing is sent.
-    - `homing`: the fingers go to the start angles in a straight line.
+    - `waiting`: too few measurements agree yet; nothing is sent.
+    - `homing`: the fingers open for the object, or go to the start angles where none is awaited.
+    - `wait for object`: the open fingers hold position until somebody confirms that the object is there.
+    - `closing`: the fingers go to the start angles around the object.
     - `running`: the policy decides.
-    - `stopped`: the fingers are held where they were; only a new loop starts again.
+    - `stopped`: the fingers hold position; only a new loop starts again.
     """
 
     WAITING = "waiting"
     HOMING = "homing"
+    WAIT_FOR_OBJECT = "wait for object"
+    CLOSING = "closing"
     RUNNING = "running"
     STOPPED = "stopped"
 
@@ -45,25 +51,10 @@ class Decides(Protocol):
         """Return q_n `(joints,)` [rad] for measured angles and filtered targets `(joints,)` [rad]."""
 
 
-@dataclass(frozen=True)
-class Homing:
-    """How the fingers get to the start angles.
-
-    Attributes:
-        speed: of the joint that has the longest way [rad/s].
-        tolerance: how close every joint must come [rad]: friction and weight leave 0.03 rad at this stiffness.
-        settle: how long they then rest there [s].
-        timeout: after which homing has failed [s].
-    """
-
-    speed: float = 0.5
-    tolerance: float = 0.05
-    settle: float = 0.5
-    timeout: float = 10.0
-
-
 class ControlLoop:
     """One call of `tick` is one period of the fast loop, at 1 kHz on the robot; it never waits.
+
+    What it sends passes `CommandGuard` last.
 
     Args:
         decides: gives q_n at 10 Hz, the policy's `Controller` or anything else.
@@ -72,14 +63,20 @@ class ControlLoop:
         rules: when to stop.
         homing: how to begin.
         seconds: how long the policy decides; then the loop stops.
-        hand: whose start angles and range these are.
+        hand: whose start angles these are.
+        opened: angles at which the fingers wait for the object `(joints,)` [rad]; None: there is none to wait for.
 
     Attributes:
         mode: what it is doing.
         reason: why it stopped; "" before.
+        time: of the last tick [s].
+        doubted: measurements that were not believed.
+        doubt: why the last of them was not.
         q_n: desired angles of the policy `(joints,)` [rad].
         q_f: filtered ones `(joints,)` [rad].
-        q_d: what was sent last `(joints,)` [rad].
+
+    Raises:
+        InputError: a time or a filter time without a meaning.
     """
 
     def __init__(
@@ -91,90 +88,139 @@ class ControlLoop:
         homing: Homing,
         seconds: float,
         hand: Hand = DLR_HAND2,
+        opened: Array | None = None,
     ) -> None:
-        if not seconds > 0:
-            raise InputError(f"seconds is {seconds}; give a time above 0 s")
+        require_positive({"seconds": seconds})
+        if not (isinstance(time_constant, (int, float)) and 0 <= time_constant < inf):
+            raise InputError(f"filter_time is {time_constant}; give a finite number of 0 s or more")
         self._decides, self._limits, self._homing, self._seconds = decides, limits, homing, seconds
-        self._filter = TargetFilter(time_constant, rate=1.0)
-        self._home = np.asarray(hand.start_angles, dtype=np.float64)
-        self._watchdog = Watchdog(rules, hand.lower, hand.upper, hand.joint_names)
-        self.mode, self.reason = Mode.WAITING, ""
-        self.q_n = self.q_f = self.q_d = self._home
-        self._last: Reading | None = None
-        self._before = self._since = self._in_place = self._asked = 0.0
+        self._home, self._opened = np.array(hand.start_angles, dtype=np.float64), opened
+        self._filter = TargetFilter(time_constant, rate=1.0, filtered=self._home.copy())
+        self._guard = CommandGuard(limits, rules, hand.joint_names)
+        self._watchdog = Watchdog(rules, hand.joint_names)
+        self.mode, self.reason, self.time = Mode.WAITING, "", -inf
+        self.doubted, self.doubt = 0, ""
+        self.q_n = self.q_f = self._home
+        self._since = self._asked = 0.0
 
     @property
-    def decider(self) -> str:
-        """Who gives q_n, in words."""
-        return "the policy decides" if isinstance(self._decides, Controller) else "an excitation, no policy"
+    def doing(self) -> str:
+        """What it is doing, in words."""
+        start = "the fingers go to the start angles"
+        policy = "the policy decides; let go of the object"
+        return {
+            Mode.HOMING: start if self._opened is None else "the fingers open",
+            Mode.WAIT_FOR_OBJECT: "put it between the open fingers",
+            Mode.CLOSING: start,
+            Mode.RUNNING: policy if isinstance(self._decides, Controller) else "an excitation, no policy",
+        }.get(self.mode, self.reason)
 
-    def tick(self, now: float, reading: Reading | None) -> Array | None:
+    @property
+    def accepted(self) -> Reading | None:
+        """The last measurement that was believed."""
+        return self._guard.state
+
+    def warm_up(self) -> None:
+        """Compile and load all that a tick needs, so that none comes late for it; nothing is sent."""
+        self._decides.reset()
+        self._decides.step(self._home.copy(), self._home.copy())
+        self._filter.step(self._home)
+        self._decides.reset()
+
+    def tick(self, now: float, reading: Reading | None = None) -> Array | None:
         """Return the desired angles q_d `(joints,)` [rad] to send, or None while nothing may be sent.
 
         Args:
-            now: time of this tick [s].
+            now: time of this tick on a monotonic clock [s].
             reading: what has been measured since the tick before; None: nothing.
         """
-        self._last = reading or self._last
-        if self._last is None:
+        dt = self._clock(now)
+        doubt = self._listen(now, reading)
+        last = self.accepted
+        if last is None or (self._guard.command is None and (self.mode is Mode.STOPPED or not self._guard.ready)):
             return None
         if self.mode is Mode.WAITING:
-            self._begin_homing(now, self._last)
-        dt, self._before = now - self._before, now
-        if self.mode is not Mode.STOPPED:
-            self._guard(now, dt, self._last)
-        wanted = self._wanted(now, dt, self._last)
-        last = self._last
-        if self.mode is not Mode.STOPPED:
-            self.q_d = self._limits.apply(self.q_d, wanted, last.q_m, last.dq, dt)
-        return self.q_d
+            self._move_to(self._home if self._opened is None else self._opened, last.q_m)
+            self.mode = Mode.HOMING
+        elif self.mode is not Mode.STOPPED:
+            self._judge(dt, now - last.time)
+        if not doubt:
+            self._go_on(now, dt, last.q_m.copy())
+        return self._guard.checked(now, self.q_f)
+
+    def confirm_object(self) -> None:
+        """Close the fingers around the object, which somebody has put between them."""
+        if self.mode is Mode.WAIT_FOR_OBJECT:
+            self._move_to(self._home, self.q_f)
+            self.mode = Mode.CLOSING
 
     def stop(self, reason: str) -> None:
-        """Hold the fingers where they are."""
-        self.mode, self.reason = Mode.STOPPED, reason
-        if self._last is not None and np.isfinite(self._last.q_m).all():
-            self.q_d = np.clip(self._last.q_m, self._limits.lower, self._limits.upper)
+        """Hold position from now on, at the last accepted angles."""
+        if self.mode is not Mode.STOPPED:
+            doubts = f"; {self.doubted} measurement(s) not believed, the last: {self.doubt}" if self.doubted else ""
+            self.mode, self.reason = Mode.STOPPED, reason + doubts
+            if self.accepted is not None:
+                self.q_f = self.accepted.q_m
 
-    def _guard(self, now: float, dt: float, last: Reading) -> None:
-        wish = self._limits.kp * (self.q_d - last.q_m) - self._limits.kd * last.dq
-        reason = self._watchdog.judge(now, dt, last, np.abs(wish) > 0.99 * self._limits.torque)
+    def _clock(self, now: float) -> float:
+        """Time since the tick before [s]; a clock that does not go forward stops the loop."""
+        if not (now > self.time and isfinite(now)):
+            self.stop(f"the clock went from {self.time:g} s to {now:g} s")
+            return 0.0
+        dt, self.time = now - self.time, now
+        return dt
+
+    def _listen(self, now: float, reading: Reading | None) -> str:
+        if reading is None:
+            return ""
+        doubt = self._guard.accept(now, reading)
+        if doubt:
+            self.doubted, self.doubt = self.doubted + 1, doubt
+        return doubt
+
+    def _judge(self, dt: float, silent: float) -> None:
+        reason = self._watchdog.judge(dt, silent, self._guard.saturated)
         if reason:
             self.stop(reason)
 
-    def _wanted(self, now: float, dt: float, last: Reading) -> Array:
-        if self.mode is Mode.HOMING:
-            self._home_further(now, last)
+    def _go_on(self, now: float, dt: float, q_m: Array) -> None:
+        if self.mode in (Mode.HOMING, Mode.CLOSING):
+            self._move_on(now, q_m)
         if self.mode is Mode.RUNNING:
-            self._run_further(now, dt, last)
-        return self.q_f
+            self._run_on(now, dt, q_m)
 
-    def _begin_homing(self, now: float, first: Reading) -> None:
-        self.mode, self._since, self._before = Mode.HOMING, now, now
-        self.q_d = self.q_f = self._from = np.array(first.q_m)
-        self._needs = float(np.max(np.abs(self._home - self._from))) / self._homing.speed
+    def _move_to(self, goal: Array, start: Array) -> None:
+        self._move = Move(self._homing, self.time, start, goal)
 
-    def _home_further(self, now: float, last: Reading) -> None:
-        share = 1.0 if self._needs == 0.0 else min(1.0, (now - self._since) / self._needs)
-        self.q_f = self._from + share * (self._home - self._from)
-        away = float(np.max(np.abs(last.q_m - self._home)))
-        if share < 1.0 or away > self._homing.tolerance:
-            self._in_place = now
-        if now - self._in_place >= self._homing.settle:
-            self._begin_running(now, last)
-        elif now - self._since > self._needs + self._homing.timeout:
-            self.stop(f"homing: still {away:.2f} rad from the start angles after {now - self._since:.0f} s")
+    def _move_on(self, now: float, q_m: Array) -> None:
+        self.q_f = self._move.target(now)
+        failure = self._move.failure(now, q_m)
+        if self._move.arrived(now, q_m):
+            self._arrive(now, q_m)
+        elif failure:
+            self.stop(f"{self.mode}: {failure}")
 
-    def _begin_running(self, now: float, last: Reading) -> None:
+    def _arrive(self, now: float, q_m: Array) -> None:
+        if self.mode is Mode.HOMING and self._opened is not None:
+            self.mode = Mode.WAIT_FOR_OBJECT
+            return
         self.mode, self._since, self._asked = Mode.RUNNING, now, now
         self._decides.reset()
-        self._filter.filtered = np.array(last.q_m)
+        self._filter.filtered = q_m.copy()
 
-    def _run_further(self, now: float, dt: float, last: Reading) -> None:
+    def _run_on(self, now: float, dt: float, q_m: Array) -> None:
         if now - self._since > self._seconds - ROUNDING:
             self.stop("time is over")
-            return
-        if now >= self._asked - ROUNDING:
-            self.q_n = self._decides.step(last.q_m, self._filter.filtered)
-            self._asked += 1.0 / POLICY_RATE
-        self._filter.rate = 1.0 / dt if dt > 0 else np.inf
-        self.q_f = np.array(self._filter.step(self.q_n))
+        elif now < self._asked - ROUNDING or self._ask(q_m):
+            self._filter.rate = 1.0 / dt
+            self.q_f = self._filter.step(self.q_n).copy()
+
+    def _ask(self, q_m: Array) -> bool:
+        """Ask for the next q_n; False, and stopped, if it is none."""
+        q_n = np.asarray(self._decides.step(q_m, self._filter.filtered.copy()), dtype=np.float64)
+        self._asked += 1.0 / POLICY_RATE
+        if q_n.shape != self._home.shape or not np.isfinite(q_n).all():
+            self.stop(f"desired angles that are no numbers of {len(self._home)} joints: {q_n}")
+            return False
+        self.q_n = np.clip(q_n, self._limits.lower, self._limits.upper)
+        return True

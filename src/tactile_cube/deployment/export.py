@@ -11,6 +11,7 @@ import numpy as np
 
 from tactile_cube.deployment.interface_contract import interface_contract
 from tactile_cube.deployment.network import Network
+from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.errors import InputError
 
 OPSET = 17
@@ -20,8 +21,13 @@ METADATA = "tactile_cube.contract"
 Contract = dict[str, Any]
 
 
-def export_policy(network: Network, path: Path) -> Path:
-    """Write the network, `.npz` or `.onnx`, and `<name>.contract.json` beside it; return the contract's path.
+def export_policy(network: Network, path: Path, setting: TrainingSetting | None = None) -> Path:
+    """Write the network, `.npz` or `.onnx`, and `<path>.contract.json` beside it; return the contract's path.
+
+    Args:
+        network: the policy.
+        path: file to write.
+        setting: that it was trained in; None: as its file says.
 
     Raises:
         InputError: unknown ending, or ONNX is not installed.
@@ -30,10 +36,10 @@ def export_policy(network: Network, path: Path) -> Path:
     if path.suffix not in writers:
         raise InputError(f"output={path}: ending {path.suffix!r} is unknown; choose one of {', '.join(writers)}")
     path.parent.mkdir(parents=True, exist_ok=True)
-    contract = interface_contract(network)
+    contract = interface_contract(network, setting)
     writers[path.suffix](network, contract, path)
     contract["sha256"] |= {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}
-    beside = path.with_suffix(".contract.json")
+    beside = path.with_name(f"{path.name}.contract.json")
     beside.write_text(json.dumps(contract, indent=1), encoding="utf-8")
     return beside
 

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.controller import POLICY_RATE, reading_size
+from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.limits import RATE
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
-from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.hand import Hand, HandModel
 
-FORMAT = "tactile_cube contract 2"
+FORMAT = "tactile_cube contract 3"
 FINGER = {
     "q1": "abduction, 0 is straight",
     "q2": "positive flexes, 0 is straight",
@@ -24,13 +25,19 @@ FINGER = {
 TOLERANCE = 1e-5  # between float32 products in different orders
 
 
-def interface_contract(network: Network) -> dict[str, Any]:
-    """Return the contract of a policy on the hand that it was trained on, ready for JSON."""
-    setting = training_setting(network.info)
+def interface_contract(network: Network, setting: TrainingSetting | None = None) -> dict[str, Any]:
+    """Return the contract of a policy on the hand that it was trained on, ready for JSON.
+
+    Args:
+        network: the policy.
+        setting: that it was trained in; None: as its file says.
+    """
+    setting = setting or training_setting(network.info, label=network.label)
     hand, constants = setting.hand, setting.constants
     names = list(hand.joint_names)
     return {
         "format": FORMAT,
+        "hand": _hand(setting),
         "joints": names,
         "joint_convention": {
             name: {"unit": "rad", "zero": 0.0, "direction": 1, "meaning": meaning}
@@ -64,20 +71,22 @@ def interface_contract(network: Network) -> dict[str, Any]:
             "time_constant_s": network.info.get("time_constant"),
         },
         "limits": {
-            "order": "clip q_f to joint_range, then the rate, then the torque",
-            "rate": {"value": StopRules().speed, "unit": "rad/s"},
+            "law": "the q_d nearest to q_f within joint_range, the rate since the last q_d and the torque, all at once",
+            "rate": {"value": RATE, "unit": "rad/s"},
             "torque": {"value": constants.torque_limit, "unit": "N m"},
-            "torque_law": "q_d in [q_m + (K_D dq - limit) / K_P, q_m + (K_D dq + limit) / K_P]",
+            "torque_law": "q_d in [q_m - limit / K_P, q_m + limit / K_P], q_m as last accepted",
         },
         "impedance": {
-            "law": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after rate and torque limits",
+            "law": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after the limits",
             "kp": {"value": _alike(constants.kp), "unit": "N m/rad"},
             "kd": {"value": _alike(constants.kd), "unit": "N m s/rad"},
         },
         "stop": {
             "rules": asdict(StopRules()),
             "unit": {"silence": "s", "lateness": "s", "margin": "rad", "speed": "rad/s", "saturation": "s"},
-            "then": "hold the measured angles; start again from homing",
+            "accepted": "a q_m stamped within silence of now, in range by margin, no further from the last than speed "
+            "allows, around which a q_d keeps all limits; else q_f stays for this tick",
+            "then": "hold the last accepted angles, within the limits; start again from homing",
         },
         "test_vector": _test_vector(network, hand) | {"tolerance": TOLERANCE},
         "sha256": {"weights": weights_hash(network), "of": "weight0, bias0, weight1, ... as little-endian float32"},
@@ -85,9 +94,42 @@ def interface_contract(network: Network) -> dict[str, Any]:
     }
 
 
+def _hand(setting: TrainingSetting) -> dict[str, Any]:
+    """Which mechanism it is, how it is held, and what touches the object."""
+    hand, constants = setting.hand, setting.constants
+    tips = [hand.finger_tips(k, hand.start_angles[None, hand.of_finger(k)])[0] for k in range(len(hand.fingers))]
+    return {
+        "name": hand.name,
+        "urdf": {"file": hand.urdf_name, "sha256": hand.urdf_sha256},
+        "coupled_joints": [_coupled(hand, k, *pair) for k in range(len(hand.fingers)) for pair in hand.coupled()],
+        "palm": {
+            "position": {"value": _plain(hand.position), "unit": "m"},
+            "rotation": [_plain(row) for row in hand.rotation],
+            "frame": "of the URDF's root link in the world: p_world = position + rotation @ p_palm",
+            "gravity": {"value": _plain(constants.gravity * hand.rotation.T @ constants.down), "unit": "m/s^2"},
+            "gravity_frame": "palm; hold the hand so that it is this",
+        },
+        "fingertips": [
+            {
+                "finger": finger.name,
+                "link": hand.link_names(k)[-1],
+                "radius": hand.tip_radius,
+                "at_start": _plain(hand.rotation.T @ (tip - hand.position)),
+            }
+            for k, (finger, tip) in enumerate(zip(hand.fingers, tips, strict=True))
+        ],
+        "fingertips_unit": "m; at_start: centre of the sphere in the palm's frame at the start angles",
+    }
+
+
+def _coupled(hand: Hand, finger: int, link: int, leader: int) -> dict[str, Any]:
+    joints = hand.chain_joints(finger)
+    return {"joint": joints[link], "follows": joints[leader], "ratio": 1.0}
+
+
 def _meanings(hand: Hand) -> list[str]:
     """What each joint does: known of the DLR-Hand II, else as its URDF says."""
-    if hand.name == DLR_HAND2.name:
+    if isinstance(hand, HandModel):
         return [FINGER[name[-2:]] for name in hand.joint_names]
     return ["as in the URDF of the hand"] * hand.joints
 
@@ -100,6 +142,8 @@ def _task(setting: TrainingSetting) -> dict[str, Any]:
             "shape": str(constants.object_shape),
             "size": {"value": _plain(constants.cube_size), "unit": "m, edges of its bounding box"},
             "mass": {"value": constants.cube_mass, "unit": "kg"},
+            "centre_of_mass": {"value": _plain(constants.cube_com), "unit": "m, from the middle of the bounding box"},
+            "friction": {"object": constants.cube_friction, "fingertips": constants.tip_friction, "law": "product"},
         },
         "axis": _plain(task.axis_vector()),
         "direction": task.direction,

@@ -2,27 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.target_filter import limit_rate, limit_torque
+from tactile_cube.errors import InputError
 
 Array = NDArray[np.float64]
+RATE = 6.28
+"""Largest change of a desired angle [rad/s]. Source: data sheet of the hand, about 360 deg/s."""
+
+
+def require_positive(numbers: Mapping[str, float]) -> None:
+    """Refuse a setting that is no finite number above 0.
+
+    Args:
+        numbers: key of the configuration -> its value.
+
+    Raises:
+        InputError: one of them bounds nothing, or everything.
+    """
+    for key, value in numbers.items():
+        if not (isinstance(value, (int, float)) and 0 < value < inf):
+            raise InputError(f"{key} is {value}; give a finite number above 0")
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Range, rate and torque limit of the desired angles, in the order in which they are applied.
+    """Range, rate and torque of the desired angles.
 
     Attributes:
-        lower: `(12,)` [rad].
-        upper: `(12,)` [rad].
+        lower: `(joints,)` [rad].
+        upper: `(joints,)` [rad].
         rate: largest change of a desired angle [rad/s].
-        torque: largest torque that the impedance law may ask for [N m].
-        kp: stiffness of the impedance law `(12,)` [N m/rad].
-        kd: its damping `(12,)` [N m s/rad].
+        torque: largest torque K_P (q_d - q_m) that a command may demand [N m].
+        kp: stiffness of the impedance law `(joints,)` [N m/rad].
+        kd: its damping `(joints,)` [N m s/rad]; it only brakes, so no limit depends on it.
+
+    Raises:
+        InputError: a limit that bounds nothing.
     """
 
     lower: Array
@@ -32,19 +53,15 @@ class Limits:
     kp: Array
     kd: Array
 
-    def apply(self, previous: Array, wanted: Array, q_m: Array, dq: Array, dt: float) -> Array:
-        """Return the desired angles q_d `(12,)` [rad] nearest to the wanted ones.
+    def __post_init__(self) -> None:
+        """Refuse limits that bound nothing."""
+        require_positive({"rate_limit": self.rate, "torque_limit": self.torque})
+        if not (self.lower <= self.upper).all():
+            raise InputError(f"joint range {self.lower} to {self.upper} [rad]; a lower limit is above an upper one")
+        if not ((self.kp >= 0) & (self.kp < inf)).all():
+            raise InputError(f"kp is {self.kp} N m/rad; give finite numbers of 0 or more")
 
-        Args:
-            previous: q_d of the tick before `(12,)` [rad].
-            wanted: `(12,)` [rad].
-            q_m: measured angles `(12,)` [rad].
-            dq: measured velocities `(12,)` [rad/s].
-            dt: since the tick before [s].
-        """
-        inside = np.clip(wanted, self.lower, self.upper)
-        limited = np.empty_like(inside)
-        for joint, target in enumerate(inside):
-            slow = limit_rate(previous[joint], target, self.rate, dt)
-            limited[joint] = limit_torque(slow, q_m[joint], dq[joint], self.kp[joint], self.kd[joint], self.torque)
-        return limited
+    @property
+    def reach(self) -> Array:
+        """How far a command may be from the measured angle: torque / K_P `(joints,)` [rad], inf without stiffness."""
+        return np.asarray(np.divide(self.torque, self.kp, out=np.full(self.kp.shape, inf), where=self.kp > 0))

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
 
-from tactile_cube.errors import InputError
+from tactile_cube.agent.policy_file import read_policy
 
 Array = NDArray[np.float32]
 
@@ -24,11 +22,13 @@ class Network:
         weights: one matrix `(out, in)` a layer.
         biases: one vector `(out,)` a layer.
         info: the policy file's metadata.
+        label: how the policy is called in a message.
     """
 
     weights: tuple[Array, ...]
     biases: tuple[Array, ...]
     info: dict[str, Any]
+    label: str = "the policy"
 
     @property
     def observation_size(self) -> int:
@@ -56,33 +56,7 @@ class Network:
 
 
 def read_network(path: Path) -> Network:
-    """Read a policy file.
-
-    Args:
-        path: a file that training wrote: safetensors with `actor.<layer>.weight` and `.bias`.
-
-    Raises:
-        InputError: the file is missing, damaged, or no policy.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such policy file")
-    try:
-        with safe_open(path, framework="np") as file:
-            info = json.loads((file.metadata() or {})["info"])
-            layers = range(len(list(file.keys())) // 2)
-            weights = tuple(file.get_tensor(f"actor.{layer}.weight") for layer in layers)
-            biases = tuple(file.get_tensor(f"actor.{layer}.bias") for layer in layers)
-    except (SafetensorError, OSError, KeyError, ValueError) as error:
-        raise InputError(f"{path}: damaged or not a policy file ({error})") from error
-    _check(path, weights, biases)
-    return Network(weights, biases, info)
-
-
-def _check(path: Path, weights: tuple[Array, ...], biases: tuple[Array, ...]) -> None:
-    """Refuse layers that do not fit one another."""
-    if not weights:
-        raise InputError(f"{path}: holds no layers")
-    outputs = [weight.shape[0] for weight in weights]
-    inputs = [weight.shape[1] for weight in weights[1:]]
-    if outputs[:-1] != inputs or outputs != [len(bias) for bias in biases] or outputs[-1] % 2:
-        raise InputError(f"{path}: layers of shapes {[weight.shape for weight in weights]} do not fit one another")
+    """Read a policy file; raises what `read_policy` does."""
+    info, layers = read_policy(path)
+    weights, biases = zip(*layers, strict=True)
+    return Network(weights, biases, info.model_dump(), f"policy={path}")

@@ -16,23 +16,21 @@ class Reading:
     """What the hand measured.
 
     Attributes:
-        time: when, on the loop's clock [s].
-        q_m: joint angles `(12,)` [rad], ring, middle, fore, thumb x (q1, q2, q3).
-        dq: joint velocities `(12,)` [rad/s].
-        torque: joint torques `(12,)` [N m]; None: not measured.
+        time: when, on the clock of `Robot.wait` [s].
+        q_m: joint angles `(joints,)` [rad], in the hand's order.
+        torque: joint torques `(joints,)` [N m]; None: not measured.
     """
 
     time: float
     q_m: Array
-    dq: Array
     torque: Array | None = None
 
 
 class Robot(Protocol):
-    """A hand under an impedance controller tau = K_P (q_d - q_m) - K_D dq."""
+    """A hand under an impedance controller tau = K_P (q_d - q_m) - K_D dq that keeps the last q_d it was sent."""
 
     def wait(self) -> float:
-        """Wait for the next tick of the fast loop; return its time [s]."""
+        """Wait for the next tick of the fast loop; return its time on a monotonic clock [s]."""
         ...
 
     def read(self) -> Reading | None:
@@ -40,11 +38,18 @@ class Robot(Protocol):
         ...
 
     def send(self, q_d: Array) -> None:
-        """Give the impedance controller its desired angles `(12,)` [rad]."""
+        """Give the impedance controller its desired angles `(joints,)` [rad]."""
         ...
 
-    def hand_over(self) -> None:
-        """Called once, when the fingers are in place: somebody may now put the cube between them."""
+    def wait_for_object(self) -> bool:
+        """Return whether somebody confirmed, here at the robot, that the object is between the open fingers.
+
+        Called every tick while the loop waits for it; Enter on the terminal confirms too.
+        """
+        ...
+
+    def release(self) -> None:
+        """Called once, when the policy begins to decide: whoever holds the object lets go of it."""
         ...
 
     def close(self) -> None:

@@ -7,34 +7,34 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tactile_cube.deployment.limits import Array, require_positive
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 
-Array = NDArray[np.float64]
-
 
 class Ros2Hand:
-    """A node that subscribes to joint states and publishes desired angles; needs rclpy and sensor_msgs of ROS 2.
+    """A node that subscribes to joint states and publishes desired angles; needs rclpy and messages of ROS 2.
 
     Args:
-        states: topic of the joint states; velocities that are missing are taken from the angles.
+        states: topic of the joint states, stamped by a clock that agrees with this computer's.
         commands: topic of the desired angles, for an impedance controller with the contract's gains.
+        confirm: topic of std_msgs/Empty that confirms that the object is between the fingers.
         names: joint of this package -> joint of the robot, where they are called otherwise.
         zeros: angle of the robot's joint where this package's is zero [rad]; by default 0.
         directions: -1 where the robot counts the other way; by default 1.
         rate: of the fast loop [Hz].
 
     Raises:
-        InputError: ROS 2 is not there, or a joint that the hand has not.
+        InputError: ROS 2 is not there, a joint that the hand has not, or no angle or direction.
     """
 
     def __init__(
         self,
         states: str = "/joint_states",
         commands: str = "/joint_commands",
+        confirm: str = "/object_in_place",
         names: Mapping[str, str] | None = None,
         zeros: Mapping[str, float] | None = None,
         directions: Mapping[str, int] | None = None,
@@ -43,22 +43,28 @@ class Ros2Hand:
     ) -> None:
         try:
             import rclpy
+            from rclpy.signals import SignalHandlerOptions
             from sensor_msgs.msg import JointState
+            from std_msgs.msg import Empty
         except ImportError as error:
             raise InputError(f"robot=ros2: {error}; source ROS 2's setup.bash, whose Python must be this one") from None
         joints = hand.joint_names
+        require_positive({"robot.rate": rate})
         _refuse_unknown(joints, names=names, zeros=zeros, directions=directions)
         self._names = [(names or {}).get(joint, joint) for joint in joints]
-        self._zeros = np.array([(zeros or {}).get(joint, 0.0) for joint in joints])
+        self._zeros = np.array([(zeros or {}).get(joint, 0.0) for joint in joints], dtype=np.float64)
         self._directions = np.array([float((directions or {}).get(joint, 1)) for joint in joints])
+        self._refuse_what_scales()
         self._period, self._next = 1.0 / rate, time.monotonic()
         self._new: Reading | None = None
-        self._before: Reading | None = None
+        self._waits = self._confirmed = False
         self._rclpy, self._message = rclpy, JointState
-        rclpy.init()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)  # its own would end the context before the hold
         self._node = rclpy.create_node("tactile_cube")
         self._node.create_subscription(JointState, states, self._hear, 1)
+        self._node.create_subscription(Empty, confirm, self._confirm, 1)
         self._publisher = self._node.create_publisher(JointState, commands, 1)
+        self._confirm_topic = confirm
 
     def wait(self) -> float:
         """Sleep until the next tick; a tick that is late already is not waited for."""
@@ -80,30 +86,46 @@ class Ros2Hand:
         message.position = [float(value) for value in self._directions * q_d + self._zeros]
         self._publisher.publish(message)
 
-    def hand_over(self) -> None:
-        """Say that the cube may now be given to the hand."""
-        self._node.get_logger().info("fingers in place: hand over the cube")
+    def wait_for_object(self) -> bool:
+        """Say once how to confirm; return whether somebody did since."""
+        if not self._waits:
+            self._waits = True
+            self._node.get_logger().info(f"wait for object: confirm with std_msgs/Empty on {self._confirm_topic}")
+        return self._confirmed
+
+    def release(self) -> None:
+        """Say that the policy decides now."""
+        self._node.get_logger().info("release the object: the policy decides")
 
     def close(self) -> None:
         """Leave ROS 2."""
         self._node.destroy_node()
-        self._rclpy.shutdown()
+        self._rclpy.try_shutdown()
 
     def _hear(self, message: Any) -> None:
         """Keep a joint state that has every joint of the hand; others on the topic are not meant for it."""
         places = {name: place for place, name in enumerate(message.name)}
-        if any(name not in places for name in self._names):
+        if any(name not in places for name in self._names) or len(message.position) != len(message.name):
             return
-        now, order = time.monotonic(), [places[name] for name in self._names]
+        stamp, order = message.header.stamp, [places[name] for name in self._names]
+        age = 1e-9 * (self._node.get_clock().now().nanoseconds - 1_000_000_000 * stamp.sec - stamp.nanosec)
         q_m = self._directions * (_ordered(message.position, order) - self._zeros)
-        dq = self._directions * _ordered(message.velocity, order) if len(message.velocity) else self._slope(now, q_m)
-        torque = self._directions * _ordered(message.effort, order) if len(message.effort) else None
-        self._new = self._before = Reading(now, q_m, dq, torque)
+        felt = len(message.effort) == len(message.name)
+        torque = self._directions * _ordered(message.effort, order) if felt else None
+        self._new = Reading(time.monotonic() - age, q_m, torque)
 
-    def _slope(self, now: float, q_m: Array) -> Array:
-        if self._before is None or now <= self._before.time:
-            return np.zeros_like(q_m)
-        return (q_m - self._before.q_m) / (now - self._before.time)
+    def _confirm(self, message: Any) -> None:
+        """Take a confirmation, but only while it is waited for."""
+        self._confirmed = self._waits
+
+    def _refuse_what_scales(self) -> None:
+        """Refuse what would change a command by more than a sign and a known angle."""
+        if not np.isfinite(self._zeros).all():
+            raise InputError(f"robot.zeros: {self._zeros}; give angles in rad")
+        if not np.isin(self._directions, (1.0, -1.0)).all():
+            raise InputError(f"robot.directions: {self._directions}; give 1 or -1")
+        if len(set(self._names)) < len(self._names):
+            raise InputError(f"robot.names: two joints with one name in {', '.join(self._names)}")
 
 
 def _ordered(values: Sequence[float], order: list[int]) -> Array:

@@ -21,22 +21,19 @@ Array = NDArray[np.float64]
 
 @dataclass
 class RunLog:
-    """One run of the loop, a row a tick: time, what was measured then, what was sent then."""
+    """One run of the loop, a row a measurement that was believed: time, measured, sent then."""
 
     time: list[float] = field(default_factory=list)
     command: list[Array] = field(default_factory=list)
     position: list[Array] = field(default_factory=list)
     torque: list[Array] = field(default_factory=list)
 
-    def add(self, reading: Reading | None, q_d: Array) -> None:
+    def add(self, reading: Reading, q_d: Array) -> None:
         """Take over one tick; one without a measurement leaves a gap in the recording."""
-        if reading is not None:
-            self.time.append(reading.time)
-            self.command.append(np.array(q_d))
-            self.position.append(np.array(reading.q_m))
-            self.torque.append(
-                np.full(len(reading.q_m), np.nan) if reading.torque is None else np.array(reading.torque)
-            )
+        self.time.append(reading.time)
+        self.command.append(np.array(q_d))
+        self.position.append(np.array(reading.q_m))
+        self.torque.append(np.full(len(reading.q_m), np.nan) if reading.torque is None else np.array(reading.torque))
 
     def table(self, number: int) -> TrialTable:
         """The run as a trial of kind `policy`, its time from 0 [s]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,25 +12,35 @@ import numpy as np
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
 from tactile_cube.deployment.robot import Robot
 from tactile_cube.deployment.run_log import RunLog
+from tactile_cube.deployment.terminal import EnterKey, noted_signals
 
-NO_HAND = 5.0  # [s] without any measurement at the beginning
+NO_HAND = 5.0  # [s] without believable measurements at the beginning
+HOLD_TICKS = 200  # of the hold at the end: the command comes to rest, and a lost message does no harm
+Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
+@dataclass
 class LoopRun:
     """One run of the loop.
 
     Attributes:
         reason: why it ended.
-        homed: whether the policy came to decide.
+        interrupted: whether by a signal, as Ctrl-C is.
+        ended: when, on the robot's clock [s]; the time of the last tick while it runs.
         log: of the time in which the policy decided.
         ticks: computing time of every tick [s], without the hand's own.
     """
 
-    reason: str
-    homed: bool
-    log: RunLog
-    ticks: list[float] = field(repr=False)
+    reason: str = ""
+    interrupted: bool = False
+    ended: float = 0.0
+    log: RunLog = field(default_factory=RunLog)
+    ticks: list[float] = field(default_factory=list, repr=False)
+
+    @property
+    def homed(self) -> bool:
+        """Whether the policy came to decide."""
+        return bool(self.log.time)
 
     @property
     def tick_times(self) -> dict[str, float]:
@@ -42,40 +53,79 @@ class LoopRun:
         }
 
 
-def run_loop(loop: ControlLoop, robot: Robot, say: Callable[[str], None] = print) -> LoopRun:
-    """Run the loop until it stops by itself; Ctrl-C stops the fingers where they are.
+def run_loop(loop: ControlLoop, robot: Robot, say: Say = print) -> LoopRun:
+    """Run the loop until it stops by itself or a signal ends it.
+
+    However it ends, by an exception too, the hold is sent and the robot is closed.
 
     Args:
         loop: a new one.
         robot: the hand.
         say: takes a line at each change of mode.
     """
-    log, ticks, began = RunLog(), list[float](), robot.wait()
-    try:
-        while loop.mode is not Mode.STOPPED:
-            mode, now = loop.mode, robot.wait()
-            reading = robot.read()
-            before = time.perf_counter()
-            q_d = loop.tick(now, reading)
-            ticks.append(time.perf_counter() - before)
-            if q_d is not None:
-                robot.send(q_d)
-            if mode is Mode.RUNNING and q_d is not None:
-                log.add(reading, q_d)
-            if loop.mode is not mode:
-                _announce(loop, robot, say)
-            if loop.mode is Mode.WAITING and now - began > NO_HAND:
-                loop.stop(f"no measurement within {NO_HAND:g} s")
-    except KeyboardInterrupt:
-        loop.stop("interrupted")
-        robot.send(loop.q_d)
-    say(f"stopped: {loop.reason}")
-    return LoopRun(loop.reason, bool(log.time), log, ticks)
+    run = LoopRun()
+    with noted_signals() as signals, closing(robot):
+        try:
+            loop.warm_up()
+            _until_stopped(loop, robot, say, run, signals)
+        except BaseException as error:
+            loop.stop(f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            _hold(loop, robot, run.ended)
+            say(f"{loop.mode}: {loop.doing}")
+    run.reason, run.interrupted = loop.reason, bool(signals)
+    return run
 
 
-def _announce(loop: ControlLoop, robot: Robot, say: Callable[[str], None]) -> None:
-    if loop.mode is Mode.HOMING:
-        say("homing: the fingers go to the start angles")
-    elif loop.mode is Mode.RUNNING:
-        robot.hand_over()
-        say(f"running: {loop.decider}")
+def _until_stopped(loop: ControlLoop, robot: Robot, say: Say, run: LoopRun, signals: list[str]) -> None:
+    said, began, key = loop.mode, robot.wait(), EnterKey()
+    while loop.mode is not Mode.STOPPED:
+        now = run.ended = robot.wait()
+        _tick(loop, robot, now, run)
+        changed = loop.mode is not said
+        if changed:
+            said, key = loop.mode, EnterKey()
+        given = loop.mode is Mode.WAIT_FOR_OBJECT and (robot.wait_for_object() or key.pressed())
+        if changed and not loop.reason:
+            _announce(loop, robot, say, ", then press Enter" if key.usable and not given else "")
+        if given:
+            loop.confirm_object()
+        if loop.mode is Mode.WAITING and now - began > NO_HAND:
+            loop.stop(f"no measurement within {NO_HAND:g} s")
+        if signals:
+            loop.stop(f"interrupted by {signals[0]}")
+
+
+def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun) -> None:
+    running, before, reading = loop.mode is Mode.RUNNING, loop.accepted, robot.read()
+    began = time.perf_counter()
+    q_d = loop.tick(now, reading)
+    run.ticks.append(time.perf_counter() - began)
+    if q_d is not None:
+        if running and loop.accepted is not None and loop.accepted is not before:
+            run.log.add(loop.accepted, q_d)
+        robot.send(q_d)
+
+
+def _hold(loop: ControlLoop, robot: Robot, now: float) -> None:
+    """Send the hold at once, then until it has come to rest at the limited rate."""
+    failure: Exception | None = None
+    for _ in range(HOLD_TICKS):
+        q_d = loop.tick(now)
+        if q_d is None:
+            return
+        try:
+            robot.send(q_d)
+            failure = None
+        except Exception as error:  # the next message may get through
+            failure = error
+        now = robot.wait()
+    if failure:
+        raise failure
+
+
+def _announce(loop: ControlLoop, robot: Robot, say: Say, key: str) -> None:
+    if loop.mode is Mode.RUNNING:
+        robot.release()
+    say(f"{loop.mode}: {loop.doing}" + (key if loop.mode is Mode.WAIT_FOR_OBJECT else ""))

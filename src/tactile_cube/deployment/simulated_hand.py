@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.deployment.limits import require_positive
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.env import cube_pose
@@ -37,7 +38,7 @@ class SimulatedHand:
 
     Args:
         rate: of the fast loop [Hz].
-        cube: whether there is one to hand over.
+        cube: whether there is one to turn.
         noise: standard deviation of the measured angles [rad].
         resolution: of the measured angles [rad].
         opened: how far the fingers are from the start angles at first [rad].
@@ -57,6 +58,7 @@ class SimulatedHand:
         seed: int = 0,
         setting: TrainingSetting | None = None,
     ) -> None:
+        require_positive({"robot.rate": rate})
         self._setting = setting or TrainingSetting.of(DLR_HAND2)
         hand = self._setting.hand
         self._world = World(hand, options=SimulationOptions(dt=1.0 / rate, substeps=1))
@@ -69,7 +71,7 @@ class SimulatedHand:
         away = home - opened * np.tile([0.0, *[1.0] * (hand.joints_per_finger - 1)], len(hand.fingers))
         self._world.reset(self._without_object(), Start(np.maximum(away, hand.lower), AWAY))
         self._q_d = np.array(self._world.q_m)
-        self._frame, self._theta = frame_along(self._setting.task.axis_vector()), 0.0
+        self._frame, self._theta = frame_along(self._setting.task.axis_vector()), [0.0]
 
     @property
     def world(self) -> World:
@@ -81,10 +83,9 @@ class SimulatedHand:
         """Whether there is a cube to turn."""
         return self._cube
 
-    @property
-    def turned(self) -> float:
-        """How far the object has been turned the wanted way since it was handed over, unwrapped [rad]."""
-        return self._setting.task.direction * self._theta
+    def turned(self, at: float) -> float:
+        """Return how far the object had been turned the wanted way at a time [s] of the clock, unwrapped [rad]."""
+        return self._setting.task.direction * self._theta[round(at * self._rate)]
 
     def wait(self) -> float:
         """Let the world go on by a period, by more where the tick is late."""
@@ -102,14 +103,18 @@ class SimulatedHand:
         q_m = self._world.q_m + self._rng.normal(0.0, self._noise, self._world.hand.joints)
         if self._resolution > 0.0:
             q_m = np.round(q_m / self._resolution) * self._resolution
-        return Reading(self._ticks / self._rate, q_m, np.array(self._world.dq), np.array(self._world.torque))
+        return Reading(self._ticks / self._rate, q_m, np.array(self._world.torque))
 
     def send(self, q_d: Array) -> None:
         """The world's impedance controller takes these angles from the next physics step on."""
         self._q_d = np.array(q_d)
 
-    def hand_over(self) -> None:
-        """Put the object between the fingers, held by somebody for the first 0.4 s where no table bears it."""
+    def wait_for_object(self) -> bool:
+        """Nobody has to confirm: `release` puts the object where somebody would have held it."""
+        return True
+
+    def release(self) -> None:
+        """Put the object between the fingers; without a table under it, it has no weight for the first 0.4 s."""
         if self._cube:
             world, held = self._world, self._given.gravity_onset
             start = Start(np.array(world.q), target=np.array(self._q_d), velocities=np.array(world.dq))
@@ -122,7 +127,7 @@ class SimulatedHand:
 
     def _follow_object(self) -> None:
         seen = seen_along(self._frame, self._world.cube_quaternion.tolist())
-        self._theta = cube_pose(self._world.cube_position.tolist(), seen, self._theta).theta
+        self._theta.append(cube_pose(self._world.cube_position.tolist(), seen, self._theta[-1]).theta)
 
     def _without_object(self) -> EpisodeConstants:
         return replace(self._given, filter_time=NO_FILTER, gravity_scale=0.0, gravity_onset=0, table_height=None)

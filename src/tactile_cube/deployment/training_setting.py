@@ -6,14 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import numpy as np
+
+from tactile_cube.agent.policy_parts import making, require_parts
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.randomization import StartStates
 from tactile_cube.simulation import EpisodeConstants, constants_of
 
-MAKERS = ("tactile_cube.hand.hand_from_urdf", "tactile_cube.hand.published_hand")
-"""What a policy file may name: nothing else is made from it."""
+DRIVES = {"kp": (0.5, 2.0), "kd": (0.5, 2.0), "torque_limit": (0.0, 1.0)}
+"""Between which multiples of the hand's own the gains and the torque limit of a training may lie."""
+CONSTANTS = {"object", *(field.name for field in fields(EpisodeConstants))}
 
 
 @dataclass(frozen=True)
@@ -40,44 +44,72 @@ class TrainingSetting:
         return cls(replace(hand, start_angles=angles), weighs, task)
 
 
-def training_setting(info: Mapping[str, Any], hand: Hand | None = None) -> TrainingSetting:
+def training_setting(
+    info: Mapping[str, Any],
+    hand: Hand | None = None,
+    object: Mapping[str, Any] | None = None,
+    label: str = "the policy",
+) -> TrainingSetting:
     """Return what a policy was trained with.
 
     Args:
         info: what the policy file says beside its weights.
-        hand: the one that the file names, from elsewhere: its URDF may have moved.
+        hand: the one that the file names, where its URDF is none of the package's: no file has another file read.
+        object: likewise, as `constants_of` takes it.
+        label: how the policy is called in a message.
 
     Raises:
-        InputError: the file names another hand, something else than a hand of this package, what no constant or task
-            has, or a URDF that is no longer there.
+        InputError: another hand or another URDF than the file names, or a file of which no setting can be made; see
+            `require_parts`.
     """
-    env = (info.get("config") or {}).get("env") or {}
-    trained = (env.get("hand") or {}).get("name", DLR_HAND2.name)
-    if hand is not None and hand.name != trained:
+    named = {"hand": hand, "object": object}
+    env = require_parts((info.get("config") or {}).get("env") or {}, label, [key for key in named if named[key]])
+    if hand is not None:
+        _require_trained(hand, info["config"]["env"].get("hand") or {})
+    with making(label):
+        hand = hand or _hand(env.get("hand"))
+        constants = {"object": object} | _values(env, "constants", CONSTANTS, label)
+        task = _values(env, "task", {field.name for field in fields(Task)}, label)
+        made = constants_of(hand, **constants)
+        _require_drives(made, constants_of(hand), label)
+        return TrainingSetting.of(hand, made, Task(**task) if task else None)
+
+
+def _require_trained(hand: Hand, named: Mapping[str, Any]) -> None:
+    trained, urdf = named.get("name", DLR_HAND2.name), named.get("sha256")
+    if hand.name != trained:
         raise InputError(
             f"hand={hand.name}: the policy was trained on {trained}; give policy=FILE of this hand, or motion=holds "
             "to move it without one"
         )
-    hand = hand or _hand(env.get("hand"))
-    given = _values(env, "constants", {"object", *(field.name for field in fields(EpisodeConstants))})
-    task = _values(env, "task", {field.name for field in fields(Task)})
-    return TrainingSetting.of(hand, constants_of(hand, **given), Task(**task) if task else None)
+    if urdf not in (None, hand.urdf_sha256):
+        raise InputError(
+            f"hand={hand.name}: its URDF has the SHA-256 {hand.urdf_sha256[:12]}..., the policy was trained on "
+            f"{str(urdf)[:12]}...; give the URDF of the training"
+        )
+
+
+def _require_drives(trained: EpisodeConstants, own: EpisodeConstants, label: str) -> None:
+    """Refuse gains and torques of other drives than the hand's: by them the commands to a robot are limited."""
+    for key, (least, most) in DRIVES.items():
+        stated, known = np.asarray(getattr(trained, key)), np.asarray(getattr(own, key))
+        if not np.all((least * known <= stated) & (stated <= most * known)):
+            raise InputError(
+                f"{label}: env.constants.{key} is {stated.max():g}, the hand's is {known.max():g}; describe a hand "
+                "with such drives and name it: hand=..."
+            )
 
 
 def _hand(named: Mapping[str, Any] | None) -> Hand:
     from hydra.utils import instantiate
 
-    if named is None:
-        return DLR_HAND2
-    if named.get("_target_") not in MAKERS:
-        raise InputError(f"the policy names the hand {named.get('_target_')!r}; only {' and '.join(MAKERS)} are made")
-    hand: Hand = instantiate(dict(named), _convert_="all")
+    hand: Hand = DLR_HAND2 if named is None else instantiate(named, _convert_="all")
     return hand
 
 
-def _values(env: Mapping[str, Any], part: str, known: set[str]) -> dict[str, Any]:
+def _values(env: Mapping[str, Any], part: str, known: set[str], label: str) -> dict[str, Any]:
     """The plain values of a part of the environment; classes and the hand stand elsewhere."""
     values = {key: value for key, value in (env.get(part) or {}).items() if key not in ("_target_", "hand", "joints")}
     for key in values.keys() - known:
-        raise InputError(f"the policy's file has env.{part}.{key}, which this version does not know")
+        raise InputError(f"{label}: has env.{part}.{key}, which this version does not know")
     return values

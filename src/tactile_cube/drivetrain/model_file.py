@@ -1,5 +1,6 @@
 """The one file that says what was identified: values, intervals, effects, provenance and errors, as plain YAML."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -7,6 +8,7 @@ from typing import Any, Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import describe, read_schema
 from tactile_cube.errors import InputError
 
@@ -19,6 +21,9 @@ OBJECT_EFFECTS = (
     "object_size",
 )
 """Effects of fingertips and object, which `simulation.contact_effects` describes; no joint has them."""
+NOT_NEGATIVE = ("kp", "kd", "torque_limit", "stiffness", "static_friction", "reflected_inertia")
+MAY_BE_INFINITE = ("stiffness", "torque_limit", "rate_limit")
+"""Constants of a drive that need not end: a rigid one, one that is not limited."""
 
 
 class _Strict(BaseModel):
@@ -46,7 +51,15 @@ class Estimate(_Strict):
     def _ordered(self) -> "Estimate":
         if not self.low <= self.value <= self.high:
             raise ValueError(f"the interval [{self.low:g}, {self.high:g}] does not hold the value {self.value:g}")
+        large = [one for one in (self.low, self.value, self.high) if limits.NUMBER < abs(one) < math.inf]
+        if large:
+            raise ValueError(f"{large[0]:g} is beyond {limits.NUMBER:g}; write .inf if that is meant")
         return self
+
+    @property
+    def finite(self) -> bool:
+        """Whether value and interval are."""
+        return all(map(math.isfinite, (self.low, self.value, self.high)))
 
 
 class EffectEstimate(_Strict):
@@ -104,7 +117,8 @@ class ModelFile(_Strict):
         rig: name of the URDF that was identified.
         joints: actuated joints in column order.
         values: parameter -> joint -> estimate; parameters are kp [N m/rad], kd [N m s/rad], torque_limit [N m],
-            stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2], friction_creep [rad/s per N m].
+            stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2], friction_creep [rad/s per N m],
+            reading_delay [s].
         effects: what had to be added to the plain drivetrain.
         offsets: joint -> offset of the joint's zero [rad]; the interval spans the robot initialisations.
         provenance: recording, command, version, seed, trials.
@@ -134,6 +148,24 @@ class ModelFile(_Strict):
         """Its effects and those found, which take the place of those of the same name."""
         names = {one.effect for one in found}
         return [*(one for one in self.effects if one.effect not in names), *found]
+
+    @model_validator(mode="after")
+    def _said_once(self) -> "ModelFile":
+        for key, names in (("joints", self.joints), ("effects", [one.effect for one in self.effects])):
+            twice = [name for name in names if names.count(name) > 1]
+            if twice:
+                raise ValueError(f"{key} names '{twice[0]}' more than once")
+        return self
+
+    @model_validator(mode="after")
+    def _possible_constants(self) -> "ModelFile":
+        named = [(f"values.{key}.{joint}", one, key) for key, row in self.values.items() for joint, one in row.items()]
+        named += [(f"offsets.{joint}", one, "offsets") for joint, one in self.offsets.items()]
+        for where, one, key in named:
+            if not (one.finite or key in MAY_BE_INFINITE) or (key in NOT_NEGATIVE and one.value < 0.0):
+                numbers = f"{one.value:g} in [{one.low:g}, {one.high:g}]"
+                raise ValueError(f"{where} is {numbers}; give finite numbers{', 0 or more' * (key in NOT_NEGATIVE)}")
+        return self
 
     @model_validator(mode="after")
     def _known_joints(self) -> "ModelFile":

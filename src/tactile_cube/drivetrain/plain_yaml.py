@@ -1,50 +1,99 @@
 """YAML as plain data: numbers, text, lists and mappings; nothing in a file can be executed or instantiated."""
 
+import math
+import re
+from collections.abc import Hashable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
+from tactile_cube.untrusted_file import read_text
 
-LARGEST = 1_000_000
-"""Values in a file; aliases could make a few lines into more than any memory holds."""
+DIGITS = 40
+"""Of a number in a file."""
 Schema = TypeVar("Schema", bound=BaseModel)
+
+
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """PyYAML's plain data, in which a key stands once and a number is one that a computer holds."""
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Refuse keys that stand twice, and `<<`, by which few lines make more than any memory holds."""
+        known = set()
+        for key, _ in node.value:
+            if key.tag.endswith(":merge"):
+                raise _at(key, "'<<' is not read; write the keys out")
+            name = self.construct_object(key, deep=True)
+            if isinstance(name, Hashable):
+                if name in known:
+                    raise _at(key, f"the key '{name}' stands twice; remove one")
+                known.add(name)
+
+    def number(self, node: yaml.ScalarNode) -> float:
+        """Refuse 1e400, which would be infinite (`.inf` is), and numbers so long that reading them takes minutes."""
+        if len(node.value) <= DIGITS:
+            made = self.construct_yaml_int if node.tag.endswith(":int") else self.construct_yaml_float
+            value: float = made(node)
+            if math.isfinite(value) or node.value.lower().lstrip("+-") in (".inf", ".nan"):
+                return value
+        raise _at(node, f"{node.value[:DIGITS]} is larger than any number; write .inf if that is meant")
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.number)
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.number)
+EXPONENT = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+$")
+"""1e400 and 1e5 are numbers, as in YAML 1.2; by YAML 1.1 they are text."""
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, [*"-+0123456789"])
+
+
+def _at(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping in `path`.
 
     Raises:
-        InputError: the file is missing, is no YAML, asks for an object (`!!python/...`) or holds no mapping.
+        InputError: the file is missing or too large, is no YAML, asks for an object (`!!python/...`), has a key twice
+            or holds no mapping.
     """
+    text = read_text(path)
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        if _size(data, {}) >= LARGEST:
-            raise ValueError(f"its aliases (*name) make more than {LARGEST} values of it")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text: {error}") from None
+        _require_shallow(text)
+        data = yaml.load(text, _Loader)
+        if _size(data, {}) >= limits.VALUES:
+            raise ValueError(f"its aliases (*name) make more than {limits.VALUES} values of it")
     except yaml.constructor.ConstructorError as error:
         raise InputError(f"{path}{_place(error)}: {error.problem}; only plain data is read, remove the tag") from None
     except yaml.YAMLError as error:
         problem = getattr(error, "problem", None) or " ".join(str(error).split())
         raise InputError(f"{path}{_place(error)}: not valid YAML: {problem}") from None
-    except (ValueError, RecursionError) as error:  # a number of thousands of digits, lists within lists within lists
+    except ValueError as error:
         raise InputError(f"{path}: not usable YAML: {str(error).partition(';')[0]}") from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping of keys to values, received {type(data).__name__}")
     return data
 
 
+def _require_shallow(text: str) -> None:
+    """Refuse lists within lists within lists, and more values than `limits.VALUES`, before anything is made of them."""
+    depth = 0
+    for count, event in enumerate(yaml.parse(text, _Loader)):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if count > limits.VALUES or depth > limits.DEPTH:
+            raise ValueError(f"more than {limits.VALUES} keys and values, or {limits.DEPTH} within each other")
+
+
 def _size(value: Any, known: dict[int, int]) -> int:
-    """Values within a value, those that aliases repeat each time; a value within itself counts as `LARGEST`."""
+    """Values within a value, those that aliases repeat each time; a value within itself counts as `limits.VALUES`."""
     if not isinstance(value, dict | list):
         return 1
     if id(value) not in known:
-        known[id(value)] = LARGEST  # until it is known: within itself
+        known[id(value)] = limits.VALUES  # until it is known: within itself
         known[id(value)] = 1 + sum(
             _size(part, known) for part in (value.values() if isinstance(value, dict) else value)
         )

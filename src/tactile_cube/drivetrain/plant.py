@@ -152,11 +152,6 @@ class Plant:
         self.view(memory, f"parameters:{effect.name}")[..., a, :] = block
         self.view(memory, f"active:{effect.name}")[..., a] = 1.0
 
-    def clear_effect(self, memory: Array, effect: EffectClass, joint: str) -> None:
-        """Switch an effect off at a joint."""
-        self._check_known(effect)
-        self.view(memory, f"active:{effect.name}")[..., self._index(joint)] = 0.0
-
     def place(self, joint: str) -> Place:
         """Where a joint sits in the plant."""
         a = self._index(joint)

@@ -18,6 +18,8 @@ from tactile_cube.simulation import EpisodeConstants
 OUTCOMES = ("running", "time_limit", "dropped", "left_range", "tilted", "lifted", "faulty")
 """What an episode's step can lead to; the key "outcome" is an index into it."""
 
+LONGEST = 1_000_000
+"""Policy steps of an episode: more than a day."""
 RUNNING, TIME_LIMIT, DROPPED, LEFT_RANGE, TILTED, LIFTED, FAULTY = range(len(OUTCOMES))
 
 
@@ -60,6 +62,8 @@ class Task:
             value = getattr(self, key)
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"task.{key} is {value}; give a number above 0")
+        if self.episode_steps > LONGEST:
+            raise InputError(f"task.episode_steps is {self.episode_steps}; give at most {LONGEST}")
         for key in ("gravity_scale", "gravity_onset"):
             if not getattr(self, key) >= 0:
                 raise InputError(f"task.{key} is {getattr(self, key)}; give a number >= 0")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.agent.policy_parts import making
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import SHIPPED
 
@@ -49,8 +50,8 @@ def read_ancestry(folders: Sequence[Path]) -> list[Ancestor]:
     """Read runs, and before each one what it rests on: where it began, who taught it, the search for its gait.
 
     Args:
-        folders: of the runs, the first one first, the policy's own the last. A run that began with another run's
-            checkpoint, still there, or with a policy that comes with the package brings that one's ancestry by itself.
+        folders: of the runs, the first one first, the policy's own the last. A run that began with that of a folder
+            beside it, or with a policy that comes with the package, brings that one's ancestry by itself.
 
     Raises:
         InputError: there is no ledger, or it or the policy cannot be read.
@@ -64,19 +65,21 @@ def _with_ancestors(folder: Path, given: set[str]) -> list[Ancestor]:
     if not (folder / POLICY).is_file():
         return [Ancestor(folder.name, steps, cpu_hours, wall_hours)]
     info = load_policy(folder / POLICY)[1]
-    exploration, start = info.config.get("exploration") or {}, (info.config.get("training") or {}).get("init_from")
-    teacher = exploration.get("teacher") if exploration.get("demonstrations") else None
-    before = [one for named in (start, teacher) if named for one in _named(Path(named), given)]
-    before += _search(exploration)
-    return [*before, Ancestor(folder.name, steps, cpu_hours, wall_hours, in_words(info.config), info.commit)]
+    with making(str(folder / POLICY)):
+        exploration, start = info.config.get("exploration") or {}, (info.config.get("training") or {}).get("init_from")
+        teacher = exploration.get("teacher") if exploration.get("demonstrations") else None
+        known = given | {folder.name}
+        before = [one for named in (start, teacher) if named for one in _named(Path(named), folder.parent, known)]
+        before += _search(exploration)
+        return [*before, Ancestor(folder.name, steps, cpu_hours, wall_hours, in_words(info.config), info.commit)]
 
 
-def _named(path: Path, given: set[str]) -> list[Ancestor]:
-    """The ancestry of a checkpoint, a run's folder or a policy of the package; of what is gone, that it was."""
+def _named(path: Path, beside: Path, given: set[str]) -> list[Ancestor]:
+    """The ancestry of a run in the folder `beside`, or of a policy of the package; else its name alone."""
     folder = path if path.is_dir() else path.parent
     if folder.name in given:
         return []
-    if (folder / LEDGER).is_file():
+    if folder.resolve().parent == beside.resolve() and (folder / LEDGER).is_file():
         return _with_ancestors(folder, given)
     card = SHIPPED / f"{path.stem}.md"
     if card.is_file() and (path.parent == SHIPPED or path.name == path.stem):

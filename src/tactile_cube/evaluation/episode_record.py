@@ -6,7 +6,7 @@ import dataclasses
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from zipfile import BadZipFile
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tactile_cube.errors import InputError
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import ObjectShape
+from tactile_cube.npz_file import read_npz
 
 Array = NDArray[np.float64]
 
@@ -127,9 +128,8 @@ class EpisodeRecord:
         Raises:
             InputError: the file is missing, damaged or not an episode record.
         """
+        data: dict[str, Any] = read_npz(path)
         try:
-            with np.load(path, allow_pickle=False) as archive:
-                data = dict(archive)
             ending, direction, constants, *later = json.loads(str(data["meta"]))
             hand = {"fingers": tuple(later[0]), "object_shape": later[1], "axis": tuple(later[2])} if later else {}
             mesh = _with_prefix(data, "mesh.")
@@ -147,7 +147,7 @@ class EpisodeRecord:
                 policy=_with_prefix(data, "policy."),
                 **hand,
             )
-        except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
+        except (LookupError, ValueError, TypeError, AttributeError) as error:
             raise InputError(f"{path}: not an episode recorded by evaluate (*.npz): {error}") from error
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.errors import InputError
 
 BASELINES = ("hold", "random", "scripted", "scripted:GAIT.yaml", "replay:EPISODE.npz")
@@ -34,8 +35,11 @@ def policy_path(name: str | None, key: str = "policy") -> Path:
         return packaged
     if not path.is_file():
         known = sorted(file.stem for file in SHIPPED.glob("*.safetensors"))
-        choices = ", ".join([*known, *(BASELINES if key == "policy" else ())])
-        raise InputError(f"{key}={name}: no such file; give a policy file, a run folder, or one of {choices}")
+        known += BASELINES if key == "policy" else ()
+        raise InputError(
+            f"{key}={name}: no such file; give a policy file, a run folder, or one of {', '.join(known)}"
+            f"{suggestion(name, known, f'{key}=')}"
+        )
     return path
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.plain_yaml import read_yaml
 from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import Array
@@ -28,11 +28,9 @@ class ScriptedPolicy:
             InputError: it cannot be read, or holds no gait.
         """
         try:
-            best = yaml.safe_load(path.read_text(encoding="utf-8"))["best"]
+            best = read_yaml(path)["best"]
             return cls(Gait(**best | {"phases": tuple(best["phases"])}))
-        except OSError as error:
-            raise InputError(f"policy=scripted:{path}: cannot be read: {error.strerror}") from error
-        except (UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+        except (KeyError, TypeError) as error:
             raise InputError(f"policy=scripted:{path}: no gait of search_gait (key 'best')") from error
 
     def start(self, env: RotationEnv, seed: int) -> None:

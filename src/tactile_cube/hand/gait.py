@@ -6,6 +6,7 @@ nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
@@ -61,6 +62,17 @@ class Gait:
     height: float = 0.009
     closing: int = 6
     phases: tuple[float, ...] = (0.0, 0.5, 0.0, 0.5)
+
+    def __post_init__(self) -> None:
+        """Refuse what no clock can follow: the numbers may be a file's."""
+        for key, value in vars(self).items():
+            for number in value if key == "phases" else (value,):
+                if not (isinstance(number, int | float) and math.isfinite(number)):
+                    raise InputError(f"gait.{key} is {value!r}; give finite numbers")
+        if not (self.period >= 1 and 0.0 < self.air_share < 1.0):
+            raise InputError(
+                f"gait.period is {self.period}, air_share is {self.air_share}; give at least 1, and a share of 0 to 1"
+            )
 
     def of(self, hand: Hand) -> Gait:
         """The same walk for a hand: where it has other fingers than there are phases, they go back in turn."""

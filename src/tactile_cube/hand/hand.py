@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -114,6 +115,16 @@ class Hand(ABC):
     @abstractmethod
     def urdf(self) -> str:
         """The whole hand; its root link is `palm`, its joints are `joint_names` and the coupled ones."""
+
+    @property
+    def urdf_name(self) -> str:
+        """Name of its URDF's file."""
+        return f"{self.name}.urdf"
+
+    @property
+    def urdf_sha256(self) -> str:
+        """SHA-256 of that file, or of the text of `urdf` where there is none."""
+        return hashlib.sha256(self.urdf().encode()).hexdigest()
 
     @abstractmethod
     def followed(self, joint: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
+from tactile_cube.untrusted_file import regular
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -136,10 +139,9 @@ def _loaded(path: Path, where: str) -> Trimesh:
 
     if path.suffix.lower() not in ENDINGS:
         raise InputError(f"{where}: ending {path.suffix!r} is unknown; give a mesh as {' or '.join(ENDINGS)}")
-    if not path.is_file():
-        raise InputError(f"{where}: no such file; a relative name is looked for in {Path.cwd()}")
+    content = BytesIO(regular(path, limits.MESH, f"; a relative name is looked for in {Path.cwd()}").read_bytes())
     try:
-        solid: Any = trimesh.load_mesh(path)
+        solid: Any = trimesh.load_mesh(content, path.suffix, skip_materials=True)  # bytes can name no other file
         if isinstance(solid, trimesh.Scene):
             solid = solid.to_mesh()
         volume = float(solid.convex_hull.volume)

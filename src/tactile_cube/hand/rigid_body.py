@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, Array, Integers, mass_matrix_and_bias
 from tactile_cube.hand.urdf_elements import Coupling, Joint
 from tactile_cube.hand.urdf_tree import read_movable_joints
@@ -109,7 +108,6 @@ class RigidBodyTree:
 def _assemble(dofs: list[Joint], actuated: tuple[str, ...]) -> RigidBodyTree:
     leaders = [actuated.index(d.coupling.joint if d.coupling else d.name) for d in dofs]
     index = {d.link: k for k, d in enumerate(dofs)}
-    _check_masses(dofs)
     return RigidBodyTree(
         joint_names=actuated,
         dof_names=tuple(d.name for d in dofs),
@@ -127,11 +125,3 @@ def _assemble(dofs: list[Joint], actuated: tuple[str, ...]) -> RigidBodyTree:
         lower=np.array([d.lower for d in dofs]),
         upper=np.array([d.upper for d in dofs]),
     )
-
-
-def _check_masses(dofs: list[Joint]) -> None:
-    for dof in dofs:
-        if not dof.body.mass >= 0.0:
-            raise InputError(f"URDF: link '{dof.link}' has mass {dof.body.mass:g} kg; give it zero or more")
-        if not np.all(np.linalg.eigvalsh(dof.body.inertia) >= -1e-12):
-            raise InputError(f"URDF: the inertia of link '{dof.link}' has a negative principal moment; correct it")

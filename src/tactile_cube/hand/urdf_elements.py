@@ -9,10 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
 
 Array = npt.NDArray[np.float64]
 MOVABLE = ("revolute", "continuous", "prismatic")
+ROUNDING = 0.02
+"""Share of the largest principal moment that rounded numbers may lack to those of a body."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,10 @@ class Body:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the URDF with the link it carries; `parent` and `link` are link names."""
+    """A joint of the URDF with the link it carries; `parent` and `link` are link names.
+
+    `velocity` [rad/s] and `effort` [N m] are its limits, inf where none is stated.
+    """
 
     name: str
     kind: str
@@ -71,6 +77,8 @@ class Joint:
     axis: Array
     lower: float
     upper: float
+    velocity: float
+    effort: float
     coupling: Coupling | None
     body: Body
 
@@ -88,7 +96,7 @@ def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
         raise InputError(f"URDF: joint '{name}' has type '{kind}'; use one of {', '.join(MOVABLE)} or fixed")
     parent, child = (_linked(element, end, name, bodies) for end in ("parent", "child"))
     limit = element.find("limit")
-    bounded = limit is not None and kind != "continuous"
+    bounded = kind != "continuous" and limit is not None and not {"lower", "upper"}.isdisjoint(limit.keys())
     return Joint(
         name=name,
         kind=kind,
@@ -98,9 +106,17 @@ def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
         axis=_axis(element, name),
         lower=number(limit, "lower", f"joint '{name}'", 0.0) if bounded else -np.inf,
         upper=number(limit, "upper", f"joint '{name}'", 0.0) if bounded else np.inf,
+        velocity=_strength(limit, "velocity", name),
+        effort=_strength(limit, "effort", name),
         coupling=_mimic(element, name),
         body=bodies[child],
     )
+
+
+def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
+    """A limit of speed or torque; exporters write 0 where they know none."""
+    value = number(limit, key, f"the limit of joint '{joint}'", 0.0)
+    return value if value > 0.0 else float("inf")
 
 
 def _mimic(element: ElementTree.Element, name: str) -> Coupling | None:
@@ -113,7 +129,11 @@ def _mimic(element: ElementTree.Element, name: str) -> Coupling | None:
 
 
 def body_of(link: ElementTree.Element) -> Body:
-    """The <inertial> of a <link>; without one it has no mass."""
+    """The <inertial> of a <link>; without one it has no mass.
+
+    Raises:
+        InputError: no body has this mass or this inertia.
+    """
     inertial, where = link.find("inertial"), f"link '{link.get('name')}'"
     if inertial is None:
         return Body()
@@ -123,6 +143,14 @@ def body_of(link: ElementTree.Element) -> Body:
         number(element, key, f"the inertia of {where}", 0.0) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     body = Body(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if not 0.0 <= mass <= limits.MASS:
+        raise InputError(f"URDF: {where} has mass {mass:g} kg; give it 0 to {limits.MASS:g} kg")
+    least, middle, most = np.linalg.eigvalsh(body.inertia)
+    if min(least, least + middle - most) < -ROUNDING * abs(most):
+        raise InputError(
+            f"URDF: {where} has principal moments of inertia {least:.4g}, {middle:.4g}, {most:.4g} kg m^2; give it "
+            "those of a body: none negative, none larger than the other two together"
+        )
     return body.seen_from(placement_of(inertial, where))
 
 
@@ -163,8 +191,8 @@ def triple(element: ElementTree.Element, key: str, where: str) -> Array:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.zeros(0)
-    if values.shape != (3,) or not np.all(np.isfinite(values)):
-        raise InputError(f'URDF: {where} has {key}="{text}"; it takes three numbers')
+    if values.shape != (3,) or not np.all(np.abs(values) <= limits.NUMBER):
+        raise InputError(f'URDF: {where} has {key}="{text}"; it takes three numbers up to {limits.NUMBER:g}')
     return values
 
 
@@ -175,8 +203,8 @@ def number(element: ElementTree.Element | None, key: str, where: str, default: f
         value = default if text is None else float(text)
     except ValueError:
         value = float("nan")
-    if not np.isfinite(value):
-        raise InputError(f'URDF: {where} has {key}="{text}"; it takes a number')
+    if not abs(value) <= limits.NUMBER:
+        raise InputError(f'URDF: {where} has {key}="{text}"; it takes a number up to {limits.NUMBER:g}')
     return value
 
 

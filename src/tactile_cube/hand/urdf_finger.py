@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -81,16 +80,15 @@ class UrdfFinger:
         return f'<joint name="{self.joints[k]}" type="revolute">{ends}{limit}{mimic}</joint>'
 
 
-def read_finger(text: str, joints: tuple[str, ...], tip: str, folder: Path, where: str) -> UrdfFinger:
+def read_finger(text: str, joints: tuple[str, ...], tip: str, where: str) -> UrdfFinger:
     """Cut a finger out of a URDF.
 
     Products of inertia about a joint's axis are left out: beside the rotor's inertia, which acts there, they vanish.
 
     Args:
-        text: the URDF.
+        text: the URDF, in which files have absolute names.
         joints: its actuated joints, from the palm to the tip.
         tip: link whose origin is the middle of the fingertip.
-        folder: of the URDF.
         where: what to call the finger in errors.
 
     Raises:
@@ -107,7 +105,7 @@ def read_finger(text: str, joints: tuple[str, ...], tip: str, folder: Path, wher
         Placement(before[k].T @ tree.placement_rotation[k] @ turns[k], before[k].T @ tree.placement_translation[k])
         for k in range(tree.dofs)
     ]
-    shapes = _shapes(text, carried, tree.dof_names, turns, folder)
+    shapes = _shapes(text, carried, tree.dof_names, turns)
     place = carried[tip][1]
     return UrdfFinger(
         joints=tree.dof_names,
@@ -175,7 +173,7 @@ def _carried_links(text: str, moving: tuple[str, ...]) -> dict[str, tuple[str, P
 
 
 def _shapes(
-    text: str, carried: dict[str, tuple[str, Placement]], joints: tuple[str, ...], turns: list[Array], folder: Path
+    text: str, carried: dict[str, tuple[str, Placement]], joints: tuple[str, ...], turns: list[Array]
 ) -> tuple[tuple[Shape, ...], ...]:
     """Collision shapes of what each joint carries, in the turned frames."""
     found: list[list[Shape]] = [[] for _ in joints]
@@ -183,16 +181,16 @@ def _shapes(
         joint, place = carried[str(link.get("name"))]
         if joint in joints:
             k = joints.index(joint)
-            found[k] += [moved(shape, turns[k]) for shape in read_shapes(link, place, folder)]
+            found[k] += [moved(shape, turns[k]) for shape in read_shapes(link, place)]
     return tuple(map(tuple, found))
 
 
-def palm_shapes(text: str, moving: tuple[str, ...], folder: Path) -> list[Shape]:
+def palm_shapes(text: str, moving: tuple[str, ...]) -> list[Shape]:
     """Collision shapes of what no joint moves, in the root link's frame: for pictures only."""
     carried = _carried_links(text, moving)
     links = ElementTree.fromstring(text).findall("link")
     placed = [(link, *carried[str(link.get("name"))]) for link in links]
-    return [shape for link, joint, place in placed if not joint for shape in read_shapes(link, place, folder)]
+    return [shape for link, joint, place in placed if not joint for shape in read_shapes(link, place)]
 
 
 def _child(text: str, joint: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,8 +16,10 @@ from tactile_cube.hand.hand import Array, FingerBase, Hand
 from tactile_cube.hand.kinematics import grasp_angles
 from tactile_cube.hand.shape import Shape
 from tactile_cube.hand.urdf import ROBOT_ROOT, origin_element, robot_element
+from tactile_cube.hand.urdf_files import package_of, with_own_files
 from tactile_cube.hand.urdf_finger import UrdfFinger, palm_shapes, read_finger
 from tactile_cube.hand.urdf_shapes import visual_elements
+from tactile_cube.untrusted_file import read_text
 
 DESCRIPTIONS = Path(__file__).parent / "descriptions"
 """URDFs that the package ships."""
@@ -33,12 +36,16 @@ class UrdfHand(Hand):
         chains: its fingers.
         palm: shapes of what no joint moves, for pictures.
         radius: of the fingertips [m].
+        file: name of the URDF's file.
+        sha256: of that file.
     """
 
     label: str
     chains: tuple[UrdfFinger, ...]
     palm: tuple[Shape, ...]
     radius: float
+    file: str
+    sha256: str
 
     @property
     def name(self) -> str:
@@ -101,6 +108,16 @@ class UrdfHand(Hand):
         fingers = [chain.parts("palm", base) for chain, base in zip(self.chains, bases, strict=True)]
         return robot_element(self.label, [f'<link name="palm">{drawn}</link>', *fingers])
 
+    @property
+    def urdf_name(self) -> str:
+        """See `Hand`."""
+        return self.file
+
+    @property
+    def urdf_sha256(self) -> str:
+        """See `Hand`."""
+        return self.sha256
+
     def chain_joints(self, finger: int) -> tuple[str, ...]:
         """See `Hand`."""
         return self.chains[finger].joints
@@ -143,6 +160,7 @@ def hand_from_urdf(
     action: Mapping[str, Sequence[float]] | None = None,
     start: Sequence[float] | None = None,
     drive: Mapping[str, float | Sequence[float]] | None = None,
+    sha256: str | None = None,
 ) -> UrdfHand:
     """Describe a hand.
 
@@ -159,13 +177,19 @@ def hand_from_urdf(
             of all [rad]; None: the URDF's limits.
         start: joint angles in which episodes start [rad]; None: fingertips 1 mm off a cube of 8 cm.
         drive: constants of the drives by their names in EpisodeConstants, e.g. kp [N m/rad].
+        sha256: that the URDF's file has to have; None: any.
 
     Raises:
         InputError: what does not fit, by its key.
     """
-    file = _file(urdf)
-    text = file.read_text(encoding="utf-8")
-    chains, bases = _fingers(fingers, text, file.parent)
+    file = urdf_file(urdf)
+    text, left_out = with_own_files(read_text(file), file, package_of(file), ("collision",))
+    if left_out:
+        raise InputError(left_out[0])
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    if sha256 not in (None, digest):
+        raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
+    chains, bases = _fingers(fingers, text)
     own = sorted({chains[0].columns.index(column) for column in chains[0].columns})
     limits = np.concatenate([chain.limits[own] for chain in chains])
     lower, upper = _action_limits(action, limits, len(chains))
@@ -182,25 +206,32 @@ def hand_from_urdf(
         drive={key: np.asarray(value) if np.ndim(value) else float(value) for key, value in (drive or {}).items()},  # type: ignore[arg-type]
         label=name,
         chains=chains,
-        palm=tuple(palm_shapes(text, moving, file.parent)),
+        palm=tuple(palm_shapes(text, moving)),
         radius=float(tip_radius),
+        file=file.name,
+        sha256=digest,
     )
     return replace(hand, start_angles=_start(hand, start))
 
 
-def _file(urdf: str) -> Path:
-    file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.is_file()), None)
+def urdf_file(urdf: str) -> Path:
+    """Return the file that a hand's `urdf` means.
+
+    Raises:
+        InputError: there is none.
+    """
+    file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.exists()), None)
     if file is None:
         raise InputError(f"hand.urdf={urdf}: no such file, nor one of the package's in {DESCRIPTIONS.name}/")
     return file
 
 
 def _fingers(
-    fingers: Mapping[str, Mapping[str, Any]], text: str, folder: Path
+    fingers: Mapping[str, Mapping[str, Any]], text: str
 ) -> tuple[tuple[UrdfFinger, ...], tuple[FingerBase, ...]]:
     if not fingers:
         raise InputError("hand.fingers is empty; describe at least one finger")
-    chains, bases = zip(*(_finger(str(key), one, text, folder) for key, one in fingers.items()), strict=True)
+    chains, bases = zip(*(_finger(str(key), one, text) for key, one in fingers.items()), strict=True)
     if len({(len(chain.joints), chain.columns) for chain in chains}) > 1:
         counts = ", ".join(f"{base.name} {len(chain.joints)}" for base, chain in zip(bases, chains, strict=True))
         raise InputError(
@@ -209,12 +240,12 @@ def _fingers(
     return chains, bases
 
 
-def _finger(name: str, one: Mapping[str, Any], text: str, folder: Path) -> tuple[UrdfFinger, FingerBase]:
+def _finger(name: str, one: Mapping[str, Any], text: str) -> tuple[UrdfFinger, FingerBase]:
     where = f"hand.fingers.{name}"
     for key in ("joints", "tip", "side"):
         if key not in one:
             raise InputError(f"{where}: lacks '{key}'; give joints, tip and side")
-    chain = read_finger(text, tuple(one["joints"]), str(one["tip"]), folder, where)
+    chain = read_finger(text, tuple(one["joints"]), str(one["tip"]), where)
     side = _vector(f"fingers.{name}.side", one["side"])
     length = float(np.linalg.norm(side[:2]))
     if length < 1e-9:

@@ -11,18 +11,18 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand.shape import Array, Shape
 from tactile_cube.hand.urdf import origin_element
 from tactile_cube.hand.urdf_elements import Placement, number, placement_of, triple
+from tactile_cube.hand.urdf_files import require_mesh
 
 
-def read_shapes(link: ElementTree.Element, place: Placement, folder: Path) -> list[Shape]:
+def read_shapes(link: ElementTree.Element, place: Placement) -> list[Shape]:
     """Collision shapes of a link whose frame sits at `place`, in the frame that `place` is given in.
 
     Args:
-        link: element of the URDF.
+        link: element of a URDF whose files have absolute names.
         place: where its frame is.
-        folder: of the URDF; file names of meshes are relative to it, `package://NAME/` too.
 
     Raises:
-        InputError: a shape that no engine has, a mesh that is not there.
+        InputError: a shape that no engine has, a mesh that none reads.
     """
     found, where = [], f"link '{link.get('name')}'"
     for collision in link.findall("collision"):
@@ -31,11 +31,11 @@ def read_shapes(link: ElementTree.Element, place: Placement, folder: Path) -> li
         if len(kinds) != 1:
             raise InputError(f"URDF: a <collision> of {where} has {len(kinds)} geometries; give one")
         at = place.then(placement_of(collision, where))
-        found.append(_shape(kinds[0], at, folder, where))
+        found.append(_shape(kinds[0], at, where))
     return found
 
 
-def _shape(element: ElementTree.Element, at: Placement, folder: Path, where: str) -> Shape:
+def _shape(element: ElementTree.Element, at: Placement, where: str) -> Shape:
     kind = element.tag
     if kind == "box":
         return Shape("box", tuple(triple(element, "size", where).tolist()), at.translation, at.rotation)
@@ -46,17 +46,10 @@ def _shape(element: ElementTree.Element, at: Placement, folder: Path, where: str
         return Shape("cylinder" if kind == "cylinder" else "capsule", size, at.translation, at.rotation)
     if kind == "mesh":
         scale = tuple(triple(element, "scale", where).tolist()) if element.get("scale") else (1.0, 1.0, 1.0)
-        return Shape("mesh", scale, at.translation, at.rotation, _mesh_file(element, folder, where))
+        file = Path(element.get("filename", ""))
+        require_mesh(file, where)
+        return Shape("mesh", scale, at.translation, at.rotation, str(file))
     raise InputError(f"URDF: {where} has the shape <{kind}>; use box, sphere, cylinder, capsule or mesh")
-
-
-def _mesh_file(element: ElementTree.Element, folder: Path, where: str) -> str:
-    name = element.get("filename", "")
-    relative = name.removeprefix("package://").partition("/")[2] if name.startswith("package://") else name
-    file = (folder / relative.removeprefix("file://")).resolve()
-    if not file.is_file():
-        raise InputError(f"URDF: {where} has the mesh '{name}'; there is no {file}")
-    return str(file)
 
 
 def collision_element(shape: Shape) -> str:

@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_elements import Body, Coupling, Joint, Placement, attribute, body_of, joint_of
 
@@ -20,9 +21,7 @@ def read_movable_joints(
 
     See `RigidBodyTree.from_urdf` for the arguments.
     """
-    robot = _robot(text)
-    bodies = {attribute(link, "name", "a link"): body_of(link) for link in robot.findall("link")}
-    every = [joint_of(element, bodies) for element in robot.findall("joint")]
+    every, bodies = read_joints(text)
     if coupled:
         _refuse_unknown(coupled, every)
         every = [replace(j, coupling=coupled[j.name]) if j.name in coupled else j for j in every]
@@ -32,10 +31,34 @@ def read_movable_joints(
     return _merge_fixed(_parents_first(every, bodies)), actuated
 
 
-def _robot(text: str) -> ElementTree.Element:
+def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
+    """All joints of a URDF, fixed ones too, and the bodies by link.
+
+    Raises:
+        InputError: it is no URDF, names a thing twice, or has a number that no mechanism has.
+    """
+    robot = robot_of(text)
+    links, joints = robot.findall("link"), robot.findall("joint")
+    if len(joints) > limits.JOINTS:
+        raise InputError(f"URDF: it has {len(joints)} joints; at most {limits.JOINTS} are read")
+    for kind, elements in (("link", links), ("joint", joints)):
+        names = [attribute(element, "name", f"a {kind}") for element in elements]
+        twice = [name for name in set(names) if names.count(name) > 1]
+        if twice:
+            raise InputError(f"URDF: two {kind}s are called '{twice[0]}'; rename one")
+    bodies = {str(link.get("name")): body_of(link) for link in links}
+    return [joint_of(element, bodies) for element in joints], bodies
+
+
+def robot_of(text: str) -> ElementTree.Element:
+    """The root element of a URDF.
+
+    Raises:
+        InputError: it is no URDF.
+    """
     try:
         robot = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # an encoding that is none
         raise InputError(f"URDF: not well-formed XML: {error}") from None
     if robot.tag != "robot":
         raise InputError(f"URDF: the root element is <{robot.tag}>; it must be <robot>")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tactile_cube.errors import InputError
+
 
 @dataclass(frozen=True)
 class Criteria:
@@ -30,6 +32,7 @@ class Criteria:
         stands_out: standard deviations by which it stands out of its scatter.
         few_segments: held-out segments below which a large gain may be unproven.
         alike: difference of two models' predictions below which they are one law in practice.
+        margin: part of a joint's limits (half its range, its speed, its torque) that a proposed command keeps free.
     """
 
     floor: float = 1.1
@@ -52,6 +55,16 @@ class Criteria:
     stands_out: float = 2.6
     few_segments: int = 60
     alike: float = 0.1
+    margin: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuse a margin that would let a command leave the limits.
+
+        Raises:
+            InputError: it is no part of them.
+        """
+        if not 0.0 <= self.margin < 1.0:
+            raise InputError(f"criteria.margin={self.margin}: is no part of a limit; take 0 to below 1, such as 0.1")
 
 
 STANDARD = Criteria()

@@ -8,7 +8,7 @@ from typing import Any
 from tactile_cube.drivetrain.model_file import EffectEstimate
 from tactile_cube.identification.diagnosis import Diagnosis
 from tactile_cube.identification.fitting.intervals import Fitted, bounds
-from tactile_cube.identification.next_experiment import FILE
+from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.recommended import effect_estimate
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import Explanation
@@ -50,10 +50,35 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "suspected": [asdict(one) for one in diagnosis.suspected],
         "unseen": [one._asdict() for one in diagnosis.unseen],
         "next_experiment": FILE if experiment and experiment.decides else None,
+        "next_experiment_safety": safety_as_json(experiment) if experiment else None,
         "inseparable": [list(pair) for pair in experiment.inseparable] if experiment else [],
         "held_out": diagnosis.held_out,
         "tested": diagnosis.tested,
         "seconds": round(seconds, 2),
+    }
+
+
+def safety_as_json(experiment: Experiment) -> dict[str, Any]:
+    """What the proposed command, or the one nearest to the limits, does at most, and what it may do."""
+    safety = experiment.safety
+    envelopes = {"reached": safety.reached, "stop_beyond": safety.allowed, "limit": safety.limits.largest}
+    return {
+        "safe": safety.safe,
+        "kind": experiment.name,
+        "scale": safety.scale,
+        "seconds": float(experiment.time[-1]),
+        "open_loop": safety.open_loop,
+        "margin": safety.margin,
+        "models": safety.models,
+        "starts": len(safety.starts),
+        "joints": {
+            joint: {
+                "start": float(safety.starts[-1, j]),
+                **{key: one.of_joint(j) for key, one in envelopes.items()},
+                "stated_by": {key: by[j] for key, by in safety.limits.sources.items()},
+            }
+            for j, joint in enumerate(experiment.joints)
+        },
     }
 
 
@@ -121,6 +146,8 @@ def _unexplained(one: Any) -> dict[str, Any]:
     return {
         "joint": one.joint,
         "black_box": round(one.black_box, 4),
+        "explained": round(one.explained, 4),
+        "of_explainable": round(one.of_explainable, 4),
         "beside": best.beside if best else None,
         "depends_most_on": best.against if best else None,
         "shapes": [

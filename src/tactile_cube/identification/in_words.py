@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.identification.next_experiment import FILE, Experiment
+from tactile_cube.identification.experiment_in_words import next_steps
+from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
 
 OPENING = {
@@ -56,7 +57,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
         f"noise floor {milli(error['noise_floor'], unit)}."
     )
     if experiment is not None:
-        lines += next_steps(experiment)
+        lines += next_steps(experiment, units)
     return "\n".join(lines)
 
 
@@ -91,21 +92,6 @@ def sets_in_words(sets: Sequence[Sequence[str]]) -> str:
     return ", or ".join(" and ".join(names) for names in sets)
 
 
-def next_steps(experiment: Experiment) -> list[str]:
-    """What to play to decide, and between what nothing that can be played decides."""
-    lines = [
-        f"No command tried would tell {one} from {other}: the machine moves alike either way."
-        for one, other in experiment.inseparable
-    ]
-    if experiment.decides:
-        lines.append(
-            f"To decide, play {FILE} twice, add both trials and diagnose again: {experiment.name} of "
-            f"{experiment.time[-1]:.0f} s. Each should say {short(experiment.told, 2)} times as much against the wrong "
-            "one, however it is refitted, as it takes to drop it."
-        )
-    return lines
-
-
 def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
     own = common_unit(units[joint] for joint in entry["joints"] if joint in units)
     values = ", ".join(
@@ -116,6 +102,11 @@ def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
 
 
 def _unexplained(entry: dict[str, Any]) -> str:
+    if entry.get("explained", 0.0) > NO_LAW:
+        return (
+            f"  {entry['joint']}: the effects explain {100 * entry['explained']:.0f} % of the torque that the refitted "
+            f"model lacks, {100 * entry['of_explainable']:.0f} % of what they and a black box explain together"
+        )
     if entry["black_box"] < NO_LAW:
         return (
             f"  {entry['joint']}: a black box of positions, speeds, torque and time explains nothing of what is left; "

@@ -23,14 +23,13 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import FINER, finer
 from tactile_cube.identification.fitting.unknowns import Unknown
+from tactile_cube.identification.safe_commands import PossibleMotions, Safety, covariance_of_numbers
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 FILE = "next_experiment.csv"
-DURATION = 12.0  # [s] of a finger
-FASTEST = 1.5  # times the fastest command of the recording: known to be safe, with a little more
 
 
 @dataclass(frozen=True)
@@ -46,6 +45,7 @@ class Experiment:
             pairs that can be told apart.
         joint: where the models of the least told of these pairs differ most.
         predictions: explanation -> (T, n) [rad], before any refit.
+        safety: what the commands do in every model that may be true.
         inseparable: pairs that none of the commands tells apart.
     """
 
@@ -56,12 +56,13 @@ class Experiment:
     told: float
     joint: str
     predictions: dict[str, Array]
+    safety: Safety
     inseparable: tuple[tuple[str, str], ...] = ()
 
     @property
     def decides(self) -> bool:
-        """Whether it is worth playing."""
-        return self.told > 1.0
+        """Whether it is worth playing, and safe."""
+        return self.told > 1.0 and self.safety.safe
 
     def write(self, folder: Path) -> Path:
         """next_experiment.csv: time and the commands, in the columns of a recording."""
@@ -93,8 +94,12 @@ def next_experiment(
         extended: the others are the first one and an effect more, which no trial speaks against that shows no such
             effect: all that counts is whether it would show.
     """
-    excitations = safe_excitations(recording, seed, shooting.time)
-    trials = [_trial(recording, name, commands) for name, commands in excitations.items()]
+    motions = PossibleMotions.of_fits(shooting, recording, list(rivals.values()), criteria.margin)
+    proposed = motions.safe_trials(seed)
+    safe = [(trial, safety) for trial, safety in proposed if safety.safe]
+    if not safe:
+        return _unsafe(recording, *min(proposed, key=lambda one: one[1].share_used))
+    trials = [trial for trial, _ in safe]
     whole = finer(shooting.cut(recording, noise, trials, segment=len(trials[0].time)), FINER)
     names, fits = list(rivals), list(rivals.values())
     predicted = shooting.finer(FINER).positions([_without_offsets(one.model) for one in fits], whole)
@@ -119,6 +124,7 @@ def next_experiment(
         float(counted[:, best].min()),
         recording.joints[int(np.argmax(apart))],
         dict(zip(names, predicted[:, best], strict=True)),
+        safe[best][1],
         tuple((names[0], name) for name, one in zip(names[1:], separable, strict=True) if not one),
     )
 
@@ -165,64 +171,23 @@ def _told(
     return np.array(times)
 
 
+def _unsafe(recording: Recording, trial: Trial, safety: Safety) -> Experiment:
+    """The command that comes nearest to the limits, which is not to be played."""
+    return Experiment(trial.kind, recording.joints, trial.time, trial.command, 0.0, recording.joints[0], {}, safety)
+
+
 def _known(trials: Recording, fitted: Fit, sizes: Mapping[str, Scales]) -> tuple[tuple[Unknown, ...], Array]:
     """The unknowns of a fit, with joint offsets of new trials for its own, and the information (P, P) on them."""
     offsets = offset_unknowns(trials, sizes)
-    others = [k for k, unknown in enumerate(fitted.unknowns) if unknown.kind != "offset"]
-    covariance = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)))[np.ix_(others, others)]
+    covariance, others = covariance_of_numbers(fitted)
     known = block_diag(np.linalg.pinv(covariance), np.diag(precision(offsets)))
-    return (*(fitted.unknowns[k] for k in others), *offsets), np.asarray(known)
-
-
-def safe_excitations(recording: Recording, seed: int, unit: float = 1.0) -> dict[str, Array]:
-    """Commands (T, n) inside the positions and near the speeds that the recording has shown to be safe."""
-    everything = np.concatenate([trial.command for trial in recording.trials])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    fastest = max(np.abs(np.diff(trial.command, axis=0)).max() / trial.step for trial in recording.trials)
-    time: Array = np.arange(round(DURATION * unit / recording.step), dtype=np.float64) * recording.step / unit
-    rng = np.random.default_rng(seed)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    phases = rng.uniform(0.0, 2.0 * np.pi, len(low))
-    waves = {
-        "slow triangles": _triangle(time[:, None] / 6.0 + phases / 6.3),
-        "fast triangles": _triangle(time[:, None] / 1.0 + phases / 6.3),
-        "growing triangles": (time[:, None] / time[-1]) ** 2 * _triangle(time[:, None] / 1.5 + phases / 6.3),
-        "tiny triangles": 0.05 * _triangle(time[:, None] / 2.0 + phases / 6.3),
-        "growing steps": (0.1 + 0.9 * time[:, None] / time[-1])
-        * np.sign(np.sin(2 * np.pi * time[:, None] / 1.6 + phases)),
-        "rising frequency": 0.4 * np.sin(2 * np.pi * (0.2 * time[:, None] + 0.3 * time[:, None] ** 2) + phases),
-        "holds with small moves": _holds(time, len(low), rng),
-    }
-    return {name: _limited(middle + half * wave, FASTEST * fastest * recording.step) for name, wave in waves.items()}
-
-
-def _triangle(turns: Array) -> Array:
-    return np.asarray(2.0 * np.abs(2.0 * (turns - np.floor(turns + 0.5))) - 1.0)
-
-
-def _holds(time: Array, joints: int, rng: np.random.Generator) -> Array:
-    steps = rng.uniform(-0.9, 0.9, (round(time[-1]) + 1, joints))
-    return np.asarray(steps[np.minimum(time.astype(int), len(steps) - 1)])
-
-
-def _limited(command: Array, most: float) -> Array:
-    """Commands whose change from row to row stays within what is safe."""
-    safe = command.copy()
-    for k in range(1, len(safe)):
-        safe[k] = safe[k - 1] + np.clip(command[k] - safe[k - 1], -most, most)
-    return safe
+    return (*others, *offsets), np.asarray(known)
 
 
 def _measured(trial: Trial, positions: Array) -> Trial:
     """A trial as a model predicts it (T, n); where its simulation ran away nothing is measured."""
     valid = np.asarray(np.isfinite(positions).all(axis=1))
-    return replace(trial, position=np.where(valid[:, None], positions, trial.command), valid=valid)
-
-
-def _trial(recording: Recording, name: str, commands: Array) -> Trial:
-    time: Array = np.arange(len(commands), dtype=np.float64) * recording.step
-    valid = np.ones(len(time), dtype=bool)
-    return Trial(name, "", name, 0, time, commands, commands.copy(), None, valid, recording.gains)
+    return replace(trial, position=np.where(valid[:, None], positions, trial.position), valid=valid)
 
 
 def _without_offsets(model: Model) -> Model:

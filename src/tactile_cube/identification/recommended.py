@@ -21,6 +21,7 @@ UNITS = {
     "static_friction": "N m",
     "reflected_inertia": "kg m^2",
     "friction_creep": "rad/s per N m",
+    "reading_delay": "s",
 }
 Known = Mapping[tuple[str, str, int, int], tuple[float, float, float]]
 

@@ -30,12 +30,20 @@ class Unexplained:
     Attributes:
         joint: its name.
         shapes: the missing torque over signals, most telling first.
-        black_box: share that a black box could still explain beside the recommended model.
+        black_box: share of the rest that a black box could still explain beside the recommended model.
+        explained: share of the torque missing beside the base model that the recommended model accounts for.
     """
 
     joint: str
     shapes: list[Shape] = field(repr=False)
     black_box: float
+    explained: float = 0.0
+
+    @property
+    def of_explainable(self) -> float:
+        """Share that the effects explain of what they and a black box explain together."""
+        together = self.explained + (1.0 - self.explained) * self.black_box
+        return self.explained / together if together > 0.0 else 0.0
 
 
 class Simulations(Questions):
@@ -88,8 +96,8 @@ class Simulations(Questions):
         search = self.search
         joints = unexplained_joints(one, search.fitted.joints, search.criteria)
         judgements = {"the recommended model": one.judgement}
-        judgements |= {"the model with refitted constants": self.base.judgement} if beside_base else {}
-        return _unexplained(search, joints, judgements) if joints else []
+        judgements["the model with refitted constants"] = self.base.judgement
+        return _unexplained(search, joints, judgements, beside_base) if joints else []
 
 
 def follows_signals(unexplained: Sequence[Unexplained], criteria: Criteria = STANDARD) -> bool:
@@ -102,16 +110,21 @@ def with_offsets(model: Model, judged: Model) -> Model:
     return Model(model.constants, model.terms, {**judged.offsets, **model.offsets})
 
 
-def _unexplained(search: Search, joints: Sequence[str], beside: Mapping[str, Judgement]) -> list[Unexplained]:
+def _unexplained(
+    search: Search, joints: Sequence[str], beside: Mapping[str, Judgement], beside_base: bool
+) -> list[Unexplained]:
     missing = {
         name: missing_torques(search.validation, search.held_out, judged.model, judged.residual)
         for name, judged in beside.items()
     }
+    recommended, base = missing.values()
     found = []
     for j, joint in enumerate(search.fitted.joints):
         if joint in joints:
-            curves = [[replace(one, beside=name) for one in shapes(torques[j])] for name, torques in missing.items()]
-            clearest = max(curves, key=lambda shown: shown[0].explained)
-            left = black_box(missing["the recommended model"][j])
-            found.append(Unexplained(joint, clearest[:SHOWN_SHAPES], left))
+            shown = missing.items() if beside_base else [*missing.items()][:1]
+            curves = [[replace(one, beside=name) for one in shapes(torques[j])] for name, torques in shown]
+            clearest = max(curves, key=lambda curve: curve[0].explained)
+            explained = 1.0 - recommended[j].torque.var() / max(base[j].torque.var(), 1e-30)
+            left = black_box(recommended[j])
+            found.append(Unexplained(joint, clearest[:SHOWN_SHAPES], left, max(0.0, float(explained))))
     return found

@@ -60,11 +60,6 @@ def bench_trials(bench: Bench, kinds: Iterable[str], initialisations: int) -> li
     return [trial for number in range(initialisations) for kind in chosen for trial in BENCH_KINDS[kind](bench, number)]
 
 
-def without_bench(recording: Recording) -> Recording:
-    """The recording without its bench tests: free motion alone."""
-    return recording.with_trials([trial for trial in recording.trials if not trial.is_bench])
-
-
 def without_touches(recording: Recording) -> Recording:
     """The recording without links that touch or hold something, which no model of a free mechanism can follow.
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
-from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.comparing.regimes import latest_direction
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -60,8 +60,7 @@ def _gains(recording: Recording, trials: Sequence[Trial]) -> dict[str, Estimate]
 
     The intervals allow for joint offsets, which turn the levers of the forces.
     """
-    coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
-    tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
+    tree = recording.rigid_body()
     rests = [_rest(trial) for trial in trials]
     errors = np.array([error for _, error in rests])
     starts = np.array([trial.initialisation for trial in trials])

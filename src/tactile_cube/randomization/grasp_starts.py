@@ -7,7 +7,6 @@ Fixed starts learn no finger gaiting even without gravity, starts in stable gras
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import asdict, dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
+from tactile_cube.npz_file import read_npz
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.randomization.start_states import StartPoses, StartStates
 from tactile_cube.simulation import EpisodeConstants, Start
@@ -66,15 +66,13 @@ class Grasps:
         Raises:
             InputError: there is no such file, or it is no file of grasps.
         """
+        data = read_npz(path)
         try:
-            with np.load(path, allow_pickle=False) as data:
-                angles, targets, positions, quaternions = (np.asarray(data[name], np.float64) for name in COLUMNS)
-                rest = json.loads(str(data["description"]))
+            angles, targets, positions, quaternions = (np.asarray(data[name], np.float64) for name in COLUMNS)
+            rest = json.loads(str(data["description"]))
             size, origin = tuple(rest["size"]), dict(rest["origin"])
             made = cls(angles, targets, positions, quaternions, rest["hand"], rest["shape"], size, origin)
-        except FileNotFoundError:
-            raise InputError(f"start.file={path}: no such file; write one with tactile_cube.search_grasps") from None
-        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"start.file={path}: no file of grasps ({error})") from error
         made.require_sound(path)
         return made

@@ -62,10 +62,19 @@ class Randomization:
         for key in ("cube_position", "cube_rotation"):
             if len(getattr(self, key)) != 3:
                 raise InputError(f"randomization.{key} has {len(getattr(self, key))} entries; give 3, for x, y, z")
+        self._require_distributions()
         if not self.sensor_noise >= 0.0:
             raise InputError(f"randomization.sensor_noise is {self.sensor_noise}; give a standard deviation >= 0 [rad]")
         if not 0.0 <= self.sticky_probability < 1.0:
             raise InputError(f"randomization.sticky_probability is {self.sticky_probability}; give a number in [0, 1)")
+
+    def _require_distributions(self) -> None:
+        for group in ("values", "factors", "shifts", "cube_position", "cube_rotation"):
+            drawn = getattr(self, group)
+            for key in drawn if isinstance(drawn, Mapping) else range(len(drawn)):
+                _require_distribution(f"{group}.{key}", drawn[key], one=group.startswith("cube"))
+        for group in ("start_angles", "joint_offset"):
+            _require_distribution(group, getattr(self, group))
 
     def constants(self, nominal: EpisodeConstants, rng: np.random.Generator) -> EpisodeConstants:
         """Draws the constants of one episode around `nominal`."""
@@ -80,6 +89,13 @@ class Randomization:
         changed["force_seed"] = int(rng.integers(2**31))
         changed["effects"] = tuple(effect.draw(rng) for effect in self.effects)
         return dataclasses.replace(nominal, **changed)
+
+
+def _require_distribution(place: str, drawn: Any, one: bool = False) -> None:
+    if not isinstance(drawn, Distribution):
+        raise InputError(f"randomization.{place} is {drawn!r}; give a distribution, such as Uniform")
+    if one and np.shape(drawn.quantile(np.array(0.5))):
+        raise InputError(f"randomization.{place} is {drawn!r}; give a distribution of one number")
 
 
 def _replace(value: Array, drawn: Array) -> Array:

@@ -15,6 +15,8 @@ from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants, Start
 
 Array = NDArray[np.float64]
+MOST = 10_000
+"""Start poses; inverse kinematics is solved for each."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,8 @@ class StartStates:
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
-        if self.poses < 1:
-            raise InputError(f"start.poses is {self.poses}; give at least 1")
+        if not 1 <= self.poses <= MOST:
+            raise InputError(f"start.poses is {self.poses}; give 1 to {MOST}")
         if not 0.0 <= self.yaw_range < 0.25 * np.pi:
             raise InputError(f"start.yaw_range is {self.yaw_range} rad; give 0 to below pi/4, beyond it faces repeat")
 

@@ -264,7 +264,7 @@ def _vector(name: str, value: object, length: int) -> Array:
     if array.shape not in ((), (length,)):
         raise InputError(f"{name} has shape {array.shape}; give one number or {length}")
     if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} is {array}; give finite numbers")
+        raise InputError(f"{name} is {array.tolist()}; give finite numbers")
     array = np.broadcast_to(array, (length,)).copy()
     array.flags.writeable = False
     return array
@@ -274,4 +274,4 @@ def _refuse_below_zero(name: str, value: object, zero_too: bool) -> None:
     """Raise for negative values, and for zero where it has no meaning."""
     numbers = np.asarray(value, dtype=np.float64)
     if np.any(np.isnan(numbers)) or np.any(numbers < 0.0) or (zero_too and np.any(numbers == 0.0)):
-        raise InputError(f"{name} is {value}; choose {'a value above 0' if zero_too else '0 or more'}")
+        raise InputError(f"{name} is {numbers.tolist()}; choose {'a value above 0' if zero_too else '0 or more'}")

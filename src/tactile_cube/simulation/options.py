@@ -10,6 +10,8 @@ from tactile_cube.errors import InputError
 Loop = Literal["auto", "c", "python"]
 LOOPS = ("auto", "c", "python")
 EngineName = Literal["bullet", "mujoco", "mixed"]
+MOST = 100_000
+"""Physics steps of a policy step, and iterations of a physics step."""
 ENGINES = ("bullet", "mujoco", "mixed")
 _SINGLE: tuple[Literal["bullet", "mujoco"], ...] = ("bullet", "mujoco")
 
@@ -44,8 +46,8 @@ class SimulationOptions:
         if not 0.0 < self.dt <= 0.01:
             raise InputError(f"simulation.dt is {self.dt} s; choose a physics step above 0 and up to 0.01 s")
         for name in ("substeps", "solver_iterations"):
-            if getattr(self, name) < 1:
-                raise InputError(f"simulation.{name} is {getattr(self, name)}; choose 1 or more")
+            if not 1 <= getattr(self, name) <= MOST:
+                raise InputError(f"simulation.{name} is {getattr(self, name)}; choose 1 to {MOST}")
         if self.loop not in LOOPS:
             raise InputError(f"simulation.loop is {self.loop!r}; choose one of {', '.join(LOOPS)}")
 

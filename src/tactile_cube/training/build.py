@@ -78,7 +78,8 @@ def build_run(
         made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
         seconds = expected_seconds(training.steps - learner.steps, learner.agent.settings, collector, training)
         notices = [*environment.approximations, *learner.agent.approximations()]
-        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, notices)
+        barrier = collector.worlds * training.steps_per_iteration * training.barrier_iterations
+        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, barrier, notices)
         held.pop_all()  # it is the run's from here
     run.best_angle = saved["best_angle"] if saved is not None else 0.0
     return run
@@ -110,7 +111,7 @@ def build_learner(
             seed=seed,
         )
         if saved is not None:
-            learner.load_state_dict(saved["learner"])
+            _fit("the run's checkpoint", lambda: learner.load_state_dict(saved["learner"]))
         elif training.init_replay:
             learner.replay.load_state_dict(replay_of(training.init_from))
         held.pop_all()
@@ -153,10 +154,15 @@ def warm_start(agent: Agent, path: Path) -> None:
     if path.suffix == POLICY_SUFFIX:
         actor, info = load_policy(path)
         require_sizes(path, info, agent.sizes.observation, agent.sizes.action)
-        _fit(path, lambda: agent.load_actor(actor))
+        if info.hidden != agent.settings.hidden:
+            raise InputError(
+                f"training.init_from={path}: networks of other shape than agent.* asks for (hidden layers "
+                f"{list(info.hidden)}, agent.hidden is {list(agent.settings.hidden)})"
+            )
+        agent.load_actor(actor)
     else:
         state = load_checkpoint(path)
-        _fit(path, lambda: agent.load_networks(state["learner"]["agent"]))
+        _fit(f"training.init_from={path}", lambda: agent.load_networks(state["learner"]["agent"]))
 
 
 def replay_of(init_from: str | None) -> dict[str, Any]:
@@ -176,14 +182,14 @@ def replay_of(init_from: str | None) -> dict[str, Any]:
     return replay
 
 
-def _fit(path: Path, load: Callable[[], None]) -> None:
+def _fit(where: str, load: Callable[[], None]) -> None:
     try:
         load()
-    except (RuntimeError, KeyError, ValueError) as error:
+    except InputError:
+        raise
+    except (AttributeError, KeyError, RuntimeError, TypeError, ValueError) as error:
         reason = str(error).splitlines()[0]
-        raise InputError(
-            f"training.init_from={path}: networks of other shape than agent.* asks for ({reason})"
-        ) from error
+        raise InputError(f"{where}: networks of other shape than agent.* asks for ({reason})") from error
 
 
 def _saved_state(checkpoints: Checkpoints, training: TrainingSettings, config: dict[str, Any]) -> dict[str, Any] | None:

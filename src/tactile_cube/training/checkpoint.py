@@ -3,11 +3,15 @@
 import hashlib
 import io
 import shutil
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import torch
+from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt, ValidationError
+from torch import Tensor
 
+from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
 from tactile_cube.training.replay_files import FOLDER, ReplayFiles, Segment
 from tactile_cube.whole_file import sync_folder, write_whole
@@ -103,13 +107,10 @@ class Checkpoints:
 
     def _load(self, path: Path) -> dict[str, Any]:
         state = load_checkpoint(path)
-        if not {"learner", "best_angle", "config"} <= state.keys() or "replay" not in state["learner"]:
-            raise InputError(f"{path}: damaged checkpoint (it lacks parts of what a run saves)")
         replay = state["learner"]["replay"]
-        if "segments" in replay:
-            segments = [(int(first), int(count), str(digest)) for first, count, digest in replay["segments"]]
-            replay["rows"] = self._replay.read(segments, replay["written"], replay["capacity"], replay["width"])
-            self._segments = segments
+        segments = [tuple(segment) for segment in replay["segments"]]
+        replay["rows"] = self._replay.read(segments, replay["written"], replay["capacity"], replay["width"])
+        self._segments = segments
         return state
 
     def _go_back(self, path: Path, refusals: list[InputError]) -> None:
@@ -125,26 +126,71 @@ class Checkpoints:
         shutil.rmtree(self.folder / FOLDER, ignore_errors=True)
 
 
+class _Ring(BaseModel):
+    """What a checkpoint says of its replay, whose rows lie in files of their own."""
+
+    written: NonNegativeInt
+    capacity: PositiveInt
+    width: PositiveInt
+    segments: list[tuple[NonNegativeInt, PositiveInt, str]]
+    generator: Any
+
+
+class _Learner(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    agent: dict[str, Any]
+    replay: _Ring
+
+
+class _State(BaseModel):
+    """What a run saves."""
+
+    learner: _Learner
+    best_angle: float
+    config: dict[str, Any]
+
+
 def load_checkpoint(path: Path) -> dict[str, Any]:
     """Read one file, weights only: nothing in it is run. Its replay's rows lie in files of their own.
 
     Raises:
-        InputError: the file is missing or damaged.
+        InputError: the file is missing or damaged, claims more than it holds, or has numbers that are not finite.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such checkpoint")
     try:
         content = memoryview(path.read_bytes())
-        head = bytes(content[: len(HEAD) + 65])
-        if head.startswith(HEAD):  # without it, from before there were checksums
-            content = content[len(head) :]
-            if hashlib.sha256(content).hexdigest().encode() != head[len(HEAD) : -1]:
-                raise ValueError("its checksum is wrong")
+        head, content = bytes(content[: len(HEAD) + 65]), content[len(HEAD) + 65 :]
+        if head != HEAD + hashlib.sha256(content).hexdigest().encode() + b"\n":
+            raise ValueError("its checksum is wrong or missing")
+        _require_uncompressed(content)
         state: dict[str, Any] = torch.load(io.BytesIO(content), weights_only=True)
+        _State.model_validate(state)
+        _require_sound(state["learner"]["agent"], "agent", len(content))
+    except ValidationError as error:
+        raise InputError(f"{path}: damaged checkpoint ({describe(error)})") from error
     except Exception as error:  # torch raises half a dozen kinds for damaged files
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{path}: damaged checkpoint ({reason})") from error
     return state
+
+
+def _require_uncompressed(content: memoryview) -> None:
+    """Refuse an archive whose parts would grow when they are read."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        if any(part.compress_type != zipfile.ZIP_STORED or part.file_size > len(content) for part in archive.filelist):
+            raise ValueError("its parts are compressed or larger than the file")
+
+
+def _require_sound(part: Any, place: str, size: int) -> None:
+    """Refuse tensors that are larger than the file (a view repeats numbers), or not finite, anywhere in a state."""
+    if isinstance(part, Tensor):
+        if part.numel() > size or not torch.isfinite(part).all():
+            raise ValueError(f"{place} holds values that are not finite, or more than the file")
+    elif isinstance(part, dict | list | tuple):
+        for key, value in part.items() if isinstance(part, dict) else enumerate(part):
+            _require_sound(value, f"{place}.{key}", size)
 
 
 def require_same_settings(path: Path, saved: dict[str, Any], now: dict[str, Any]) -> None:

@@ -113,8 +113,8 @@ class Learner:
         self.agent.load_state_dict(state["agent"])
         self.replay.load_state_dict(state["replay"])
         self.episodes.load_state_dict(state["episodes"])
-        for name, value in state["counters"].items():
-            setattr(self, name, value)
+        for name in ("iteration", "steps", "updates"):
+            setattr(self, name, int(state["counters"][name]))
         torch.set_rng_state(state["random_state"])
         if torch.cuda.is_available() and state["cuda_random_state"]:
             torch.cuda.set_rng_state_all(state["cuda_random_state"])

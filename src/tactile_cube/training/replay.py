@@ -1,5 +1,6 @@
 """A ring of transitions in one preallocated matrix: one row a transition, sampled by one gather."""
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,6 +22,9 @@ class Replay:
         sizes: widths of observation, privileged state and action.
         reward_terms: number of reward terms.
         seed: of the sampling generator.
+
+    Raises:
+        InputError: the machine has less memory than that takes.
     """
 
     def __init__(self, capacity: int, sizes: Sizes, reward_terms: int, seed: int):
@@ -37,6 +41,7 @@ class Replay:
         }
         self.widths = widths
         self.capacity = capacity
+        _require_memory(4 * capacity * sum(widths.values()), capacity)
         self.rows = torch.zeros(capacity, sum(widths.values()))
         self.written = 0
         self.generator = torch.Generator().manual_seed(seed)
@@ -82,3 +87,13 @@ class Replay:
         self.rows[: len(rows)] = rows
         self.written = state["written"]
         self.generator.set_state(state["generator"])
+
+
+def _require_memory(size: int, capacity: int) -> None:
+    """Refuse a replay larger than the machine's memory: it would be taken page by page, hours later."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else size
+    if size > memory:
+        raise InputError(
+            f"training.replay_size={capacity}: takes {size / 2**30:.3g} GiB, this machine has {memory / 2**30:.3g}; "
+            "keep fewer transitions"
+        )

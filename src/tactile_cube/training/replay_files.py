@@ -55,8 +55,9 @@ class ReplayFiles:
         """The filled part of the ring, (min(written, capacity), width); later rows are appended to these segments.
 
         Raises:
-            InputError: a segment is missing or damaged.
+            InputError: a segment is missing or damaged, or they do not hold the rows of the ring.
         """
+        self._require_whole(segments, written, capacity, width)
         ring = torch.empty(min(written, capacity), width)
         for segment in segments:
             block = torch.from_numpy(self._read(segment).reshape(-1, width))
@@ -65,6 +66,21 @@ class ReplayFiles:
             ring[number[inside] % capacity] = block[inside]
         self._segments = [(first, count, digest) for first, count, digest in segments]
         return ring
+
+    def _require_whole(self, segments: Sequence[Segment], written: int, capacity: int, width: int) -> None:
+        """Hold what a checkpoint claims against the files, before memory is taken for it."""
+        at = max(written - capacity, 0)
+        for segment in segments:
+            if not segment[0] <= at < _end(segment):
+                break
+            at = _end(segment)
+            path = self._path(segment[0])
+            size = path.stat().st_size if path.is_file() else None
+            if size != 4 * width * segment[1]:
+                found = "is missing" if size is None else f"has {size} bytes"
+                raise InputError(f"{path}: {found}, the checkpoint claims {segment[1]} rows of {width} numbers in it")
+        if at != written:
+            raise InputError(f"{self.folder}: holds the replay up to row {at}, the checkpoint claims {written} rows")
 
     def delete_all_but(self, segments: Iterable[Segment]) -> None:
         """Delete what no checkpoint refers to."""

@@ -36,6 +36,7 @@ class Run:
         checkpoints: where its state goes.
         saved_at: environment steps at the last checkpoint.
         expected_seconds: on the clock until all steps are done, on two idle cores.
+        barrier_steps: environment steps from one barrier, and so one checkpoint, to the next.
         approximations: which shortcuts are on, in words.
     """
 
@@ -47,6 +48,7 @@ class Run:
     lock: BaseFileLock
     checkpoints: Checkpoints
     expected_seconds: float
+    barrier_steps: int
     approximations: list[str]
 
     def __post_init__(self) -> None:
@@ -87,6 +89,10 @@ class Run:
         start = f"goes on at {learner.steps} steps" if learner.steps else "starts"
         expected = clock(self.expected_seconds)
         self.line.say(f"{self.folder}: {start}, {settings.steps} steps in all, about {expected} on two idle cores")
+        self.line.say(
+            f"saved every {self.barrier_steps} steps; after Ctrl-C the same command goes on from the last time, "
+            "and does the steps since then again"
+        )
         if self.checkpoints.notice:
             self.line.say(self.checkpoints.notice)
         if not learner.steps and settings.init_from:

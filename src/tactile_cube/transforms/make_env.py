@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,6 +30,16 @@ from tactile_cube.transforms.sticky_action import StickyAction
 
 ALMOST_ALL = 1.0 - 1e-9
 """The fraction of draws below what counts as a distribution's largest value."""
+DEEPEST_STACK = 1_000
+PARTS: Mapping[str, tuple[type, ...]] = {
+    "task": (Task,),
+    "reward": (Reward,),
+    "randomization": (Randomization,),
+    "start": (StartStates, GraspStarts),
+    "constants": (EpisodeConstants,),
+    "simulation": (SimulationOptions,),
+    "hand": (Hand,),
+}
 GAITS = 64  # that demonstrations choose from
 
 
@@ -71,6 +81,10 @@ class EnvConfig:
     def __post_init__(self) -> None:
         """Makes the effects, puts the model in place, and refuses values without a meaning."""
         object.__setattr__(self, "hand", self.hand or DLR_HAND2)  # null in the configuration
+        for key, kinds in PARTS.items():
+            if not isinstance(getattr(self, key), kinds):
+                names = " or ".join(kind.__name__ for kind in kinds)
+                raise InputError(f"env.{key} is {str(getattr(self, key))[:60]}; give a {names}")
         effects = [one for effect in self.effects for one in placed_effects(effect, self.hand)]
         if self.constants.joints != self.hand.joints:
             raise InputError(
@@ -85,8 +99,9 @@ class EnvConfig:
             effects += known[2]
             object.__setattr__(self, "model", None)
         object.__setattr__(self, "effects", effects)
-        if self.stack < 1:
-            raise InputError(f"env.stack is {self.stack}; give at least 1 reading")
+        self.randomization.constants(self.constants, np.random.default_rng(0))  # refuses what cannot be drawn
+        if not 1 <= self.stack <= DEEPEST_STACK:
+            raise InputError(f"env.stack is {self.stack}; give 1 to {DEEPEST_STACK} readings")
 
     def approximations(self) -> list[str]:
         """What is computed less well than it could be, in words; [] if nothing."""

@@ -15,8 +15,6 @@ TILT = 1.0 / 0.1
 VELOCITY = 1.0 / 0.05
 """It moves at some centimetres a second."""
 OBJECT_SCALE = (POSITION,) * 3 + (1.0, 1.0) + (TILT,) * 2 + (VELOCITY,) * 3 + (1.0,) * 3
-SCALE = OBJECT_SCALE + (1.0,) * 12
-"""With the joints' angles q_f of the DLR-Hand II behind them, which are taken as they are."""
 
 
 class PrivilegedState(Transform):  # type: ignore[misc]
@@ -30,7 +28,7 @@ class PrivilegedState(Transform):  # type: ignore[misc]
     """
 
     def __init__(self, joints: int = 12, visible: bool = True) -> None:
-        """Scales the entries of a hand with `joints` joints; all are zero where they are not `visible`."""
+        """Scales the entries of a hand with `joints` joints, angles not; all are zero where they are not `visible`."""
         super().__init__(in_keys=["object_state"], out_keys=["privileged"])
         self.scale: Tensor = torch.tensor(OBJECT_SCALE + (1.0,) * joints) * float(visible)
 

@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
 
+from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
 from tactile_cube.visualization.comparison_figures import marked
@@ -91,7 +92,13 @@ def _log_robot(stream: rr.RecordingStream, comparison: Comparison, starts: list[
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "rig.urdf"
         file.write_text(recording.urdf, encoding="utf-8")
-        tree = UrdfTree.from_file_path(file, entity_path_prefix="robot", static_transform_entity_path="robot/static")
+        try:
+            tree = UrdfTree.from_file_path(
+                file, entity_path_prefix="robot", static_transform_entity_path="robot/static"
+            )
+        except Exception as error:  # of a shape that Rerun does not know
+            reason = str(error).strip().partition("\n")[0]
+            raise InputError(f"{recording.rig.path}: cannot be drawn ({reason}); mend it, or say rerun=false") from None
         tree.log_urdf_to_recording(stream)
     fill_shapes(stream, tree, recording.urdf)
     stride = max(1, round(recording.rate / POSE_RATE))

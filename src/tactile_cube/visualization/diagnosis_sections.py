@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactile_cube.identification.in_words import GAIN_OF, next_steps
+from tactile_cube.identification.experiment_in_words import joint_rows, proposal, watch_for
+from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, TURNS, common_unit, milli, of_joint, short
 from tactile_cube.visualization.numbers import p_value
-from tactile_cube.visualization.report import Figure, Listing, Section, Table
+from tactile_cube.visualization.report import Callout, Figure, Listing, Section, Table
 from tactile_cube.visualization.svg import PALETTE, SIMULATED, Axes, Band, Line, line_chart
 from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_chart
 
@@ -26,6 +27,7 @@ COLUMNS = {
     "p_value": "p (no better than without)",
 }
 INTERVALS = "Values and 95 % intervals, each on a scale of its own; effects that the model lacks are not allowed for."
+REACHED = ("joint", "position in any model", "speed", "torque")
 HELD = "How the error with an object falls"
 
 
@@ -166,7 +168,11 @@ def next_section(
 
 def experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Section:
     """The commands that would decide, what each rival predicts, and between what nothing would decide."""
-    text, blocks = next_steps(experiment), []
+    rows, blocks = joint_rows(experiment, units), list[Table | Callout | Figure]()
+    if rows:
+        bound = "stop beyond" if experiment.safety.safe else "allowed"
+        blocks.append(Table((*REACHED, f"{bound}: position", "speed", "torque"), rows))
+    blocks += [Callout(line, "warn") for line in watch_for(experiment, units)]
     if experiment.decides:
         joint, unit = experiment.joints.index(experiment.joint), units.get(experiment.joint, TURNS)
         predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
@@ -177,8 +183,8 @@ def experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Sect
         ]
         chart = line_chart(Axes("time [s]", f"{experiment.joint} [{THOUSANDTHS[unit]}]", height=220), lines)
         caption = f"What each candidate predicts for {experiment.joint} before any refit, relative to their mean."
-        blocks = [Figure(chart, caption)]
-    return Section("What to record next", text, blocks)
+        blocks.append(Figure(chart, caption))
+    return Section("What to record next", proposal(experiment), blocks)
 
 
 def _typed(effect: str, joint: str) -> str:

@@ -31,11 +31,13 @@ def test_a_finger_s_joint_stands_for_that_joint_of_every_finger() -> None:
 @pytest.mark.parametrize(
     ("name", "complaint"),
     [
-        ("striebeck", "'striebeck' is unknown"),
+        ("striebeck_friction", r"'striebeck_friction' is unknown.*did you mean stribeck_friction\?$"),
+        ("stribeck", r"did you mean stribeck_friction\?$"),
         ("no_such_rig.Drag", "whose code no file can have run"),
         ("tests.drivetrain.effects.laws.Nothing", "no subclass of Effect named 'Nothing'"),
         ("tests.drivetrain.effects.laws.NOT_AN_EFFECT", "no subclass of Effect"),
         ("stribeck_friction@q9", "joint 'q9' is unknown; the joints are q1, q2"),
+        ("stribeck_friction@q22", r"joint 'q22' is unknown; the joints are q1, q2; did you mean q2\?$"),
         ("stribeck_friction@", "joint '' is unknown"),
     ],
 )

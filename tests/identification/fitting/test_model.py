@@ -34,8 +34,3 @@ def test_a_candidate_fits_only_the_parameters_of_its_form() -> None:
     assert model.terms[0].values == {"play": 0.0, "gap": 0.01, "smooth": 0.0, "softness": 0.01, "crossing": 0.0}
     assert model_unknowns(model) == unknowns
     assert read_all(put_all(model, unknowns, np.array([0.02])), unknowns).tolist() == [0.02]
-
-
-def test_a_term_is_named_as_a_user_writes_it() -> None:
-    model, _ = Candidate(find_effect("backlash"), ("q2",), {"gap": 0.01}).added_to(PLAIN)
-    assert model.terms[0].label == "backlash@q2"

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
-from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting import resolution
 from tactile_cube.identification.fitting.resolution import resolved, step_error
 from tactile_cube.identification.fitting.shooting import Shooting
@@ -64,10 +63,6 @@ def test_a_slow_controller_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(resolution, "step_error", lambda *_: 0.0)
     stated = read_recording(write(tmp_path, lambda data: data["controller"].update(rate_hz=200.0)))
     assert resolved(stated, EFFECTS, print) is stated
-
-
-def test_what_steps_hide_is_less_than_what_an_effect_must_gain() -> None:
-    assert np.isclose(resolution.HIDDEN**2, STANDARD.least_gain)
 
 
 def test_a_torque_limit_that_is_reached_between_rows_needs_shorter_steps_where_the_encoder_is_fine(

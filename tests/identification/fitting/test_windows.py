@@ -4,7 +4,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -17,10 +16,6 @@ NO_ROWS = np.zeros(0, dtype=np.int64)
 @pytest.fixture
 def recording(tmp_path: Path) -> Recording:
     return read_recording(write(tmp_path))
-
-
-def test_the_sensor_noise_is_read_from_the_positions(recording: Recording) -> None:
-    assert sensor_noise(recording) == pytest.approx([2e-4, 2e-4], rel=0.25)
 
 
 def test_every_sample_is_in_exactly_one_segment(recording: Recording) -> None:

@@ -5,8 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactile_cube.identification.search.evidence import charged, correlation_length, in_blocks, p_value
-from tests.identification.test_verdict import judged
+from tactile_cube.identification.search.evidence import (
+    Judgement,
+    charged,
+    correlation_length,
+    in_blocks,
+    p_value,
+    worse,
+)
+from tests.identification.test_verdict import MODEL, NOTHING, judged
 
 
 def remembering(length: int, count: int = 600, seed: int = 0) -> np.ndarray:
@@ -23,6 +30,17 @@ def test_the_length_of_a_correlation_is_found(length: int) -> None:
 def test_one_trial_does_not_remember_another() -> None:
     levels = np.repeat(np.random.default_rng(0).normal(size=60), 10)
     assert correlation_length(levels, np.arange(600)) == 1
+
+
+def test_five_differences_of_one_sign_have_the_one_sided_probability_of_1_in_32() -> None:
+    before = Judgement(MODEL, np.full(5, 400.0), np.full(5, 100), NOTHING, np.ones(1), np.arange(5))
+    after = replace(before, costs=before.costs - [20.0, 30.0, 50.0, 70.0, 110.0])
+    assert p_value(before, after) == pytest.approx(1 / 32)
+    assert p_value(after, before) == 1.0
+    assert p_value(before, before) == 1.0
+    few = replace(before, costs=before.costs[:4], samples=before.samples[:4], trial=before.trial[:4])
+    steady = replace(few, costs=few.costs + np.array([390.0, 410.0, 400.0, 400.0]))
+    assert (p_value(steady, few), worse(steady, few)) == (1.0, True), "four blocks prove nothing, a steady loss does"
 
 
 def test_the_same_difference_many_times_is_no_proof() -> None:
@@ -43,11 +61,12 @@ def test_blocks_keep_the_sum_and_do_not_cross_trials() -> None:
 
 
 def test_numbers_that_a_segment_chose_for_itself_are_charged_above_the_noise_alone() -> None:
-    samples, numbers = np.full(3, 400), np.array([0, 2, 2])
-    found = charged(np.array([4000.0, 4000.0, 390.0]), samples, numbers)
+    samples, numbers = np.array([400, 400, 400, 50]), np.array([0, 2, 2, 2])
+    found = charged(np.array([4000.0, 4000.0, 390.0, 150.0]), samples, numbers)
     assert found[0] == 4000.0
     assert found[1] == pytest.approx(400.0 + 3600.0 * (8.0 / 6.0) ** 2), "eight of 400 samples are independent"
     assert found[2] == 390.0
+    assert found[3] == pytest.approx(50.0 + 100.0 * 3.0**2), "a short segment has at least one more than it chose"
 
 
 def test_an_effect_that_shows_in_fast_motion_alone_is_proven_by_each_segment_of_it() -> None:

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.comparing.error import residuals, summarise
+from tactile_cube.measurement.comparing.error import normalised_fit, raw_residuals, residuals, summarise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import write
 
@@ -31,3 +31,12 @@ def test_bridged_samples_count_in_no_error(tmp_path: Path) -> None:
     errors = residuals(recording.trials, simulated)
     assert np.isnan(errors[0][100]).all()
     assert summarise(errors, recording.joints).overall == 0.0
+
+
+def test_of_the_raw_error_nothing_is_removed_and_the_fit_is_what_is_left_of_the_motion(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))
+    trials = recording.trials
+    raw = raw_residuals(trials, [trial.position + 0.02 for trial in trials])
+    assert summarise(raw, recording.joints).joints["a"] == pytest.approx(0.02)
+    halves = [trial.position.mean(axis=0) + 0.5 * (trial.position - trial.position.mean(axis=0)) for trial in trials]
+    assert normalised_fit(trials, raw_residuals(trials, halves), ("a", "b"))["a"] == pytest.approx(50.0)

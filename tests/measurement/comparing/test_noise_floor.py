@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,16 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import table, write
 
 
-def test_repeats_give_the_sensor_noise_and_not_the_joint_offset(tmp_path: Path) -> None:
-    floor = noise_floor(read_recording(write(tmp_path)))
+@pytest.mark.parametrize("repeats", [2, 5])
+def test_repeats_give_the_sensor_noise_and_not_the_joint_offset(tmp_path: Path, repeats: int) -> None:
+    recording = read_recording(write(tmp_path))
+    noises = np.random.default_rng(0).normal(scale=2e-4, size=(repeats - 2, *recording.trials[0].position.shape))
+    clean = table(noise=0.0)
+    position = np.stack([clean["a.position"], clean["b.position"]], axis=1)
+    more = [replace(recording.trials[0], name=f"more {k}", position=position + n) for k, n in enumerate(noises)]
+    floor = noise_floor(recording.with_trials((*recording.trials, *more)))
     assert floor.source == "repeats"
-    assert floor.repeats == 2
+    assert floor.repeats == repeats
     assert floor.overall == pytest.approx(2e-4, rel=0.1)
 
 
@@ -46,11 +53,24 @@ def test_another_command_is_no_repeat_and_the_floor_is_a_guess(tmp_path: Path) -
     assert floor.overall == pytest.approx(2e-4, rel=0.5)
 
 
-def test_a_coarse_sensor_bounds_the_guess(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["sensors"]["position_resolution"] = 0.01
+def test_the_sensors_noise_is_that_of_the_positions_whatever_jumps_there_are(tmp_path: Path) -> None:
+    def spoil(columns: dict) -> None:
+        columns["a.position"][::30] += 0.05
 
-    assert np.all(sensor_noise(read_recording(write(tmp_path, change))) >= 0.01 / np.sqrt(12))
+    assert sensor_noise(read_recording(write(tmp_path, spoil=spoil))) == pytest.approx([2e-4, 2e-4], rel=0.1)
+
+
+def test_a_sensor_is_no_better_than_its_owner_says_or_than_a_millionth_of_the_motion(tmp_path: Path) -> None:
+    def noise(name: str, **sensors: float) -> np.ndarray:
+        def spoil(columns: dict) -> None:
+            columns.update(table(noise=0.0))
+
+        recording = read_recording(write(tmp_path / name, lambda data: data.update(sensors=sensors), spoil))
+        return sensor_noise(recording.with_trials(recording.trials[:1]))
+
+    stated = noise("stated", position_resolution=0.012, position_noise=0.004)
+    np.testing.assert_allclose(stated, np.hypot(0.012 / np.sqrt(12.0), 0.004))
+    np.testing.assert_allclose(noise("ideal"), 1e-6 * np.array([0.6, 0.8]), rtol=1e-3)
 
 
 def test_the_floor_is_the_recordings_alone_and_the_step_size_error_stands_beside_it(tmp_path: Path) -> None:

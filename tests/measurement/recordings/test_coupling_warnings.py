@@ -8,11 +8,11 @@ from tactile_cube.measurement.recordings.consistency import check_coupling
 from tactile_cube.measurement.recordings.description import Coupling
 from tactile_cube.measurement.recordings.rig import parse_rig
 
-LIMIT = '<limit lower="-1" upper="1"/>'
-URDF = f"""<robot>
-  <joint name="a" type="revolute">{LIMIT}</joint>
-  <joint name="b" type="revolute">{LIMIT}</joint>
-  <joint name="c" type="revolute">{LIMIT}<mimic joint="a"/></joint>
+ENDS = '<parent link="base"/><child link="link"/>'
+URDF = f"""<robot><link name="base"/><link name="link"/>
+  <joint name="a" type="revolute">{ENDS}</joint>
+  <joint name="b" type="revolute">{ENDS}</joint>
+  <joint name="c" type="revolute">{ENDS}<mimic joint="a"/></joint>
 </robot>"""
 
 

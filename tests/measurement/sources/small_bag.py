@@ -32,13 +32,14 @@ uint32 stride
 """
 
 
-def write_bag(path: Path) -> None:
+def write_bag(path: Path, compression: str = "ZSTD") -> None:
     """Write states of both joints in another order than the rig's, and commands as bare arrays."""
+    from mcap.writer import CompressionType
     from mcap_ros2 import writer
 
     columns = table()
     with path.open("wb") as stream:
-        output = writer.Writer(stream)
+        output = writer.Writer(stream, compression=CompressionType[compression])
         states = output.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
         commands = output.register_msgdef("std_msgs/msg/Float64MultiArray", ARRAY)
         for row, time in enumerate(columns["time"]):

@@ -75,11 +75,14 @@ def test_names_and_units_of_other_programs_are_understood(
         assert np.allclose(recording.trials[0].command[:, k], table()[f"{joint}.command"], atol=1e-6)
 
 
-def test_torques_are_taken_where_all_joints_have_one_and_converted_by_their_names(tmp_path: Path) -> None:
-    names = NUMBERED | {"a.torque": "tau1 [mNm]", "b.torque": "tau2 [mNm]"}
+@pytest.mark.parametrize(("unit", "size"), [("mNm", 1e-3), ("Nmm", 1e-3), ("Ncm", 1e-2), ("N cm", 1e-2), ("Nm", 1.0)])
+def test_torques_are_taken_where_all_joints_have_one_and_converted_by_their_names(
+    unit: str, size: float, tmp_path: Path
+) -> None:
+    names = NUMBERED | {"a.torque": f"tau1 [{unit}]", "b.torque": f"tau2 [{unit}]"}
     trial = imported(tmp_path, {"log.csv": log(names)}).trials[0]
     assert trial.torque is not None
-    assert np.allclose(trial.torque[:, 1], 1e-3 * table()["b.torque"], atol=1e-6)
+    assert np.allclose(trial.torque[:, 1], size * table()["b.torque"], atol=1e-6)
 
 
 def test_command_and_position_may_be_in_different_units(tmp_path: Path) -> None:

@@ -1,8 +1,10 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
@@ -11,13 +13,17 @@ from tests.measurement.small_rig import URDF, table
 from tests.measurement.sources.small_bag import write_bag
 
 pytest.importorskip("mcap_ros2.writer", reason="needs the extra `ros`")
+import lz4.frame
+import zstandard
+
+from tactile_cube.measurement.sources.mcap_file import unpacked
 
 
-@pytest.fixture
-def bag(tmp_path: Path) -> Path:
+@pytest.fixture(params=["ZSTD", "LZ4", "NONE"])
+def bag(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """States of both joints in another order than the rig's, commands as bare arrays."""
     (tmp_path / "rig.urdf").write_text(URDF)
-    write_bag(tmp_path / "bag.mcap")
+    write_bag(tmp_path / "bag.mcap", request.param)
     return tmp_path / "bag.mcap"
 
 
@@ -51,6 +57,27 @@ def test_a_wrong_topic_is_named(bag: Path) -> None:
 def test_a_missing_joint_is_named(bag: Path) -> None:
     with pytest.raises(InputError, match="'elbow' is missing"):
         source(bag, joints=["a", "elbow"]).recordings(0)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
+def test_a_chunk_is_unpacked_no_further_than_it_says(compression: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from mcap.records import Chunk
+
+    content = bytes(10_000)  # 1 GB of zeros would be as small
+    packed = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "": bytes}[compression](content)
+    chunk = Chunk(compression, packed, 0, 0, 0, len(content))
+    assert unpacked(chunk).data == content
+    with pytest.raises(ValueError, match="a chunk is not of the 100 bytes that it says"):
+        unpacked(replace(chunk, uncompressed_size=100))
+    monkeypatch.setattr(limits, "CHUNK", 9_999)
+    with pytest.raises(ValueError, match=r"a chunk of 0\.01 MB"):
+        unpacked(chunk)
+
+
+def test_a_bag_of_more_messages_than_memory_holds_is_refused(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MESSAGES", 599)
+    with pytest.raises(InputError, match="more than 599 messages on /joint_states and /joint_commands; split the bag"):
+        source(bag).recordings(0)
 
 
 def test_a_truncated_bag_is_an_error(bag: Path) -> None:

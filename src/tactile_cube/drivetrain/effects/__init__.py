@@ -1,4 +1,4 @@
-"""The catalogue of physical effects: one class each, used in training, in fitting and in the search."""
+"""The catalogue of physical effects: one class each, used in training, fitting and search."""
 
 from tactile_cube.drivetrain.effects.catalogue import (
     catalogue,

@@ -7,8 +7,12 @@ from tactile_cube.drivetrain.signals import ACCELERATION, DAMPING, TORQUE
 
 
 class ActuatorLag(Effect):
-    """time_constant * s' = tau - s; s reaches the joint.
+    """Motor torque that follows the torque asked for with a first-order lag.
 
+    time_constant * s' = tau - s; the torque s reaches the joint.
+
+    In data: a delay in slow motion; fast motion loses amplitude too.
+    Confused with: `command_delay` below 1 / (2 pi time_constant); `reflected_inertia`.
     Source: torque loops and tendons, 5-100 ms (Shadow hand: 54 ms).
     """
 
@@ -20,14 +24,15 @@ class ActuatorLag(Effect):
 
     @classmethod
     def state_size(cls, dt: float) -> int:
-        """Delivered torque, first-call flag, torque asked for in the last step, its own share in what was delivered."""
+        """Return 4: delivered torque, first-call flag, last torque asked for and its share in the delivered one."""
         return 4
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor torque [N m], exact for an input that is a straight line from step to step.
+        """Return the motor torque [N m], exact for an input that is linear from step to step.
 
-        The speed of a step is that of its middle; what was remembered of the last step is carried on to its end.
+        The torque asked for depends on the speed in the middle of a step. The last step's state is moved to its end
+        before it is used.
         """
         asked = x[TORQUE, j]
         if p[0] <= 0.0:

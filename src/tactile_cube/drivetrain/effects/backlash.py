@@ -11,11 +11,15 @@ from tactile_cube.drivetrain.signals import DAMPING, DEFLECTION, GAP, LEAD, MOTO
 class Backlash(Effect):
     """Play between motor and link, in its three usual descriptions.
 
-    play: the motor encoder keeps its reading until the link has moved through the gap (hysteresis of width
-    play). gap: a dead band of the spring. Within it the motor carries no torque and stands where its controller asks
-    for none; on either flank it leads or lags by half a gap. Oil in the gap lets the motor near that place by 63 % in a
-    `crossing` time, and pulls the link meanwhile. smooth: the motor leads or lags by half of it as the
-    torque changes its sign, softly over torques of `softness`, as where seals or grease carry it through its gap.
+    - `play`: hysteresis of the reading. The motor encoder keeps its value until the link has moved through the gap.
+    - `gap`: dead band of the spring. Within it the motor carries no torque and stands where its controller asks for
+      none; on either flank it leads or lags by half a gap. Oil in the gap brings the motor 63 % of the way to that
+      place in the time `crossing`, and pulls the link meanwhile.
+    - `smooth`: the motor leads or lags by half of this angle as the torque changes its sign, softly over torques of
+      `softness`. Seals or grease carry the motor through its gap.
+
+    In data: a flat spot of fixed width in the position after each reversal, at any speed.
+    Confused with: `elasticity` and `stribeck_friction` in motion of one amplitude; a preload removes backlash.
     Source: Nordin and Gutman, Controlling mechanical systems with backlash, 2002.
     """
 
@@ -30,26 +34,22 @@ class Backlash(Effect):
         Parameter("crossing", unit="s", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="oil; ms", scale=0.005),
     )
 
-    forms = (
-        {"play": 0.01},
-        {"gap": 0.01},
-        {"smooth": 0.01, "softness": 0.01},
-    )
+    forms = ({"play": 0.01}, {"gap": 0.01}, {"smooth": 0.01, "softness": 0.01})
     details = ("crossing",)
 
     @classmethod
     def details_at(cls, scales: Scales, values: Mapping[str, float]) -> tuple[str, ...]:
-        """Only a gap is crossed."""
+        """Return `crossing` where there is a gap to cross."""
         return cls.details if values["gap"] > 0.0 else ()
 
     @classmethod
     def state_size(cls, dt: float) -> int:
-        """Offset within the play, first-call flag, last reading, offset within the gap."""
+        """Return 4: offset within the play, first-call flag, last reading, offset within the gap."""
         return 4
 
     @staticmethod
     def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor position [rad] but for the drive's deflection and the play."""
+        """Return the motor position [rad] without the drive's deflection and without the play."""
         half = 0.5 * p[1]
         reading = x[MOTOR_POSITION, j]
         if half > 0.0:
@@ -66,7 +66,7 @@ class Backlash(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor position [rad]."""
+        """Return the motor position [rad]."""
         reading = x[MOTOR_POSITION, j]
         if p[0] > 0.0:
             half = 0.5 * p[0]
@@ -77,7 +77,7 @@ class Backlash(Effect):
             s[0] = min(max(s[0] - (reading - s[2]), -half), half)
             s[2] = reading
             reading += s[0]
-        if p[2] > 0.0:  # a deflection by the torque, which the torque feels without delay
+        if p[2] > 0.0:  # in DEFLECTION too: the torque depends on it in the same step
             lead = 0.5 * p[2] * tanh(x[TORQUE, j] / p[3])
             x[DEFLECTION, j] += lead
             reading += lead

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.errors import InputError
 
@@ -49,7 +51,7 @@ CATALOGUE_MODULES = (
 
 @cache
 def catalogue() -> dict[str, EffectClass]:
-    """All effects of this package by name, in the order in which they act."""
+    """Return all effects of this package by name, in the order in which they act."""
     package = __package__ or __name__.rpartition(".")[0]
     modules = (import_module(f"{package}.{name}") for name in CATALOGUE_MODULES)
     found = (value for module in modules for value in vars(module).values() if _defines_effect(value, module.__name__))
@@ -57,9 +59,9 @@ def catalogue() -> dict[str, EffectClass]:
 
 
 def find_effect(name: str) -> EffectClass:
-    """An effect by its catalogue name, or a user's own class by the dotted path of a module that is imported already.
+    """Return an effect by its catalogue name, or a user's own class by its dotted path.
 
-    Names stand in files that come from anywhere, so nothing is imported for them: see `import_own_effects`.
+    Nothing is imported for a dotted path, because names come from files of any origin: see `import_own_effects`.
 
     Raises:
         InputError: there is no such effect.
@@ -67,16 +69,18 @@ def find_effect(name: str) -> EffectClass:
     if name in catalogue():
         return catalogue()[name]
     if "." not in name:
-        known = ", ".join(catalogue())
-        raise InputError(f"effect '{name}' is unknown; use a dotted path to your own class, or one of: {known}")
+        raise InputError(
+            f"effect '{name}' is unknown; use a dotted path to your own class, or one of: {', '.join(catalogue())}"
+            f"{suggestion(name, catalogue())}"
+        )
     return _own_effect(name)
 
 
 def import_own_effects(names: Iterable[str]) -> None:
-    """Import the modules of a user's own classes, so that files may name them; of other names nothing.
+    """Import the modules of a user's own classes, so that files may name them; other names are ignored.
 
     Args:
-        names: what the user wrote, never what a file says: `my_rig.CableDrag`, `my_rig.CableDrag@q2: tension=0.1`.
+        names: as the user wrote them, never from a file: `my_rig.CableDrag`, `my_rig.CableDrag@q2: tension=0.1`.
 
     Raises:
         InputError: a module that cannot be imported, or has no such effect.
@@ -87,16 +91,16 @@ def import_own_effects(names: Iterable[str]) -> None:
         if not module:
             continue
         if str(Path.cwd()) not in sys.path:
-            sys.path.append(str(Path.cwd()))  # a user's file lies where the command is typed
+            sys.path.append(str(Path.cwd()))  # a user's file lies in the folder of the command
         try:
             import_module(module)
-        except Exception as error:  # whatever the user's file raises
+        except Exception as error:  # the user's file may raise anything
             raise InputError(f"effect '{path}': cannot import '{module}': {error}") from None
         _own_effect(path)
 
 
 def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectClass, str]]:
-    """Effects and joints for names such as `backlash@q3`; without `@JOINT` the effect is placed on every joint.
+    """Return effects and joints for names such as `backlash@q3`; without `@JOINT` an effect acts on every joint.
 
     Args:
         names: as a user writes them.
@@ -115,7 +119,7 @@ def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectCla
 
 
 def matching_joints(joint: str, joints: Sequence[str]) -> list[str]:
-    """The joint of that name, or else those whose name ends in it after `_`, `/` or `.` (one per finger).
+    """Return the joint of that name, or else those whose name ends in it after `_`, `/` or `.` (one per finger).
 
     Raises:
         InputError: there is none.
@@ -124,7 +128,8 @@ def matching_joints(joint: str, joints: Sequence[str]) -> list[str]:
         return [joint]
     found = [name for name in joints if joint and name.endswith(tuple(mark + joint for mark in "_/."))]
     if not found:
-        raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(joints)}")
+        near = suggestion(joint, [*joints, *(re.split("[_/.]", name)[-1] for name in joints)])
+        raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(joints)}{near}")
     return found
 
 

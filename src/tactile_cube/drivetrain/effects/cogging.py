@@ -9,15 +9,19 @@ from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, TORQUE
 
 RIPPLE = "1-5 % of the rating"
-REPEATS = 1.5  # periods in the range of motion: half a period is seen again, as of a torque that repeats
+REPEATS = 1.5  # periods in the range of motion from which a ripple is seen to repeat
 OVERTONES = ("sine_2", "cosine_2", "sine_3", "cosine_3")
 
 
 class Cogging(Effect):
-    """tau += sine * sin(harmonic q) + cosine * cos(harmonic q) in the motor, or the same at the joint.
+    """Torque ripple that repeats with the position.
 
-    A ripple of the motor also bends the drive's elasticity; one of a gear's last stage or a bearing does not. Waves of
-    twice and three times the harmonic act where the first one does.
+    tau += sine * sin(harmonic q) + cosine * cos(harmonic q) in the motor; `joint_sine` and `joint_cosine` act at the
+    joint instead. A ripple of the motor also bends the drive's elasticity; one of a gear's last stage or of a bearing
+    does not. Waves of twice and three times the harmonic act where the first one does.
+
+    In data: a comb over the position, not over time.
+    Confused with: `transmission_error`, which needs no torque; slow motion both ways at two loads separates them.
     Source: Holtz and Springob, Identification and compensation of torque ripple, 1996.
     """
 
@@ -43,13 +47,13 @@ class Cogging(Effect):
 
     @classmethod
     def details_at(cls, scales: Scales, values: Mapping[str, float]) -> tuple[str, ...]:
-        """Overtones of a ripple that is seen to repeat: three waves follow whatever does not."""
+        """Return the overtones if the ripple repeats in the motion; three waves fit any torque that does not repeat."""
         repeats = values["harmonic"] * scales.span / (2.0 * pi)
         return cls.details if repeats >= REPEATS else ()
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Joint torque [N m]."""
+        """Return the joint torque [N m]."""
         angle = p[2] * x[ANGLE, j]
         if p[3] == 0.0 and p[4] == 0.0:
             return x[JOINT_TORQUE, j]
@@ -59,7 +63,7 @@ class Cogging(Effect):
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor torque [N m]."""
+        """Return the motor torque [N m]."""
         angle = p[2] * x[ANGLE, j]
         ripple = p[0] * sin(angle) + p[1] * cos(angle)
         if p[3] == 0.0 and p[4] == 0.0:

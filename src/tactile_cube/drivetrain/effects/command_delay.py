@@ -1,4 +1,4 @@
-"""Commands that arrive late: bus, scheduler, filter without lag."""
+"""Commands that arrive late."""
 
 from math import ceil
 
@@ -6,14 +6,19 @@ from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Sta
 from tactile_cube.drivetrain.signals import COMMAND
 
 LONGEST = 0.1
-"""Longest delay that is remembered [s], if it is not less than so many steps."""
+"""Longest delay that the state can hold [s]."""
 STEPS = 50
+"""Least number of steps that the state can hold."""
 
 
 class CommandDelay(Effect):
-    """u(t - Td), interpolated between steps so that the delay can be fitted smoothly.
+    """Command that reaches the controller late.
 
-    State: [1 after the first call, write index, ring of past commands].
+    q_d(t) = command(t - delay), interpolated between time steps, so that a fit can change the delay smoothly.
+
+    In data: an error proportional to the command's speed; its phase grows linearly with the frequency.
+    Confused with: `actuator_lag` and `velocity_filter_lag` in slow motion.
+    Source: bus, scheduler and filters of a controller, 2-60 ms.
     """
 
     name = "command_delay"
@@ -21,11 +26,13 @@ class CommandDelay(Effect):
     parameters = (Parameter("delay", "s", 0.0, 0.0, LONGEST, 0.02, "2-60 ms"),)
 
     @classmethod
-    def state_size(cls, dt: float) -> int:  # noqa: D102
+    def state_size(cls, dt: float) -> int:
+        """Return the size of: first-call flag, write index, ring of past commands."""
         return 4 + max(STEPS, ceil(LONGEST / dt - 1e-9))
 
     @staticmethod
-    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:  # noqa: D102
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the command [rad]."""
         length = len(s) - 2
         if s[0] == 0.0:
             s[:] = x[COMMAND, j]

@@ -1,4 +1,4 @@
-"""One physical effect of a drive: its parameters, where it acts, its law."""
+"""A physical effect of a drive: its parameters, where it acts, its law."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ View = Callable[[str], Array]
 
 
 class Stage(Enum):
-    """Where an effect acts; the value is the row of `x` that its law returns anew (MECHANISM: no law)."""
+    """Where an effect acts; the value is the row of `x` whose new value the law returns (MECHANISM: no law)."""
 
     COMMAND = signals.COMMAND
     VELOCITY_SENSOR = signals.MEASURED_VELOCITY
@@ -34,17 +34,17 @@ class Stage(Enum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect, its sizes stated for a finger's joint; `at` tells them for a joint of any other size.
+    """A number of an effect. Its sizes are those of a finger's joint; `at` returns them for any other joint.
 
     Attributes:
         name: its key in configurations and model files.
-        unit: SI, `1` for none, of a joint that turns; at one that slides `N m` stands for N and `rad` for m.
+        unit: SI unit at a joint that turns, `1` for none; at one that slides, N replaces `N m` and m replaces `rad`.
         neutral: the value at which the effect changes nothing.
         low: smallest value that a search may try.
-        high: largest.
-        typical: a usual size, where a search starts.
+        high: largest value that a search may try.
+        typical: usual value, at which a search starts.
         source: where the figures come from.
-        scale: size of a noticeable change; None: as large as the value a search starts from.
+        scale: size of a noticeable change; None: as large as the value at which a search starts.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Parameter:
     scale: float | None = None
 
     def at(self, scales: Scales) -> Parameter:
-        """The same number at a joint of these sizes."""
+        """Return the same parameter at a joint of these sizes."""
         factor = scales.of(self.unit)
         sizes = {key: factor * getattr(self, key) for key in ("neutral", "low", "high", "typical")}
         scale = None if self.scale is None else factor * self.scale
@@ -82,15 +82,16 @@ class Place:
 
     @property
     def outermost(self) -> int:
-        """The last dof that the joint moves by itself: its own or its last follower."""
+        """The last dof that the joint moves by itself: its own or its last follower's."""
         return max((self.link, *self.followers))
 
 
 class Effect:
     """An effect on one joint, with values; subclass it to describe a new one.
 
-    A subclass states `name`, `stage`, `parameters`, and gives `law` (or `configure` for a MECHANISM); without them it
-    cannot be defined. With every parameter at its neutral value the law returns the row's own value, bit for bit.
+    A subclass states `name`, `stage` and `parameters` and defines `law` (or `configure` for a MECHANISM). With every
+    parameter at its neutral value the law returns the row's own value, bit for bit. Its docstring is shown to users: a
+    line, the formula, then lines that begin with `In data:`, `Confused with:` and `Source:`.
 
     Example:
         >>> class CableDrag(Effect):
@@ -106,21 +107,21 @@ class Effect:
     stage: ClassVar[Stage]
     parameters: ClassVar[tuple[Parameter, ...]]
     forms: ClassVar[tuple[dict[str, float], ...]] = ()
-    """Alternative descriptions that a search tries in turn: parameters fitted and their starts, the rest neutral.
+    """Alternative forms that a search tries: the fitted parameters with their starts; the others are neutral.
 
     Empty: one form, all parameters at their typical values.
     """
     details: ClassVar[tuple[str, ...]] = ()
-    """Parameters that make a form richer: a search frees them where the form follows the data already, never before."""
+    """Parameters that a search frees last, where a form fits the data already."""
     contains: ClassVar[tuple[str, ...]] = ()
-    """Names of simpler effects that this one becomes at some of its values, so that it always follows data as well."""
+    """Names of simpler effects that are special cases of this one."""
     constant_reading: ClassVar[str] = ""
-    """The parameter by which it adds a constant to the reading of the position, as every initialisation does."""
+    """The parameter that adds a constant to the measured position, as the joint offset of an initialisation does."""
     from_residual: ClassVar[tuple[str, ...]] = ("harmonic", "torque_0")
-    """Parameters whose start is read from what is missing: a form that has one waits for a fitted model."""
+    """Parameters whose start comes from a fitted model's residual; a form with one of them is tried after a fit."""
 
     def __init_subclass__(cls) -> None:
-        """Refuse a class that lacks what its stage asks for.
+        """Refuse a class that lacks what its stage needs.
 
         Raises:
             InputError: it has no name, stage, parameters or law.
@@ -135,11 +136,11 @@ class Effect:
 
     @classmethod
     def defines(cls, law: str) -> bool:
-        """Whether the class has its own `law`, `torque_law`, `ahead_law` or `configure`."""
+        """Return whether the class has its own `law`, `torque_law`, `ahead_law` or `configure`."""
         return getattr(cls, law) is not getattr(Effect, law)
 
     def __init__(self, joint: str, **values: float) -> None:
-        """Place the effect on `joint`; parameters not given are as `defaults` has them.
+        """Place the effect on `joint`; `defaults` gives the parameters that are not stated.
 
         Raises:
             InputError: an unknown parameter or a value that is no finite number.
@@ -156,12 +157,12 @@ class Effect:
 
     @classmethod
     def parameters_at(cls, scales: Scales) -> dict[str, Parameter]:
-        """The parameters by name with the sizes that they have at a joint."""
+        """Return the parameters by name, with their sizes at a joint."""
         return {p.name: p.at(scales) for p in cls.parameters}
 
     @classmethod
     def defaults(cls, given: Collection[str] = ()) -> dict[str, float]:
-        """What a parameter is when only the `given` ones are stated: typical, or neutral if it is of another form."""
+        """Return each parameter's value when only `given` ones are stated: typical, or neutral if of another form."""
         every = {key for form in cls.forms for key in form}
         named = every.intersection(given)
         meant = {key for form in cls.forms if named <= form.keys() for key in form}
@@ -170,17 +171,17 @@ class Effect:
 
     @classmethod
     def forms_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """The forms, or all parameters at their typical values, with the sizes that they have at a joint."""
+        """Return the forms, or one of all parameters at their typical values, with their sizes at a joint."""
         factor = {p.name: scales.of(p.unit) for p in cls.parameters}
         plain = cls.forms or ({p.name: p.typical for p in cls.parameters},)
         return [{name: factor[name] * value for name, value in form.items()} for form in plain]
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Where a search begins at a joint: parameters to fit and their starts.
+        """Return where a search begins at a joint: parameters to fit and their starts.
 
-        By default the forms. In a form of several numbers the first one that may have either sign starts with both: a
-        first look scales a whole effect, and one number's sign is not that of the whole.
+        By default these are the forms. In a form of several parameters, the first one that may have either sign starts
+        with both, because screening scales all parameters of a form together.
         """
         known = cls.forms_at(scales)
         signed = {p.name for p in cls.parameters if p.neutral == 0.0 and p.low < 0.0}
@@ -191,50 +192,50 @@ class Effect:
 
     @classmethod
     def placed_at(cls, scales: Scales) -> dict[str, float]:
-        """Values of parameters that are not fitted but follow from what a recording shows of the joint."""
+        """Return values of parameters that are not fitted but follow from the recording of the joint."""
         return {}
 
     @classmethod
     def details_at(cls, scales: Scales, values: Mapping[str, float]) -> tuple[str, ...]:
-        """Those of `details` that a recording of the joint can tell, where the plain form has these values."""
+        """Return those of `details` that a recording of the joint can identify, where the form has these values."""
         return cls.details
 
     @classmethod
     def can_act(cls, scales: Scales) -> bool:
-        """Whether it can act at a joint at all."""
+        """Return whether the effect can act at a joint at all."""
         return True
 
     @classmethod
     def unseen_at(cls, scales: Scales) -> str | None:
-        """What a recording of the joint lacks to show the effect, were it there; None: nothing."""
+        """Return why a recording of the joint could not show the effect, in words; None if it could."""
         return None
 
     @classmethod
     def state_size(cls, dt: float) -> int:
-        """How many numbers the law remembers between steps of `dt` [s]; they are zero after a reset."""
+        """Return how many numbers the law keeps between steps of `dt` [s]; they are zero after a reset."""
         return 0
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """The new value of the stage's row for joint j; scalar Python that Numba compiles.
+        """Return the new value of the stage's row for joint j; scalar Python that Numba compiles.
 
         Args:
-            x: (ROWS, n) signals of the joint's finger, see `signals`; columns are joints, so neighbours are visible.
+            x: (ROWS, n) signals of the joint's finger, see `signals`; columns are joints.
             j: the joint's column.
             p: (parameters,) values in the order of `parameters`.
-            s: (state_size,) the law's own memory, to be changed in place.
+            s: (state_size,) the law's own state, changed in place.
             dt: step [s].
         """
-        return nan  # of a MECHANISM, which is never asked
+        return nan  # a MECHANISM has no law
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """The new motor torque of joint j [N m], for effects that act there too; arguments as of `law`."""
+        """Return the new motor torque of joint j [N m], for effects that act there too; arguments as in `law`."""
         return x[signals.TORQUE, j]
 
     @staticmethod
     def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """The part of a POSITION_SENSOR law [rad] that is known before the torque, which feels it without delay."""
+        """Return the part of a POSITION_SENSOR law [rad] that does not depend on the torque of the same step."""
         return x[signals.MOTOR_POSITION, j]
 
     @staticmethod

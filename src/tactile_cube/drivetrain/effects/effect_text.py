@@ -8,11 +8,11 @@ from tactile_cube.errors import InputError
 
 
 def parse_effect(text: str, find: Callable[[str], Any] = find_effect) -> tuple[str, dict[str, float]]:
-    """`NAME@JOINT` and parameter -> value; what is not given takes its typical value.
+    """Return `NAME@JOINT` and parameter -> value; parameters that are not given take their typical values.
 
     Args:
         text: as a user writes it.
-        find: gives the effect of a name.
+        find: returns the effect of a name.
 
     Raises:
         InputError: an unknown effect or parameter, or a value that is no number.

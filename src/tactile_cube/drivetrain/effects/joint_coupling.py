@@ -6,54 +6,32 @@ from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Sta
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import JOINT_TORQUE, POSITION, VELOCITY
 
+KINDS = (
+    ("damping", "N m s/rad", 1.0, "cables and shared shafts"),
+    ("friction", "N m", 0.5, "shared seals"),
+    ("stiffness", "N m/rad", 2.0, "tendons across two joints"),
+)
+FIRST = ("damping", "previous")
+
 
 class JointCoupling(Effect):
-    """tau_i += f(v_j, q_j) of the previous and the next joint of the chain (taken in a ring).
+    """Torque on a joint that the motion of its neighbours causes.
 
-    Viscous (damping), dry (friction, rounded below the speed `rounding`) and elastic (stiffness) parts.
+    tau_i += damping * v_j + friction * tanh(v_j / rounding) + stiffness * q_j for the previous and the next joint j of
+    the chain; the last joint's next one is the first.
+
+    In data: an error of one joint that follows its neighbour's motion.
+    Confused with: `torque_crosstalk`, which follows the neighbour's torque.
     Source: Janot et al., Staubli TX40: friction of coupled joints 5 and 6, 1.95 against 0.28 N m.
     """
 
     name = "joint_coupling"
     stage = Stage.JOINT_TORQUE
     parameters = (
-        Parameter(
-            "damping_previous",
-            unit="N m s/rad",
-            neutral=0.0,
-            low=-1.0,
-            high=1.0,
-            typical=0.03,
-            source="cables and shared shafts",
-        ),
-        Parameter(
-            "damping_next",
-            unit="N m s/rad",
-            neutral=0.0,
-            low=-1.0,
-            high=1.0,
-            typical=0.0,
-            source="cables and shared shafts",
-        ),
-        Parameter("friction_previous", unit="N m", neutral=0.0, low=-0.5, high=0.5, typical=0.0, source="shared seals"),
-        Parameter("friction_next", unit="N m", neutral=0.0, low=-0.5, high=0.5, typical=0.0, source="shared seals"),
-        Parameter(
-            "stiffness_previous",
-            unit="N m/rad",
-            neutral=0.0,
-            low=-2.0,
-            high=2.0,
-            typical=0.0,
-            source="tendons across two joints",
-        ),
-        Parameter(
-            "stiffness_next",
-            unit="N m/rad",
-            neutral=0.0,
-            low=-2.0,
-            high=2.0,
-            typical=0.0,
-            source="tendons across two joints",
+        *(
+            Parameter(f"{kind}_{side}", unit, 0.0, -bound, bound, 0.03 if (kind, side) == FIRST else 0.0, source)
+            for kind, unit, bound, source in KINDS
+            for side in ("previous", "next")
         ),
         Parameter("rounding", unit="rad/s", neutral=0.02, low=1e-3, high=1.0, typical=0.02, source="below any motion"),
     )
@@ -69,12 +47,12 @@ class JointCoupling(Effect):
 
     @classmethod
     def can_act(cls, scales: Scales) -> bool:
-        """Only where there are neighbours."""
+        """Return whether the joint has neighbours."""
         return scales.neighbours > 0
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Joint torque [N m]."""
+        """Return the joint torque [N m]."""
         n = x.shape[1]
         a, b = (j - 1) % n, (j + 1) % n
         torque = x[JOINT_TORQUE, j] + p[0] * x[VELOCITY, a] + p[1] * x[VELOCITY, b]

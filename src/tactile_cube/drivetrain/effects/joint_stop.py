@@ -7,44 +7,28 @@ from tactile_cube.drivetrain.effects.scales import Scales, unit_at
 from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, VELOCITY
 
 SHARES = (0.03, 0.12, 0.3)
-"""Of the range of motion by which a stop lies within it, where a search starts."""
-
-
+"""Distances of a stop from the end of the motion at which a search starts, as parts of the range of motion."""
 NEAR = 0.1
-"""An end of the joint this near to the motion, as a part of its range, is visited: less play no user has."""
+"""Largest distance, as a part of the range of motion, at which the motion counts as reaching an end of the joint."""
 
 
 class JointStop(Effect):
-    """A spring and a damper beyond the upper or the lower stop; they push, never pull.
+    """End stop inside the range of motion.
 
-    stiffness * depth * (deep / depth)^exponent at `deep` beyond it: a spring that stiffens by an exponent above 1.
-    Source: rubber end stops; Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, 1975
-    (the exponent; without their damping in proportion to the depth).
+    tau -= stiffness * depth * (d / depth)^exponent + damping * v beyond `upper`, at a penetration d; mirrored below
+    `lower`. The stop pushes and never pulls. An exponent above 1 is a spring that stiffens.
+
+    In data: a torque only near one end of the motion.
+    Confused with: `position_torque`, which acts over the whole range.
+    Source: rubber end stops; the exponent: Hunt and Crossley, Coefficient of restitution interpreted as damping in
+    vibroimpact, 1975 (their damping is proportional to the penetration, here it is constant).
     """
 
     name = "joint_stop"
     stage = Stage.JOINT_TORQUE
     parameters = (
-        Parameter(
-            "upper",
-            unit="rad",
-            neutral=1e9,
-            low=-7.0,
-            high=1e9,
-            typical=1.0,
-            source="within the range of motion",
-            scale=0.05,
-        ),
-        Parameter(
-            "lower",
-            unit="rad",
-            neutral=-1e9,
-            low=-1e9,
-            high=7.0,
-            typical=-1e9,
-            source="within the range of motion",
-            scale=0.05,
-        ),
+        Parameter("upper", "rad", 1e9, -7.0, 1e9, 1.0, "within the range of motion", scale=0.05),
+        Parameter("lower", "rad", -1e9, -1e9, 7.0, -1e9, "within the range of motion", scale=0.05),
         Parameter("stiffness", unit="N m/rad", neutral=5.0, low=0.1, high=500.0, typical=5.0, source="rubber to metal"),
         Parameter("damping", unit="N m s/rad", neutral=0.0, low=0.0, high=2.0, typical=0.0, source="rubber to metal"),
         Parameter(
@@ -53,16 +37,13 @@ class JointStop(Effect):
         Parameter("depth", unit="rad", neutral=0.05, low=1e-3, high=1.0, typical=0.05, source="some degrees"),
     )
 
-    forms = (
-        {"upper": 1.0, "stiffness": 5.0},
-        {"lower": -1.0, "stiffness": 5.0},
-    )
+    forms = ({"upper": 1.0, "stiffness": 5.0}, {"lower": -1.0, "stiffness": 5.0})
 
     details = ("exponent",)
 
     @classmethod
     def unseen_at(cls, scales: Scales) -> str | None:
-        """The ends of the range: a stop beyond the motion touches nothing."""
+        """Return how far the joint moved, if not to both of its ends: a stop beyond the motion touches nothing."""
         if scales.low - scales.lower < NEAR * scales.span and scales.upper - scales.high < NEAR * scales.span:
             return None
         ends = f" of {scales.lower:.3g} to {scales.upper:.3g}" if isfinite(scales.upper - scales.lower) else ""
@@ -70,15 +51,16 @@ class JointStop(Effect):
 
     @classmethod
     def placed_at(cls, scales: Scales) -> dict[str, float]:
-        """The stiffness is that of a push as deep as the middle start lies within the range.
+        """Return the penetration at which `stiffness` is defined: that of the middle start at the end of the motion.
 
-        Far from where the pushes are, every exponent has a stiffness of its own, and a fit of both hardly moves.
+        With a `depth` far from the penetrations in the data, stiffness and exponent are correlated and a fit of both is
+        slow.
         """
         return {"depth": SHARES[1] * scales.span}
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Stops within the range that the recording shows."""
+        """Return stops within the range of motion of the recording."""
         inside = [share * scales.span for share in SHARES]
         upper, lower = cls.forms_at(scales)
         return [
@@ -88,7 +70,7 @@ class JointStop(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Joint torque [N m]."""
+        """Return the joint torque [N m]."""
         over = x[ANGLE, j] - p[0]
         under = p[1] - x[ANGLE, j]
         deep = max(over, under)

@@ -1,4 +1,4 @@
-"""A mass on the rig that its description does not know."""
+"""A mass beyond those of the description."""
 
 import numpy as np
 
@@ -7,10 +7,14 @@ from tactile_cube.drivetrain.effects.scales import Scales
 
 
 class Payload(Effect):
-    """A point mass on the outermost link that the joint moves by itself, `distance` from that link's joint.
+    """Point mass on the outermost link that the joint moves by itself.
 
-    It lies on the line through the link's centre of mass; a negative mass is a link lighter than stated.
+    The mass lies `distance` from that link's joint, on the line through the link's centre of mass. A negative mass
+    makes the link lighter than stated.
 
+    In data: an error like the weight: sin q of the posture, also at rest; more inertia in fast motion.
+    Confused with: `torque_gain`; a second posture or a known weight separates them. `position_offset`;
+    `reflected_inertia`.
     Source: parallel-axis theorem.
     """
 
@@ -23,21 +27,22 @@ class Payload(Effect):
 
     @classmethod
     def forms_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """A joint that slides does not feel where on the link the mass lies."""
+        """Return the form; of a joint that slides without `distance`, which does not change its motion."""
         (form,) = super().forms_at(scales)
         return [{"mass": form["mass"]} if scales.slides else form]
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Little mass more or less, and as much as a tool: half the link's own, as far out as that.
+        """Return a little mass more and less, and that of a tool: half the mass that the joint moves, at its lever.
 
-        From a few per cent a fit does not arrive at a mass several times the link's: the torque's gain is nearer.
+        A fit that starts at a few per cent does not reach a mass several times the link's.
         """
         tool = {"mass": 0.5 * scales.mass} if scales.slides else {"mass": 0.5 * scales.mass, "distance": scales.lever}
         return [*super().starts_at(scales), tool]
 
     @staticmethod
-    def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102
+    def configure(view: View, place: Place, p: Array) -> None:
+        """Change mass, centre of mass and inertia of the link."""
         chain, link = place.chain, place.outermost
         mass, com = view("mass")[..., chain, link], view("com")[..., chain, link, :]
         length = np.maximum(np.linalg.norm(com, axis=-1), 1e-9)[..., None]

@@ -5,9 +5,13 @@ from tactile_cube.drivetrain.signals import MOTOR_POSITION
 
 
 class PositionOffset(Effect):
-    """q_m += offset, in every initialisation the same.
+    """Encoder whose zero is wrong by the same angle in every initialisation.
 
-    Source: Sievers et al., ICRA 2022, joint-angle offsets dominate the model error.
+    q_m += offset.
+
+    In data: a constant error of the position, and an error of the weight's torque like cos q.
+    Confused with: the joint offset of an initialisation, `payload`, `torque_bias`.
+    Source: Sievers et al., ICRA 2022: joint-angle offsets dominate the model error.
     """
 
     name = "position_offset"
@@ -17,5 +21,5 @@ class PositionOffset(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor position [rad]."""
+        """Return the motor position [rad]."""
         return x[MOTOR_POSITION, j] + p[0]

@@ -9,10 +9,13 @@ SOURCE = "return springs, cables, detents"
 
 
 class PositionTorque(Effect):
-    """Spring, cable or detent: tau += bias - stiffness * q + f(q).
+    """Torque that depends on the position alone: spring, cable or detent.
 
-    f is a cubic B-spline with KNOTS equally spaced control torques from `first` to `last`, constant beyond.
+    tau += bias - stiffness * q + f(q). f is a cubic B-spline with 17 equally spaced control torques from `first` to
+    `last`, and constant beyond.
 
+    In data: an error that is the same function of the position in both directions.
+    Confused with: `cogging`, `joint_stop`, `torque_bias`, `payload`: special shapes of the same function.
     Source: cable and tendon routing; any spring parallel to the joint.
     """
 
@@ -30,19 +33,16 @@ class PositionTorque(Effect):
         ),
     )
 
-    forms = (
-        {"stiffness": 0.05, "bias": 0.0},
-        {f"torque_{k}": 0.01 for k in range(KNOTS)},
-    )
+    forms = ({"stiffness": 0.05, "bias": 0.0}, {f"torque_{k}": 0.01 for k in range(KNOTS)})
 
     @classmethod
     def placed_at(cls, scales: Scales) -> dict[str, float]:
-        """The profile spans the range that the recording shows."""
+        """Return the ends of the profile: those of the motion."""
         return {"first": scales.low, "last": scales.high}
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Joint torque [N m]."""
+        """Return the joint torque [N m]."""
         place = min(max((x[ANGLE, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1), 0.0), KNOTS - 1.000001)
         knot = int(place)
         u = place - knot

@@ -7,12 +7,17 @@ from tactile_cube.drivetrain.signals import DAMPING, FRICTION, JOINT_TORQUE, VEL
 
 
 class PreslidingFriction(Effect):
-    """Dahl's friction: the bristle deflection z follows the motion and saturates at the friction limit.
+    """Dry friction on bristles, which act as a spring before the joint slides (Dahl, LuGre).
 
-    z' = v / breakaway * (1 - z sgn v); torque -(limit + excess) * z - micro_damping * breakaway * z'. It takes the
-    place of rigid Coulomb friction, so the joint creeps elastically below break-away and shows hysteresis loops in
-    (q, tau); damped bristles (LuGre) add drag where the motion turns round, and none while it slides.
-    Source: Dahl, A solid friction model, 1968; Canudas de Wit et al., LuGre, 1995 (Stribeck's curve apart).
+    z' = v / breakaway * (1 - z sgn v) is the bristles' deflection, -1 to 1; their torque is -(limit + excess) * z -
+    micro_damping * breakaway * z'. It replaces rigid dry friction with its limit: the joint creeps elastically below
+    break-away, with hysteresis between position and torque. Damped bristles (LuGre) add drag where the motion turns
+    round, and none while it slides.
+
+    In data: closed loops of torque over position in small motion, the same at any speed.
+    Confused with: `elasticity` and `backlash` in motion of one amplitude.
+    Source: Dahl, A solid friction model, 1968; Canudas de Wit et al., A new model for control of systems with friction,
+    1995 (without their Stribeck curve).
     """
 
     name = "presliding_friction"
@@ -20,24 +25,8 @@ class PreslidingFriction(Effect):
     contains = ("coulomb_friction",)
     parameters = (
         Parameter("breakaway", unit="rad", neutral=0.0, low=0.0, high=0.1, typical=0.003, source="0.05 mrad to 1 deg"),
-        Parameter(
-            "excess",
-            unit="N m",
-            neutral=0.0,
-            low=-0.05,
-            high=0.5,
-            typical=0.0,
-            source="friction beyond the nominal static friction",
-        ),
-        Parameter(
-            "micro_damping",
-            unit="N m s/rad",
-            neutral=0.0,
-            low=0.0,
-            high=2.0,
-            typical=0.0,
-            source="0.5 to 1 of what damps the link critically on its bristles, 2 sqrt(limit / breakaway * inertia)",
-        ),
+        Parameter("excess", "N m", 0.0, -0.05, 0.5, 0.0, "friction beyond the nominal static friction"),
+        Parameter("micro_damping", "N m s/rad", 0.0, 0.0, 2.0, 0.0, "0.5-1 of critical damping on the bristles"),
     )
 
     forms = (
@@ -48,12 +37,12 @@ class PreslidingFriction(Effect):
 
     @classmethod
     def state_size(cls, dt: float) -> int:
-        """Bristle deflection z, -1 to 1."""
+        """Return 1: the bristle deflection z, -1 to 1."""
         return 1
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Rigid friction limit that remains [N m]; the bristles' torque is added to the joint torque."""
+        """Return the rigid friction limit that remains [N m]; add the bristles' torque to the joint torque."""
         if p[0] <= 0.0:
             return x[FRICTION, j] + p[1]
         limit = max(x[FRICTION, j] + p[1], 0.0)

@@ -4,8 +4,12 @@ from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Pla
 
 
 class ReflectedInertia(Effect):
-    """Rotor inertia beyond the nominal one, i^2 J, in joint space.
+    """Rotor that is heavier, seen from the joint, than stated.
 
+    M_jj += excess, where the nominal rotor counts with i^2 J for the gear ratio i.
+
+    In data: an error proportional to the acceleration.
+    Confused with: `actuator_lag`, `command_delay`, `payload`.
     Source: data sheets give J; gear ratios of 100 to 200 square its error.
     """
 
@@ -14,5 +18,6 @@ class ReflectedInertia(Effect):
     parameters = (Parameter("excess", "kg m^2", 0.0, -0.003, 0.1, 0.003, "0.002-0.01 kg m^2"),)
 
     @staticmethod
-    def configure(view: View, place: Place, p: Array) -> None:  # noqa: D102
+    def configure(view: View, place: Place, p: Array) -> None:
+        """Add to the reflected inertia."""
         view("reflected_inertia")[..., place.joint] += p[..., 0]

@@ -1,4 +1,4 @@
-"""How large things are at a joint: bounds, usual sizes and starts of an effect's numbers follow from it."""
+"""Sizes of a joint, from which bounds, typical values and starts of an effect's parameters follow."""
 
 from __future__ import annotations
 
@@ -7,32 +7,32 @@ from dataclasses import dataclass
 from math import inf
 
 UNITS = re.compile(r"(N m|N|rad|kg|m|s|Hz)(?:\^(\d))?")
-MORE_PERIODS = 3.0  # of screws and magnets in the range of a joint that slides than of gears in that of one that turns
-FINGER_RANGE = 1.2  # [rad] of a finger's joint: what the range of a joint that slides stands for
+MORE_PERIODS = 3.0  # a sliding joint has this many times the periods of a turning one
+FINGER_RANGE = 1.2  # [rad] of a finger's joint; corresponds to the range of a joint that slides
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Sizes of one joint; of a joint that slides in m, N, kg in place of rad, N m, kg m^2.
+    """Sizes of one joint; of a joint that slides in m, N and kg instead of rad, N m and kg m^2.
 
     Attributes:
         torque: usual torque of the drive, exceeded in a tenth of the samples [N m].
         often: torque exceeded in half of the samples [N m].
-        seldom: torque hardly exceeded [N m].
-        low: lowest position but for a few samples [rad].
+        seldom: largest torque but for a few samples [N m].
+        low: lowest position, without a few samples [rad].
         high: highest [rad].
-        speed: hardly exceeded by the joint [rad/s].
-        command_speed: hardly exceeded by the command [rad/s].
+        speed: largest speed of the joint, without a few samples [rad/s].
+        command_speed: largest speed of the command, without a few samples [rad/s].
         inertia: at the mean posture, rotor included [kg m^2].
         mass: of all links that the joint moves [kg].
         lever: radius of gyration of these links about the joint [m].
-        time: what a second of a finger stands for, in whole decades [s].
-        slides: a prismatic joint.
-        neighbours: other joints of the rig.
-        leads: another joint is coupled to this one.
-        torque_limit: of the controller, as stated [N m]; infinite where none is.
-        lower: end of the joint as stated [rad]; infinite where none is.
-        upper: the other one [rad].
+        time: the time that corresponds to 1 s of a finger, a power of ten [s].
+        slides: whether the joint is prismatic.
+        neighbours: number of other joints of the rig.
+        leads: whether another joint follows this one.
+        torque_limit: stated limit of the controller [N m]; infinite without one.
+        lower: stated lower end of the joint [rad]; infinite without one.
+        upper: stated upper end [rad].
     """
 
     torque: float
@@ -60,15 +60,14 @@ class Scales:
 
     @property
     def position(self) -> float:
-        """What 1 rad of a finger's joint stands for: an angle has no size of its own, a path is part of the range."""
+        """What 1 rad of a finger's joint corresponds to: 1 rad, or for a joint that slides a part of its range [m]."""
         return self.span / FINGER_RANGE if self.slides else 1.0
 
     def of(self, unit: str) -> float:
-        """How many times larger a number of this unit is at this joint than at a finger's.
+        """Return how many times larger a number of this unit is at this joint than at a finger's.
 
-        Torques, positions and speeds are measured in those of the recording; what is left of time, and inertia, mass
-        and lengths, in those of the rig. Delays and windows of time go by whole decades: within a decade they are the
-        same for joints of any kind. Units that are none of these (K, V) have no scale.
+        Torques, positions and speeds scale with those of the recording; inertias, masses and lengths with those of the
+        rig. Times scale in powers of ten. Units other than these (K, V) do not scale.
 
         Args:
             unit: as a parameter states it, `N m s/rad`.
@@ -104,11 +103,11 @@ FINGER = Scales(
     time=1.0,
     neighbours=2,
 )
-"""Of the joints that the catalogue's numbers are stated for: small geared joints of 0.02 to 1 N m."""
+"""Sizes of the joints for which the catalogue states its numbers: small geared joints of 0.02 to 1 N m."""
 
 
 def unit_at(unit: str, slides: bool) -> str:
-    """A unit as it reads at a joint: `N m s/rad` is `N s/m` at one that slides."""
+    """Return a unit as it reads at a joint: `N m s/rad` is `N s/m` at one that slides."""
     if not slides:
         return unit
     for turning, sliding in (("kg m^2", "kg"), ("(N m)", "N"), ("N m", "N"), ("rad", "m")):

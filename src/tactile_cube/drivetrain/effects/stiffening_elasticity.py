@@ -8,12 +8,16 @@ from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DEFLECTION, TORQUE
 
 CUBIC = (0.01, 0.1, 1.0)
-"""Parts of the usual torque at which the cubic part of the spring bends as far as the linear one."""
+"""Torques at which the cubic part of the spring equals the linear one where a search starts, in usual torques."""
 
 
 class StiffeningElasticity(Effect):
-    """tau = K d + cubic * d^3 with 1 / K = 1 / K_e + compliance.
+    """Tendon or belt that gets stiffer as it is pulled.
 
+    tau = K d + cubic * d^3 with 1 / K = 1 / K_e + compliance, d = q_m - q.
+
+    In data: odd harmonics; soft at small torques, stiff at large ones.
+    Confused with: `elasticity` in motion of one amplitude; two preloads separate them.
     Source: Palli et al., tendon transmissions; Spong 1987 with a cubic spring.
     """
 
@@ -21,31 +25,15 @@ class StiffeningElasticity(Effect):
     stage = Stage.DEFLECTION
     contains = ("elasticity",)
     parameters = (
-        Parameter(
-            "compliance",
-            unit="rad/(N m)",
-            neutral=0.0,
-            low=0.0,
-            high=2.0,
-            typical=0.1,
-            source="slack tendons: 2-20 N m/rad",
-        ),
-        Parameter(
-            "cubic",
-            unit="N m/rad^3",
-            neutral=0.0,
-            low=0.0,
-            high=10000000.0,
-            typical=2000.0,
-            source="as large as the linear part at 10-50 mrad",
-        ),
+        Parameter("compliance", "rad/(N m)", 0.0, 0.0, 2.0, 0.1, "slack tendons: 2-20 N m/rad"),
+        Parameter("cubic", "N m/rad^3", 0.0, 0.0, 10000000.0, 2000.0, "as large as the linear part at 10-50 mrad"),
     )
 
     forms = ({"compliance": 0.1, "cubic": 2e3},)
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Springs whose cubic part is as large as the linear one below, at about, or beyond the usual torque."""
+        """Return springs whose cubic part is as large as the linear one at the torques of `CUBIC`."""
         (form,) = cls.forms_at(scales)
         springs = (form["compliance"], STIFF * form["compliance"])
         return [
@@ -56,7 +44,7 @@ class StiffeningElasticity(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Deflection q_m - q [rad]: the real root of cubic * d^3 + K d = tau (Cardano)."""
+        """Return the deflection q_m - q [rad]: the real root of cubic * d^3 + K d = tau (Cardano)."""
         torque = x[TORQUE, j]
         deflection = x[DEFLECTION, j] + p[0] * torque
         if p[1] <= 0.0 or torque * deflection <= 0.0:

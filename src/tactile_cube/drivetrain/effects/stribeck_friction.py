@@ -7,8 +7,12 @@ from tactile_cube.drivetrain.signals import FRICTION, VELOCITY
 
 
 class StribeckFriction(Effect):
-    """(Fs - Fc) exp(-|v / vs|^exponent): spikes after standstill, and a gain that drops at small amplitudes.
+    """Dry friction that is larger at standstill and falls with the speed (stiction).
 
+    F += excess * exp(-|v / velocity|^exponent).
+
+    In data: spikes after standstill; small motion falls short of its command.
+    Confused with: `backlash` and `elasticity` in motion of one amplitude.
     Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), who report exponents of 0.5 to 2.
     """
 
@@ -25,6 +29,7 @@ class StribeckFriction(Effect):
     details = ("exponent",)
 
     @staticmethod
-    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:  # noqa: D102
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the friction limit [N m]."""
         speed = abs(x[VELOCITY, j] / p[1])
         return x[FRICTION, j] + p[0] * exp(-(speed * speed if p[2] == 2.0 else speed ** p[2]))

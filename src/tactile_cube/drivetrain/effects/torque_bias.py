@@ -5,8 +5,12 @@ from tactile_cube.drivetrain.signals import TORQUE
 
 
 class TorqueBias(Effect):
-    """tau += bias.
+    """Constant torque that nobody commanded.
 
+    tau += bias.
+
+    In data: a constant error of the torque, at rest too.
+    Confused with: `asymmetric_friction` while the joint moves; `payload` in one posture; `position_offset`.
     Source: offsets of current and torque sensors.
     """
 
@@ -16,5 +20,5 @@ class TorqueBias(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor torque [N m]."""
+        """Return the motor torque [N m]."""
         return x[TORQUE, j] + p[0]

@@ -6,8 +6,12 @@ from tactile_cube.drivetrain.signals import TORQUE
 
 
 class TorqueCrosstalk(Effect):
-    """tau_i += from_previous * tau_(i-1) + from_next * tau_(i+1); joints of a chain taken in a ring.
+    """Part of the neighbours' torque that reaches a joint.
 
+    tau_i += from_previous * tau_(i-1) + from_next * tau_(i+1); the last joint's next one is the first.
+
+    In data: an error proportional to a neighbour's torque.
+    Confused with: `joint_coupling`, which follows the neighbour's motion.
     Source: tendons routed over neighbouring joints; cross-coupling of torque sensors.
     """
 
@@ -18,18 +22,15 @@ class TorqueCrosstalk(Effect):
         Parameter("from_next", unit="1", neutral=0.0, low=-0.9, high=0.9, typical=0.0, source="1-15 %"),
     )
 
-    forms = (
-        {"from_previous": 0.05},
-        {"from_next": 0.05},
-    )
+    forms = ({"from_previous": 0.05}, {"from_next": 0.05})
 
     @classmethod
     def can_act(cls, scales: Scales) -> bool:
-        """Only where there are neighbours."""
+        """Return whether the joint has neighbours."""
         return scales.neighbours > 0
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor torque [N m]."""
+        """Return the motor torque [N m]."""
         n = x.shape[1]
         return x[TORQUE, j] + p[0] * x[TORQUE, (j - 1) % n] + p[1] * x[TORQUE, (j + 1) % n]

@@ -1,20 +1,24 @@
-"""A motor whose torque bends over its command."""
+"""A motor whose torque is not proportional to its command."""
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DAMPING, TORQUE
 
 SMALLEST = 0.01
-"""Part of `reference` below which the curve goes straight to zero."""
+"""Part of `reference` below which the curve is a straight line to zero."""
 
 
 class TorqueCurve(Effect):
-    """tau = (1 + gain) * reference * |u / reference|^(1 + bend) * sgn u, u the torque asked for.
+    """Motor whose torque is not proportional to its command.
 
-    A negative bend gives less than proportional torque beyond `reference` and more below it, as servos do whose duty
-    cycle is what their controller sets, or whose iron saturates.
-    Source: Duclos et al., BAM: extended friction models for servo actuators, 2025 (duty law); Mohan, Power
-    Electronics, 2003 (saturation).
+    tau = (1 + gain) * reference * |u / reference|^(1 + bend) * sgn u, u the torque asked for. A negative bend gives
+    less than proportional torque beyond `reference` and more below it. Servos whose controller sets the duty cycle do
+    this, and motors whose iron saturates.
+
+    In data: too much torque for small commands and too little for large ones, or the reverse.
+    Confused with: `torque_gain` in motion of one amplitude; `torque_saturation`.
+    Source: Duclos et al., BAM: extended friction models for servo actuators, 2025 (duty law); Mohan, Power Electronics,
+    2003 (saturation).
     """
 
     name = "torque_curve"
@@ -30,12 +34,12 @@ class TorqueCurve(Effect):
 
     @classmethod
     def placed_at(cls, scales: Scales) -> dict[str, float]:
-        """The curve turns about the usual torque."""
+        """Return the usual torque, at which `bend` changes nothing."""
         return {"reference": scales.torque}
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor torque [N m]."""
+        """Return the motor torque [N m]."""
         if p[0] == 0.0 and p[1] == 0.0:
             return x[TORQUE, j]
         load = abs(x[TORQUE, j]) / p[2]

@@ -5,8 +5,13 @@ from tactile_cube.drivetrain.signals import DAMPING, TORQUE
 
 
 class TorqueGain(Effect):
-    """tau *= 1 + error.
+    """Torque constant that differs from the stated one.
 
+    tau *= 1 + error.
+
+    In data: an error proportional to the torque.
+    Confused with: `payload` and all inertia together; `load_dependent_friction` under one load; a known weight
+    separates.
     Source: tolerance of torque constants and current sensors.
     """
 
@@ -16,6 +21,6 @@ class TorqueGain(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor torque [N m]."""
+        """Return the motor torque [N m]."""
         x[DAMPING, j] *= 1.0 + p[0]
         return x[TORQUE, j] * (1.0 + p[0])

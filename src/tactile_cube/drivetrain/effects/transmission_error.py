@@ -8,8 +8,12 @@ from tactile_cube.drivetrain.signals import ANGLE, MOTOR_POSITION
 
 
 class TransmissionError(Effect):
-    """q_m += sine * sin(harmonic q) + cosine * cos(harmonic q).
+    """Position error that repeats with the turn of a gear.
 
+    q_m += sine * sin(harmonic q) + cosine * cos(harmonic q).
+
+    In data: a wave over the position, at any torque.
+    Confused with: `cogging`, whose error depends on the stiffness of control.
     Source: Tuttle and Seering, A nonlinear model of a harmonic drive gear transmission, 1996.
     """
 
@@ -25,6 +29,6 @@ class TransmissionError(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Motor position [rad]."""
+        """Return the motor position [rad]."""
         angle = p[2] * x[ANGLE, j]
         return x[MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)

@@ -7,8 +7,13 @@ from tactile_cube.drivetrain.signals import ACCELERATION, DAMPING, MEASURED_VELO
 
 
 class VelocityFilterLag(Effect):
-    """The controller's velocity passes a first-order low-pass, time_constant * v_f' = v - v_f, and maybe a second one.
+    """Damping that acts on a filtered velocity.
 
+    time_constant * v_f' = v - v_f: the controller's velocity passes a first-order low-pass, and a second one where
+    `second` is above zero.
+
+    In data: less damping than stated in fast motion; overshoot.
+    Confused with: `command_delay` and `actuator_lag` in slow motion.
     Source: any controller that differentiates an encoder; the filters of servo drives are of first or second order.
     """
 
@@ -24,14 +29,14 @@ class VelocityFilterLag(Effect):
 
     @classmethod
     def state_size(cls, dt: float) -> int:
-        """First-call flag, speed of the last step; of each filter its output and its last input's share in that."""
+        """Return 6: first-call flag, last speed; for each filter its output and the share of its last input in that."""
         return 6
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Measured velocity [rad/s], exact for an input that is a straight line from step to step.
+        """Return the measured velocity [rad/s], exact for an input that is linear from step to step.
 
-        The speed of a step is that of its middle; what was remembered of the last step is carried on to its end.
+        The speed of a step is that of its middle. The last step's state is moved to its end before it is used.
         """
         asked = x[MEASURED_VELOCITY, j]
         if p[0] <= 0.0:

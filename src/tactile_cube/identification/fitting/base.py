@@ -25,6 +25,7 @@ TOLERANCE = {
 MEASURED = (0.2, 5.0)
 SPREAD = 0.12  # relative standard deviation of a true constant about its nominal value
 OFFSET, OFFSET_SPREAD = 0.05, 0.01  # [rad] of a finger
+READING_SPREAD = 0.3  # rows: as if a reading came at any time within half a row of its stamp
 CREEP, CREEP_SPREAD, LARGEST_CREEP = 0.05, 0.1, 1.0  # [rad/s per N m] where friction is regularised
 
 
@@ -62,7 +63,8 @@ def base_unknowns(
         for j, joint in enumerate(recording.joints)
         if nominal["static_friction"][j] > 0.0
     ]
-    return (*constants, *creeps, *offset_unknowns(recording, sizes))
+    delays = [_reading_delay(j, recording.step) for j in joints]
+    return (*constants, *creeps, *delays, *offset_unknowns(recording, sizes))
 
 
 def offset_unknowns(recording: Recording, sizes: Mapping[str, Scales]) -> tuple[Unknown, ...]:
@@ -83,6 +85,11 @@ def _offset(joint: int, initialisation: int, size: float) -> Unknown:
 def _creep(joint: int, size: float) -> Unknown:
     most, scale, spread = size * LARGEST_CREEP, size * CREEP, size * CREEP_SPREAD
     return Unknown("constant", "friction_creep", joint, 0.0, most, scale, spread=spread)
+
+
+def _reading_delay(joint: int, row: float) -> Unknown:
+    """When within a row the position is read is never exact, and what is a row late is a delay."""
+    return Unknown("constant", "reading_delay", joint, -row, row, 0.1 * row, spread=READING_SPREAD * row)
 
 
 def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float) -> Unknown:

@@ -28,6 +28,7 @@ from tactile_cube.identification.search.shared_offset import shared_offset
 from tactile_cube.identification.search.shortlist import of_each, with_groups
 from tactile_cube.identification.search.simplicity import simplest
 from tactile_cube.identification.search.special_laws import special_candidates
+from tactile_cube.identification.search.standard_model import standard_explanation
 from tactile_cube.identification.search.together import Proposal, Together
 from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
 from tactile_cube.measurement.recordings.recording import Recording
@@ -66,6 +67,16 @@ class Findings:
     surpassed: tuple[Explanation, ...] = ()
 
 
+ENOUGH = 24  # held-out segments at least
+FEWEST_ROWS = 8
+
+
+def enough_rows(held_out: Recording) -> int:
+    """Rows of a segment at most, so that the held-out trials have enough of them for a test."""
+    rows = sum(np.count_nonzero(trial.valid) for trial in held_out.trials)
+    return max(FEWEST_ROWS, int(rows) // ENOUGH)
+
+
 class Search(Division):
     """A recording with its trials divided, and the effects that may be missing."""
 
@@ -102,7 +113,7 @@ class Search(Division):
         shooting = Shooting(fitted, effects)
         usual = shooting.cut(fitted, noise)
         windows = some(usual if longer == 1 else shooting.cut(fitted, noise, segment=longer * usual.segment), SEGMENTS)
-        segment = steady_rows(shooting, start, windows)
+        segment = min(steady_rows(shooting, start, windows), enough_rows(held_out))
         segments = min(SEGMENTS, SEGMENTS * usual.segment // segment)
         super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
         self.say, self.criteria, self.effects, self.folds = say, criteria, effects, folds
@@ -121,11 +132,12 @@ class Search(Division):
         base = self.base
         self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
         nominal = self.judged(self.start)
-        levels, scores, doubtful = self.one_by_one(base)
+        standard = standard_explanation(self, base) if base.error > self.criteria.far else None
+        levels, scores, doubtful = self.one_by_one(base, standard)
         found = [e for level in levels for e in level]
         best = min(found, key=lambda e: e.error, default=base)
         surpassed: list[Explanation] = []
-        if self.sets and best.error > self.criteria.far:
+        if self.sets and not standard and best.error > self.criteria.far:
             folds = [
                 Division(self.shooting, *one, self.noise, self.segment, self.known, self.segments) for one in self.folds
             ]
@@ -138,12 +150,15 @@ class Search(Division):
         return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed))
 
     def one_by_one(
-        self, base: Explanation
+        self, base: Explanation, standard: Explanation | None = None
     ) -> tuple[list[tuple[Explanation, ...]], tuple[Score, ...], list[Explanation]]:
-        """Effects added one at a time: levels of explanations, the first look, and what may be chance at the end."""
-        levels: list[tuple[Explanation, ...]] = []
+        """Effects added one at a time: levels of explanations, the first look, and what may be chance at the end.
+
+        They are added to `standard` where the standard model explains nearly all, else to the base model.
+        """
+        levels: list[tuple[Explanation, ...]] = [(standard,)] if standard else []
         scores: tuple[Score, ...] = ()
-        beam: tuple[Explanation, ...] = (base,)
+        beam: tuple[Explanation, ...] = (standard or base,)
         while len(levels) < DEEPEST and not any(e.largest_error <= self.criteria.floor for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
             scores = scores or tuple(self.last_scores)

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.band import Band, simulate_band
-from tactile_cube.measurement.comparing.error import ErrorSummary, residuals, summarise
+from tactile_cube.measurement.comparing.error import (
+    ErrorSummary,
+    normalised_fit,
+    raw_residuals,
+    residuals,
+    summarise,
+)
 from tactile_cube.measurement.comparing.failing_intervals import FailingInterval, failing_intervals
 from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.joint_offsets import with_fitted_offsets
@@ -40,6 +46,8 @@ class Comparison:
         residuals: (n, joints) of each trial, nan where a dropped sample was bridged.
         errors: overall and by joint.
         trials: the same for each trial.
+        raw: RMS of the free run from the first state, nothing removed: overall and by joint, then for each trial.
+        fit: joint -> normalised fit of the free run [%], nothing removed.
         floor: what a perfect model would leave.
         regimes: the error by joint and regime.
         sentences: the same in words.
@@ -56,6 +64,8 @@ class Comparison:
     residuals: list[Array]
     errors: ErrorSummary
     trials: list[ErrorSummary]
+    raw: list[ErrorSummary]
+    fit: dict[str, float]
     floor: NoiseFloor
     regimes: list[Regime]
     sentences: list[str]
@@ -139,6 +149,7 @@ def describe(
     """What simulations of the trials, one each, leave of the measurement, and where."""
     trials, joints = recording.trials, recording.joints
     errors = residuals(trials, [one.position for one in simulated])
+    raw = raw_residuals(trials, [one.position for one in simulated])
     summary = summarise(errors, joints)
     table = regimes(trials, errors, joints)
     return Comparison(
@@ -148,6 +159,8 @@ def describe(
         residuals=errors,
         errors=summary,
         trials=[summarise([error], joints) for error in errors],
+        raw=[summarise(raw, joints), *(summarise([one], joints) for one in raw)],
+        fit=normalised_fit(trials, raw, joints),
         floor=floor,
         regimes=table,
         sentences=where_it_fails(table, summary.joints, floor, recording.units),
@@ -175,6 +188,8 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         "recording": str(recording.folder),
         "units": recording.units,
         "error": asdict(comparison.errors),
+        "raw_error": asdict(comparison.raw[0]),
+        "normalised_fit_percent": comparison.fit,
         "noise_floor": {
             "overall": floor.overall,
             "joints": floor.joints,
@@ -187,8 +202,8 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         "regimes": [asdict(one) for one in comparison.regimes],
         "trials": [
             {"name": trial.name, "file": trial.file, "kind": trial.kind, "initialisation": trial.initialisation}
-            | {"error": asdict(errors)}
-            for trial, errors in zip(recording.trials, comparison.trials, strict=True)
+            | {"error": asdict(errors), "raw_error": asdict(raw)}
+            for trial, errors, raw in zip(recording.trials, comparison.trials, comparison.raw[1:], strict=True)
         ],
         "where": comparison.sentences,
         "failing_intervals": [asdict(one) for one in comparison.failing_intervals],

@@ -57,6 +57,26 @@ def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array
     ]
 
 
+def raw_residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
+    """Measured - simulated (n, joints) [rad] of each trial with nothing removed; nan where a sample was bridged."""
+    return [
+        np.where(trial.valid[:, None], trial.position - positions, np.nan)
+        for trial, positions in zip(trials, simulated, strict=True)
+    ]
+
+
+def normalised_fit(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> dict[str, float]:
+    """How much of each joint's motion a simulation follows [%]: 100 (1 - |error| / |position - mean|), as NRMSE fit.
+
+    100 is a perfect model, 0 one that predicts the mean, negative a worse one. The mean is each trial's own.
+    Source: Ljung, System Identification, 1999; `compare` of MATLAB's System Identification Toolbox.
+    """
+    squares = np.nansum([np.nansum(error**2, axis=0) for error in errors], axis=0)
+    moved = [trial.position[trial.valid] - trial.position[trial.valid].mean(axis=0) for trial in trials]
+    motion = np.maximum(np.sum([np.sum(one**2, axis=0) for one in moved], axis=0), np.finfo(float).tiny)
+    return dict(zip(joints, map(float, 100.0 * (1.0 - np.sqrt(squares / motion))), strict=True))
+
+
 def free_run_error(recording: Recording, simulated: Sequence[Simulated]) -> ErrorSummary:
     """RMS error [rad] of a recording's trials simulated freely."""
     return summarise(residuals(recording.trials, [one.position for one in simulated]), recording.joints)

@@ -16,6 +16,7 @@ from tactile_cube.measurement.recordings.description import Controller, Descript
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
+from tactile_cube.untrusted_file import read_text
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,15 @@ def recording_from_arrays(
     joints: Sequence[str],
     urdf: str | Path,
     rate: float,
-    kp: PerJoint,
-    kd: PerJoint,
+    kp: PerJoint = 0.0,
+    kd: PerJoint = 0.0,
     torque_limit: PerJoint = float("inf"),
     nominal: Mapping[str, PerJoint] | None = None,
     gravity: Sequence[float] = (0.0, 0.0, -9.81),
     read: Literal["before", "after"] = "before",
     resolution: float = 0.0,
     folder: str | Path | None = None,
+    mode: Literal["position", "torque"] = "position",
 ) -> Recording:
     """A recording as `compare`, `diagnose` and `identify` take it, checked as if it had been read from disk.
 
@@ -58,7 +60,7 @@ def recording_from_arrays(
         joints: names in the URDF, in the order of the columns.
         urdf: path of the rig's URDF, or its text.
         rate: samples per second [Hz].
-        kp: stiffness of the impedance controller [N m/rad], one number or one for each joint.
+        kp: stiffness of the impedance controller [N m/rad], one number or one for each joint; not used in torque mode.
         kd: its damping [N m s/rad].
         torque_limit: its limit [N m].
         nominal: what you believe of the drive: stiffness [N m/rad], static_friction [N m], reflected_inertia [kg m^2].
@@ -66,6 +68,7 @@ def recording_from_arrays(
         read: whether a row's position was read before its command was sent, as most loops log, or after it acted.
         resolution: of the position [rad].
         folder: where to keep it; None: nowhere.
+        mode: whether commands are positions, or the torques [N m] (forces [N]) that moved the joints.
 
     Raises:
         InputError: naming trial, joint and value of what cannot be used.
@@ -80,7 +83,7 @@ def recording_from_arrays(
         gravity=list(gravity),
         rate_hz=rate,
         joints=list(joints),
-        controller=Controller(kp=kp, kd=kd, torque_limit=torque_limit),
+        controller=Controller(kp=kp, kd=kd, torque_limit=torque_limit, mode=mode),
         nominal=dict(nominal or {}),
         sensors=Sensors(read=read, position_resolution=resolution),
         trials=[table.entry for table in tables],
@@ -120,7 +123,4 @@ def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[n
 def _urdf_text(urdf: str | Path) -> str:
     if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
         return urdf
-    try:
-        return Path(urdf).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"urdf={urdf}: cannot be read: {error.strerror}") from None
+    return read_text(Path(urdf))

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.tables import Table
 
@@ -72,7 +73,7 @@ def _stack(table: Table, joints: tuple[str, ...], signal: str, path: Path) -> Ar
 
 
 def _finite(table: Table, name: str, path: Path) -> Array:
-    wrong = np.flatnonzero(~np.isfinite(table[name]))
+    wrong = np.flatnonzero(~(np.abs(table[name]) <= (np.finfo(float).max if name == "time" else limits.NUMBER)))
     if len(wrong):
         row = int(wrong[0])
         raise InputError(

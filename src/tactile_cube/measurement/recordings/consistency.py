@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.model_file import MAY_BE_INFINITE
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.rig import Rig
@@ -95,7 +96,7 @@ def _require_gains(gains: Gains, joints: tuple[str, ...], key: str) -> None:
 def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
     """Refuse nominal values that are no physical constants."""
     for key, values in nominal.items():
-        if np.isnan(values).any() or (values < 0).any():
+        if (values < 0).any() or (np.isinf(values).any() and key not in MAY_BE_INFINITE):
             raise ValueError(
                 f"key 'nominal.{key}': received {values.tolist()}; expected numbers >= 0 for {list(joints)}"
             )

@@ -6,9 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0)]
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+from tactile_cube import limits
+
+Number = Annotated[float, Field(ge=-limits.NUMBER, le=limits.NUMBER, allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Mass = Annotated[Positive, Field(le=limits.MASS)]
+Rate = Annotated[Positive, Field(le=limits.RATE)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 PerJoint = float | list[float] | dict[str, float]
 
 
@@ -20,8 +25,8 @@ class Coupling(_Strict):
     """A joint that follows another one: q = ratio * q_joint + offset."""
 
     joint: str
-    ratio: float = 1.0
-    offset: float = 0.0
+    ratio: Number = 1.0
+    offset: Number = 0.0
 
 
 class Controller(_Strict):
@@ -39,7 +44,7 @@ class Controller(_Strict):
     kd: PerJoint = 0.0
     torque_limit: PerJoint = float("inf")
     mode: Literal["position", "torque"] = "position"
-    rate_hz: Positive | None = None
+    rate_hz: Rate | None = None
 
 
 class ControllerChange(_Strict):
@@ -75,8 +80,8 @@ class KnownForce(_Strict):
     """
 
     joint: str
-    point: Annotated[list[float], Field(min_length=3, max_length=3)]
-    vector: Annotated[list[float], Field(min_length=3, max_length=3)]
+    point: Vector
+    vector: Vector
 
 
 class Touch(_Strict):
@@ -88,7 +93,7 @@ class Touch(_Strict):
     """
 
     joint: str
-    angle: float
+    angle: Number
 
 
 class HeldObject(_Strict):
@@ -101,7 +106,7 @@ class HeldObject(_Strict):
     """
 
     size: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
-    mass: Positive
+    mass: Mass
     com: Vector = Field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     @model_validator(mode="before")
@@ -126,13 +131,19 @@ class Grasp(_Strict):
     """
 
     position: Vector
-    quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
+    quaternion: Annotated[list[Number], Field(min_length=4, max_length=4)] = Field(
         default_factory=lambda: [0.0, 0.0, 0.0, 1.0]
     )
     released: NotNegative = 0.0
     size: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
-    mass: Positive | None = None
+    mass: Mass | None = None
     com: Vector | None = None
+
+    @model_validator(mode="after")
+    def _turned(self) -> "Grasp":
+        if not any(self.quaternion):
+            raise ValueError("quaternion is zero, which is no orientation; [0, 0, 0, 1] is the base frame's")
+        return self
 
 
 class TrialEntry(_Strict):
@@ -180,8 +191,8 @@ class Description(_Strict):
 
     format: Literal[1]
     rig: str = "rig.urdf"
-    gravity: Annotated[list[float], Field(min_length=3, max_length=3)]
-    rate_hz: Positive
+    gravity: Vector
+    rate_hz: Rate
     joints: Annotated[list[str], Field(min_length=1)]
     coupled: dict[str, Coupling] = Field(default_factory=dict)
     controller: Controller
@@ -213,7 +224,7 @@ def per_joint(value: PerJoint, joints: tuple[str, ...], key: str) -> NDArray[np.
     """One number per joint, shape (joints,), from a number, a list in joint order or a mapping.
 
     Raises:
-        ValueError: a list of another length, or a mapping that lacks a joint or names another one.
+        ValueError: a list of another length, a mapping that lacks a joint or names another one, a number that is none.
     """
     if isinstance(value, dict):
         if set(value) != set(joints):
@@ -221,4 +232,11 @@ def per_joint(value: PerJoint, joints: tuple[str, ...], key: str) -> NDArray[np.
         value = [value[joint] for joint in joints]
     if isinstance(value, list) and len(value) != len(joints):
         raise ValueError(f"key '{key}': expected one number for all joints or {len(joints)}, received {value}")
-    return np.broadcast_to(np.asarray(value, dtype=np.float64), (len(joints),)).copy()
+    numbers = np.broadcast_to(np.asarray(value, dtype=np.float64), (len(joints),)).copy()
+    wrong = ~(np.isinf(numbers) | (np.abs(numbers) <= limits.NUMBER))
+    if wrong.any():
+        raise ValueError(
+            f"key '{key}': received {numbers[wrong][0]:g} for {joints[int(np.argmax(wrong))]}; expected numbers up to "
+            f"{limits.NUMBER:g}, or .inf"
+        )
+    return numbers

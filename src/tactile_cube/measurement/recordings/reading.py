@@ -3,8 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
+from tactile_cube.hand.urdf_files import with_own_files
 from tactile_cube.measurement.recordings.columns import pick_columns
 from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
@@ -16,6 +20,7 @@ from tactile_cube.measurement.recordings.consistency import (
 )
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.excluded import without_excluded
+from tactile_cube.measurement.recordings.outliers import without_outliers
 from tactile_cube.measurement.recordings.plausibility import check_assignment, check_units
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
@@ -23,6 +28,7 @@ from tactile_cube.measurement.recordings.statics import swap_warning
 from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.timing import check_time, on_grid
 from tactile_cube.measurement.recordings.trial import Trial, load_of
+from tactile_cube.untrusted_file import below
 
 DESCRIPTION = "recording.yaml"
 
@@ -36,9 +42,11 @@ def read_recording(folder: str | Path) -> Recording:
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"recording={folder}: no such folder; a recording is a folder with {DESCRIPTION} in it")
-    file = folder / DESCRIPTION
+    file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)
-    rig = read_rig(_inside(folder, description.rig, "rig"))
+    rig = read_rig(below(folder, description.rig, f"{file}: key 'rig'"))
+    urdf, not_drawn = with_own_files(rig.text, rig.path, folder)
+    rig = replace(rig, text=urdf)
     check_joints(description, rig, file)
     check_rate(description, file)
     try:
@@ -47,8 +55,11 @@ def read_recording(folder: str | Path) -> Recording:
         raise
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
-    swapped = swap_warning(recording)
-    return recording if swapped is None else replace(recording, warnings=(*recording.warnings, swapped))
+    recording.rigid_body()
+    more = [] if (swapped := swap_warning(recording)) is None else [swapped]
+    if not_drawn:
+        more.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
+    return replace(recording, warnings=(*recording.warnings, *more))
 
 
 def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
@@ -56,13 +67,15 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
     check_nominal(nominal, joints)
     warnings = [f"{folder / DESCRIPTION}: {line}" for line in check_coupling(description, rig)]
-    trials, gains = [], gains_of(description, None, "controller")
+    trials, gains, left = [], gains_of(description, None, "controller"), limits.NUMBERS
     if description.controller.mode != "torque" and (gains.kd == 0).any():
         warnings.append(
             f"{folder / DESCRIPTION}: key 'controller.kd': 0 for {joints_where(gains.kd == 0, joints)}: no damping"
         )
     for index, entry in enumerate(description.trials):
-        trial = read_trial(folder, entry, description, rig, f"trials.{index}.controller")
+        path = below(folder, entry.file, f"{folder / DESCRIPTION}: key 'trials.{index}.file'")
+        trial = _trial(path, left, entry, description, rig, f"trials.{index}.controller")
+        left -= trial.time.size + 3 * trial.position.size
         trials += without_excluded(trial, entry.exclude, f"{folder / DESCRIPTION}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
     if not trials:
@@ -70,18 +83,21 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
 
 
-def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
+def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
     """One trial, checked and on the uniform grid of the recording's rate."""
-    path = _inside(folder, entry.file, "trials.file")
     joints = tuple(description.joints)
     gains = gains_of(description, entry, key)
-    columns, warnings = pick_columns(read_table(path), joints, path)
+    columns, warnings = pick_columns(read_table(path, most), joints, path)
     columns, time_warnings = check_time(columns, description.rate_hz, path)
-    limits = [rig.joints[joint] for joint in joints]
+    ranges = [rig.joints[joint] for joint in joints]
     if description.controller.mode == "position":
-        warnings += check_units(columns, limits, gains, path)
-        warnings += check_assignment(columns, limits, path) if entry.object is None else []
+        warnings += check_units(columns, ranges, gains, path)
+        warnings += check_assignment(columns, ranges, path) if entry.object is None else []
+    columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, description.rate_hz)
+    stamps = (columns.time[outlying] - columns.time[0]) * description.rate_hz
+    beside = np.concatenate([np.floor(stamps), np.ceil(stamps)]).astype(np.int64)
+    valid[np.minimum(beside, len(valid) - 1)] = False
     return Trial(
         path.stem,
         entry.file,
@@ -96,13 +112,6 @@ def read_trial(folder: Path, entry: TrialEntry, description: Description, rig: R
         entry.force,
         entry.clamped,
         entry.touch,
-        tuple(warnings + time_warnings),
+        tuple(warnings + time_warnings + single),
         load_of(description.object, entry.object) if description.object and entry.object else None,
     )
-
-
-def _inside(folder: Path, name: str, key: str) -> Path:
-    path = folder / name
-    if not path.resolve().is_relative_to(folder.resolve()):
-        raise InputError(f"{folder / DESCRIPTION}: key '{key}': '{name}' lies outside the recording's folder")
-    return path

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body
 from tactile_cube.measurement.recordings.description import Coupling, Description
 from tactile_cube.measurement.recordings.rig import Rig
@@ -107,9 +108,16 @@ class Recording:
         return None if values is None else float(values[self.joints.index(joint)])
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
-        """The mechanism."""
+        """The mechanism.
+
+        Raises:
+            InputError: the URDF and the joints of recording.yaml make none.
+        """
         coupled = {name: rigid_body.Coupling(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
-        return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
+        try:
+            return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
+        except InputError as error:
+            raise InputError(f"{self.rig.path}: {error}") from None
 
     def with_trials(self, trials: list[Trial] | tuple[Trial, ...]) -> Recording:
         """The same rig with these trials alone."""

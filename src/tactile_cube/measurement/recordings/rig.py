@@ -1,7 +1,6 @@
 """What a recording's URDF says of its joints: names, limits, couplings."""
 
 import math
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.hand.urdf_elements import MOVABLE, Joint
+from tactile_cube.hand.urdf_tree import read_joints
+from tactile_cube.untrusted_file import read_text
 
-MOVABLE = ("revolute", "continuous", "prismatic")
 LONGEST_WAY = 10.0  # [m] of a sliding joint
 WRONG_ZERO = 0.35  # [rad] a servo that was mounted some teeth off
 
@@ -25,6 +26,8 @@ class RigJoint:
         upper: likewise.
         mimics: the joint that it follows.
         prismatic: it slides.
+        velocity: limit of its speed [rad/s] ([m/s]), inf where it has none.
+        effort: limit of its torque [N m] ([N]), likewise.
     """
 
     name: str
@@ -32,6 +35,8 @@ class RigJoint:
     upper: float
     mimics: str | None
     prismatic: bool = False
+    velocity: float = math.inf
+    effort: float = math.inf
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -70,49 +75,26 @@ def read_rig(path: Path) -> Rig:
     """The URDF at `path`.
 
     Raises:
-        InputError: the file is missing, no XML, or no robot with a movable joint.
+        InputError: the file is missing or too large, no URDF, or has no movable joint.
     """
-    try:
-        return parse_rig(path.read_text(encoding="utf-8"), path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; recording.yaml names it under 'rig'") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a URDF: {error}") from None
+    return parse_rig(read_text(path, "; recording.yaml names it under 'rig'"), path)
 
 
 def parse_rig(text: str, path: Path) -> Rig:
     """The rig in a URDF's text; `path` is what errors name.
 
     Raises:
-        InputError: no XML, or no robot with a movable joint.
+        InputError: no URDF, or no robot with a movable joint.
     """
     try:
-        root = ElementTree.fromstring(text)
-        joints = {joint.name: joint for joint in map(_joint, root.iter("joint")) if joint is not None}
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InputError(f"{path}: not a URDF: {error}") from None
-    if root.tag != "robot" or not joints:
-        raise InputError(f"{path}: not a URDF with movable joints (root element <{root.tag}>)")
-    return Rig(text, path, joints)
+        joints = [joint for joint in read_joints(text)[0] if joint.kind in MOVABLE]
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    if not joints:
+        raise InputError(f"{path}: not a URDF with movable joints")
+    return Rig(text, path, {joint.name: _rig_joint(joint) for joint in joints})
 
 
-def _joint(element: ElementTree.Element) -> RigJoint | None:
-    kind = element.get("type", "")
-    if kind not in MOVABLE:
-        return None
-    limit, mimic = element.find("limit"), element.find("mimic")
-    bounded = limit is not None and kind != "continuous"
-    name = element.get("name", "")
-    lower, upper = -math.inf, math.inf
-    if bounded and limit is not None:
-        lower, upper = _number(limit, "lower", name, lower), _number(limit, "upper", name, upper)
-    leader = mimic.get("joint") if mimic is not None else None
-    return RigJoint(name, lower, upper, leader, kind == "prismatic")
-
-
-def _number(limit: ElementTree.Element, key: str, joint: str, default: float) -> float:
-    text = limit.get(key)
-    try:
-        return default if text is None else float(text)
-    except ValueError:
-        raise ValueError(f"joint '{joint}': limit {key}='{text}' is no number") from None
+def _rig_joint(joint: Joint) -> RigJoint:
+    leader = None if joint.coupling is None else joint.coupling.joint
+    return RigJoint(joint.name, joint.lower, joint.upper, leader, joint.prismatic, joint.velocity, joint.effort)

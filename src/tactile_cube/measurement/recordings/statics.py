@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 
@@ -31,8 +31,7 @@ def swap_warning(recording: Recording) -> str | None:
         return None
     stride = max(1, len(position) // MOST_SAMPLES)
     position, torque = position[::stride], np.concatenate([one[1] for one in still])[::stride]
-    coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in recording.coupled.items()}
-    tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints, coupled)
+    tree = recording.rigid_body()
     as_named = _missing(tree, recording.gravity, position, torque)
     best, swap = as_named, None
     for pair in combinations(range(len(recording.joints)), 2):

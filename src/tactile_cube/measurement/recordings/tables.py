@@ -1,77 +1,115 @@
 """Columns of numbers from a trial's file: Parquet, CSV or NPZ."""
 
 import re
-import zipfile
 from collections.abc import Callable
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import polars
+import polars.selectors as selectors
 from numpy.typing import NDArray
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
+from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import regular
 
 Table = dict[str, NDArray[np.float64]]
+Reader = Callable[[Path, int, bool], Table]
+PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x01", b"\x78\x5e", b"\x78\x9c", b"\x78\xda")
+"""How gzip, zstd and zlib begin, which the reader of CSV would unpack whatever comes of it."""
 
 
-def read_table(path: Path, only_numbers: bool = True) -> Table:
+def read_table(path: Path, most: int = limits.NUMBERS, only_numbers: bool = True) -> Table:
     """Column name -> values, all of one length.
 
     Args:
         path: Parquet, CSV (separated by comma, semicolon or tab) or NPZ.
+        most: numbers that it may hold; what it says of its size is looked at before it is read.
         only_numbers: refuse columns that hold something else; otherwise they are left out, and dates become seconds.
 
     Raises:
-        InputError: a missing or truncated file, an unknown ending, or a column that holds no numbers.
+        InputError: a missing, truncated or too large file, an unknown ending, or a column that holds no numbers.
     """
-    frames: dict[str, Callable[[Path], polars.DataFrame]] = {".parquet": _parquet, ".csv": _csv, ".txt": _csv}
+    readers: dict[str, Reader] = {".parquet": _parquet, ".csv": _csv, ".txt": _csv, ".npz": _npz}
     suffix = path.suffix.lower()
-    if suffix not in {*frames, ".npz"}:
-        raise InputError(f"{path}: unknown ending '{path.suffix}'; trials are .parquet, .csv, .txt, .npz")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; recording.yaml names it under 'trials'")
-    if suffix == ".npz":
-        table = _npz(path)
-    else:
-        frame = frames[suffix](path)
-        table = _numbers(frame if only_numbers else _without_words(frame), path)
+    if suffix not in readers:
+        raise InputError(f"{path}: unknown ending '{path.suffix}'; trials are {', '.join(readers)}")
+    regular(path, lacking="; recording.yaml names it under 'trials'")
+    try:
+        table = readers[suffix](path, most, only_numbers)
+    except (polars.exceptions.PolarsError, polars.exceptions.PanicException, OSError) as error:
+        reason = str(error).strip().partition("\n")[0] or type(error).__name__
+        raise InputError(f"{path}: not a complete {suffix} file (truncated?): {reason}") from None
     if len({len(column) for column in table.values()}) > 1:
         lengths = {name: len(column) for name, column in table.items()}
         raise InputError(f"{path}: columns differ in length: {lengths}")
     return table
 
 
-def _parquet(path: Path) -> polars.DataFrame:
+def _parquet(path: Path, most: int, only_numbers: bool) -> Table:
+    from pyarrow import ArrowException, parquet  # imports slowly
+
     try:
-        return polars.read_parquet(path)
-    except (polars.exceptions.PolarsError, polars.exceptions.PanicException, OSError) as error:
-        raise InputError(f"{path}: not a complete Parquet file (truncated?): {_first_line(error)}") from None
+        about = parquet.read_metadata(path)
+        groups = [about.row_group(index) for index in range(about.num_row_groups)]
+    except ArrowException as error:
+        raise OSError(error) from None
+    frame = polars.scan_parquet(path, glob=False, hive_partitioning=False)
+    schema = frame.collect_schema()
+    numbers = sum(max(abs(group.num_rows) * len(schema), group.total_byte_size // 16) for group in groups)
+    _require_size(path, numbers, len(schema), most)
+    plain = [name for name, kind in schema.items() if kind.is_numeric() or kind == polars.Null]
+    dates = [] if only_numbers else [name for name, kind in schema.items() if kind.is_temporal()]
+    wrong = [name for name in schema if only_numbers and name not in plain]
+    if wrong:
+        raise InputError(f"{path}: column '{wrong[0]}' holds {schema[wrong[0]]}, expected numbers")
+    return _numbers(_in_seconds(frame.select(*plain, *dates).collect()), path)
 
 
-def _csv(path: Path) -> polars.DataFrame:
-    try:
-        separator, decimal_comma = _dialect(path)
-        frame = polars.read_csv(
-            path,
-            infer_schema_length=None,
-            comment_prefix="#",
-            separator=separator,
-            decimal_comma=decimal_comma,
-            encoding="utf8-lossy",
+def _csv(path: Path, most: int, only_numbers: bool) -> Table:
+    separator, decimal_comma, columns = _dialect(path)
+    with path.open("rb") as stream:
+        rows = sum(block.count(b"\n") for block in iter(lambda: stream.read(1 << 20), b""))
+    _require_size(path, rows * columns, columns, most)
+    frame = polars.read_csv(
+        path,
+        glob=False,
+        infer_schema_length=None,
+        comment_prefix="#",
+        separator=separator,
+        decimal_comma=decimal_comma,
+        encoding="utf8-lossy",
+    )
+    frame = frame.rename({name: name.strip().strip("\ufeff") for name in frame.columns})
+    return _numbers(frame if only_numbers else _without_words(frame), path)
+
+
+def _npz(path: Path, most: int, only_numbers: bool) -> Table:
+    return {name: _one_dimension(array, name, path) for name, array in read_npz(path, most).items()}
+
+
+def _require_size(path: Path, numbers: int, columns: int, most: int) -> None:
+    if numbers > most or columns > limits.COLUMNS:
+        raise InputError(
+            f"{path}: holds {columns} columns, {numbers:.4g} numbers; {limits.COLUMNS} columns and {most:.4g} numbers "
+            "are read here: leave columns out, or split the trial"
         )
-    except (polars.exceptions.PolarsError, polars.exceptions.PanicException, OSError) as error:
-        raise InputError(f"{path}: not a CSV table: {_first_line(error)}") from None
-    return frame.rename({name: name.strip().strip("\ufeff") for name in frame.columns})
 
 
-def _dialect(path: Path) -> tuple[str, bool]:
-    """Separator, and whether numbers have a decimal comma, from the header and the row below it."""
-    with path.open(encoding="utf-8", errors="replace") as stream:
-        lines = [line for line in islice(stream, 50) if line.strip() and not line.startswith("#")]
-    header, row = [*lines, "", ""][:2]
+def _dialect(path: Path) -> tuple[str, bool, int]:
+    """Separator, whether numbers have a decimal comma, and the columns, from the header and the row below it."""
+    with path.open("rb") as stream:
+        start = [stream.readline(limits.LINE) for _ in range(50)]
+    if start[0].startswith(PACKED):
+        raise InputError(f"{path}: is compressed; unpack it")
+    if any(len(line) == limits.LINE for line in start):
+        raise InputError(f"{path}: not a CSV table: a line is longer than {limits.LINE / 1e6:g} MB")
+    text = (line.decode(errors="replace") for line in start)
+    header, row = [*(line for line in text if line.strip() and not line.startswith("#")), "", ""][:2]
     separator = max(",;\t", key=header.count)
-    return separator, separator != "," and re.search(r"\d,\d", row) is not None
+    decimal_comma = separator != "," and re.search(r"\d,\d", row) is not None
+    return separator, decimal_comma, header.count(separator) + 1
 
 
 def _without_words(frame: polars.DataFrame) -> polars.DataFrame:
@@ -81,11 +119,13 @@ def _without_words(frame: polars.DataFrame) -> polars.DataFrame:
         if column.dtype == polars.String:
             numbers = column.str.strip_chars().cast(polars.Float64, strict=False)
             column = numbers if numbers.is_not_null().any() else _date(column)
-        if column.dtype.is_temporal():
-            column = column.cast(polars.Datetime("us")).cast(polars.Int64) * 1e-6
-        if column.dtype.is_numeric():
-            kept.append(column)
-    return polars.DataFrame(kept)
+        kept.append(column)
+    return _in_seconds(polars.DataFrame(kept).select(selectors.numeric() | selectors.temporal()))
+
+
+def _in_seconds(frame: polars.DataFrame) -> polars.DataFrame:
+    """Dates as seconds."""
+    return frame.with_columns(selectors.temporal().cast(polars.Datetime("us")).cast(polars.Int64) * 1e-6)
 
 
 def _date(column: polars.Series) -> polars.Series:
@@ -95,22 +135,12 @@ def _date(column: polars.Series) -> polars.Series:
         return column
 
 
-def _npz(path: Path) -> Table:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: _one_dimension(archive[name], name, path) for name in archive.files}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not a complete NPZ file of plain arrays: {_first_line(error)}") from None
-
-
 def _one_dimension(array: NDArray[np.generic], name: str, path: Path) -> NDArray[np.float64]:
     if array.ndim != 1 or array.dtype.kind not in "fiu":
         raise InputError(
             f"{path}: column '{name}' is {array.ndim}-dimensional {array.dtype}, expected (samples,) numbers"
         )
-    return array.astype(np.float64)
+    return np.asarray(array, dtype=np.float64)
 
 
 def _numbers(frame: polars.DataFrame, path: Path) -> Table:
@@ -126,9 +156,5 @@ def _numbers(frame: polars.DataFrame, path: Path) -> Table:
             column = parsed
         if not (column.dtype.is_numeric() or column.dtype == polars.Null):
             raise InputError(f"{path}: column '{name}' holds {column.dtype}, expected numbers")
-        table[name] = column.cast(polars.Float64).fill_null(float("nan")).to_numpy().astype(np.float64)
+        table[name] = column.cast(polars.Float64).fill_null(float("nan")).to_numpy()
     return table
-
-
-def _first_line(error: BaseException) -> str:
-    return str(error).strip().partition("\n")[0] or type(error).__name__

@@ -39,6 +39,11 @@ def check_time(columns: Columns, rate: float, path: Path) -> tuple[Columns, list
             f"({columns.time[worst]:.4f} s); split the trial there"
         )
     dropped = int(np.sum(np.round(gaps[gaps > DROPPED]) - 1))
+    if dropped > len(columns.time):
+        raise InputError(
+            f"{path}: column 'time': of {dropped + len(columns.time)} samples at rate_hz {rate:g} it has "
+            f"{len(columns.time)}; set rate_hz to what the log has, or split the trial"
+        )
     if dropped:
         warnings.append(
             f"{path}: column 'time': {dropped} samples dropped (longest gap {gaps[worst] / rate * 1e3:.1f} ms "

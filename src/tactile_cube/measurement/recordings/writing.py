@@ -10,6 +10,7 @@ import yaml
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
+from tactile_cube.untrusted_file import below
 
 Array = NDArray[np.float64]
 
@@ -43,8 +44,13 @@ class RecordingTables:
 
 
 def write_recording(folder: Path, recording: RecordingTables) -> None:
-    """Write a recording into a folder."""
+    """Write a recording into a folder.
+
+    Raises:
+        InputError: a trial's file, which a log may have named, lies outside of it.
+    """
     description, tables = recording.description, recording.tables
+    files = [below(folder, table.entry.file, "trials.file") for table in tables]
     folder.mkdir(parents=True, exist_ok=True)
     (folder / description.rig).write_text(recording.urdf, encoding="utf-8")
     entries = [table.entry for table in tables]
@@ -52,8 +58,8 @@ def write_recording(folder: Path, recording: RecordingTables) -> None:
     ordered = {"format": 1, "rig": description.rig} | data | {"trials": [_entry(entry) for entry in entries]}
     text = yaml.safe_dump(ordered, sort_keys=False, allow_unicode=True)
     (folder / "recording.yaml").write_text(text, encoding="utf-8")
-    for table in tables:
-        write_table(folder / table.entry.file, table, description.joints)
+    for file, table in zip(files, tables, strict=True):
+        write_table(file, table, description.joints)
 
 
 def _entry(entry: TrialEntry) -> dict[str, object]:

@@ -64,8 +64,9 @@ class Model:
     """What a simulation of a rig needs beside its URDF.
 
     Attributes:
-        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia and friction_creep (how fast a
-            sticking joint gives way, rad/s per N m), each (n,).
+        constants: kp, kd, torque_limit, stiffness, static_friction, reflected_inertia, friction_creep (how fast a
+            sticking joint gives way, rad/s per N m) and reading_delay (how old a position is when its row is logged, s;
+            negative: younger), each (n,).
         terms: effects in force.
         offsets: initialisation -> (n,) true minus measured angle [rad].
     """

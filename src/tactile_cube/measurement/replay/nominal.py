@@ -12,7 +12,13 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, terms_of
 
 Array = NDArray[np.float64]
-DEFAULTS = {"stiffness": np.inf, "static_friction": 0.0, "reflected_inertia": 0.0, "friction_creep": 0.0}
+DEFAULTS = {
+    "stiffness": np.inf,
+    "static_friction": 0.0,
+    "reflected_inertia": 0.0,
+    "friction_creep": 0.0,
+    "reading_delay": 0.0,
+}
 CONTROLLER = ("kp", "kd", "torque_limit")
 TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
 

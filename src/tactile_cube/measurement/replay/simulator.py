@@ -186,8 +186,17 @@ class Simulator:
             before, known = before_steps(signals[:, :, :2], windows.segment, windows.substeps)
             far &= known[:, None]
             position, torque = np.where(far, before[:, :, 0], position), np.where(far, before[:, :, 1], torque)
-        out[0] = position
+        out[0] = self._as_read(position, model, windows)
         out[1:] = torque
+
+    def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
+        """Positions (S, K segment, n) as old as the log reads them, within each segment."""
+        delay = model.constants.get("reading_delay", np.zeros(1))
+        if not delay.any():
+            return position
+        parts = position.reshape(len(windows), windows.segments, windows.segment, -1)
+        speed = np.gradient(parts, self.recording.step, axis=2).reshape(position.shape)
+        return np.asarray(position - delay * speed)
 
     def _in_closed_form(
         self,

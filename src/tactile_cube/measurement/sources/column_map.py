@@ -87,8 +87,8 @@ def _signals(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> 
         signals |= {name: "command" for name in names if may_be_desired(name)}
     if not torque_mode:
         return {name: signal for name, signal in signals.items() if signal != "torque_command"}
-    asked = "torque_command" if "torque_command" in signals.values() else "torque"
-    kept = {name: signal for name, signal in signals.items() if signal in ("position", asked)}
+    asked = next((one for one in ("torque_command", "torque") if one in signals.values()), "command")
+    kept: dict[str, Signal] = {name: signal for name, signal in signals.items() if signal in ("position", asked)}
     return {name: "command" if signal == asked else signal for name, signal in kept.items()}
 
 

@@ -30,7 +30,7 @@ UNITS: dict[str, tuple[str, ...]] = {
     "us": ("us", "usec", "micros", "microseconds"), "ns": ("ns", "nsec", "nanos", "nanoseconds"),
     "mm": ("mm", "millimetres", "millimeters"), "um": ("um",),
 }  # fmt: skip
-TORQUE_UNIT = re.compile(r"(?<![a-z])([mc]?)n[ .*·_]?m(?![a-z])", re.IGNORECASE)
+TORQUE_UNIT = re.compile(r"(?<![a-z])(?:([mc]?)n[ .*·_]?m|n[ .*·_]?([mc])m)(?![a-z])", re.IGNORECASE)
 TORQUE_PREFIX = {"": "Nm", "m": "mNm", "c": "Ncm"}
 
 
@@ -89,7 +89,7 @@ def unit_of(name: str, units: Iterable[str]) -> str | None:
     allowed = set(units)
     torque = TORQUE_UNIT.search(name)
     if torque is not None and allowed & set(TORQUE_PREFIX.values()):
-        return TORQUE_PREFIX[torque.group(1).lower()]
+        return TORQUE_PREFIX[(torque.group(1) or torque.group(2) or "").lower()]
     if "°" in name and "deg" in allowed:
         return "deg"
     for word in reversed(words(name)[1:] or words(name)):

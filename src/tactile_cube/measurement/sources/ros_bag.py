@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described, known, median_rate
+from tactile_cube.untrusted_file import regular
 
 Array = NDArray[np.float64]
 SAME_STAMP = 1e-6  # [s]
@@ -80,16 +82,18 @@ class RosBag:
 def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float, Any]]]:
     """Topic -> (time [s], message); the header's stamp where a message has one, else when it was logged."""
     try:
-        from mcap.reader import make_reader
-        from mcap_ros2.decoder import DecoderFactory
+        from tactile_cube.measurement.sources.mcap_file import decoded_messages
     except ImportError:
         raise InputError("source=mcap needs the optional extra: pip install 'tactile-cube[ros]'") from None
     found: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
     try:
-        with path.open("rb") as stream:
-            reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-            for _, channel, logged, message in reader.iter_decoded_messages(topics=list(topics)):
-                found[channel.topic].append((_stamp(message, logged.log_time), message))
+        with regular(path).open("rb") as stream:
+            for number, (topic, log_time, message) in enumerate(decoded_messages(stream, topics)):
+                if number == limits.MESSAGES:
+                    raise InputError(f"{path}: more than {number} messages on {' and '.join(topics)}; split the bag")
+                found[topic].append((_stamp(message, log_time), message))
+    except InputError:
+        raise
     except Exception as error:  # decoder and decompressors raise a dozen kinds for damaged files
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a complete MCAP file: {reason}") from None

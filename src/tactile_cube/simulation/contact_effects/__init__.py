@@ -1,4 +1,4 @@
-"""The catalogue of contact effects: what fingertips and object can be like, one small class each."""
+"""The catalogue of contact effects: properties of fingertips and object, one class each."""
 
 from tactile_cube.simulation.contact_effects.catalogue import contact_catalogue, find_any_effect, is_contact_effect
 from tactile_cube.simulation.contact_effects.contact_effect import ContactEffect

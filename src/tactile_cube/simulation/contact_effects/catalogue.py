@@ -22,12 +22,12 @@ _EFFECTS: tuple[type[ContactEffect], ...] = (
 
 
 def contact_catalogue() -> dict[str, type[ContactEffect]]:
-    """All contact effects by name; they need a recording with an object."""
+    """Return all contact effects by name; they need a recording with an object."""
     return {effect.name: effect for effect in _EFFECTS}
 
 
 def find_any_effect(name: str) -> type[ContactEffect] | type[Effect]:
-    """An effect of the contact or of the drivetrain.
+    """Return an effect of the contact or of the drivetrain.
 
     Raises:
         InputError: there is no such effect.
@@ -36,5 +36,5 @@ def find_any_effect(name: str) -> type[ContactEffect] | type[Effect]:
 
 
 def is_contact_effect(name: str) -> bool:
-    """Whether `NAME` or `NAME@...` names a contact effect."""
+    """Return whether `NAME` or `NAME@...` names a contact effect."""
     return name.partition("@")[0] in contact_catalogue()

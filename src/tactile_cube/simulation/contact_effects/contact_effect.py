@@ -1,4 +1,4 @@
-"""One property of fingertips or object that the PyBullet world knows as a constant of the episode."""
+"""A property of fingertips or object that is a constant of the episode."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from tactile_cube.simulation.constants import EpisodeConstants
 
 
 class ContactEffect:
-    """A contact effect; a subclass is data alone.
+    """A contact effect; a subclass states data only.
 
     Attributes:
         name: its key in configurations and model files.
-        parameters: its numbers; at their neutral values it changes nothing in the world of the paper, bit for bit.
+        parameters: its numbers; their neutral values are the constants of the paper, bit for bit.
         constant: the field of EpisodeConstants that it changes.
-        added: its values are added to what is stated of the object; otherwise they replace the constant.
-        shown_by: the kinds of trial that show it best; others are used where a recording has none of these.
-        shows_in: how: "slips" (when something slips, each number by itself), "load" (how far the fingers give way, all
-            its numbers together), "offsets" (the joint offsets that a grip would need, alike in all initialisations).
+        added: whether its values are added to the constant; otherwise they replace it.
+        shown_by: kinds of trial that are used to identify it; other kinds where a recording has none of these.
+        shows_in: how it is identified: "slips" (when something slips, each number alone), "load" (how far the fingers
+            give way, all numbers together), "offsets" (joint offsets that a grip would need, the same in all
+            initialisations).
     """
 
     name: ClassVar[str]
@@ -35,7 +36,7 @@ class ContactEffect:
 
     @classmethod
     def apply(cls, constants: EpisodeConstants, values: Mapping[str, float]) -> EpisodeConstants:
-        """The constants with this effect at some values, parameter -> number; what is left out is neutral.
+        """Return the constants with this effect; parameters that `values` leaves out are neutral.
 
         Raises:
             InputError: an unknown parameter.

@@ -7,7 +7,13 @@ _SOURCE = "a guess: a cube of 8 cm that is filled unevenly"
 
 
 class ObjectCom(ContactEffect):
-    """Displacement of the centre of mass in the object's frame."""
+    """Displacement of the object's centre of mass, in the object's frame.
+
+    c = stated centre + (x, y, z).
+
+    In data: the fingers on one side carry more than those on the other.
+    Confused with: joint offsets of a single initialisation.
+    """
 
     name = "object_com"
     constant = "cube_com"

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from tactile_cube.drivetrain.effects import Parameter
 from tactile_cube.simulation.constants import EpisodeConstants
 from tactile_cube.simulation.contact_effects.contact_effect import ContactEffect
 
 LEAST = 0.1
-"""Share of the stated mass that always remains: a search must not try a weight below nothing."""
+"""Smallest share of the stated mass: a search may try values that would leave less than nothing."""
 
 
 class ObjectMass(ContactEffect):
-    """Mass beyond the stated one."""
+    """Mass of the object beyond the stated one.
+
+    m = stated mass + excess; at least a tenth of the stated mass remains.
+
+    In data: joints give way with the weight; the object slips earlier.
+    Confused with: `lateral_friction` where the object slips; `torque_gain` of the joints.
+    """
 
     name = "object_mass"
     constant = "cube_mass"
@@ -25,6 +30,6 @@ class ObjectMass(ContactEffect):
 
     @classmethod
     def apply(cls, constants: EpisodeConstants, values: Mapping[str, float]) -> EpisodeConstants:
-        """As of every effect; a tenth of the stated mass always remains."""
-        changed = super().apply(constants, values)
-        return replace(changed, cube_mass=max(changed.cube_mass, LEAST * constants.cube_mass))
+        """Return the constants with this effect; at least a tenth of the stated mass remains."""
+        least = (LEAST - 1.0) * constants.cube_mass
+        return super().apply(constants, {key: max(value, least) for key, value in values.items()})

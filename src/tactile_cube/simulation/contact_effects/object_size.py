@@ -5,7 +5,13 @@ from tactile_cube.simulation.contact_effects.contact_effect import ContactEffect
 
 
 class ObjectSize(ContactEffect):
-    """Length added to each edge. In one initialisation joint offsets look the same; in all of them they would not."""
+    """Length added to each edge of the object.
+
+    size = stated size + excess.
+
+    In data: the fingers close earlier or later, alike in all initialisations.
+    Confused with: joint offsets, in a single initialisation.
+    """
 
     name = "object_size"
     constant = "cube_size"

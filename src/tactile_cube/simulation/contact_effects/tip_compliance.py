@@ -1,11 +1,17 @@
-"""How soft the skin of the fingertips is."""
+"""Softness of the fingertips' skin."""
 
 from tactile_cube.drivetrain.effects import Parameter
 from tactile_cube.simulation.contact_effects.contact_effect import ContactEffect
 
 
 class TipCompliance(ContactEffect):
-    """A fingertip gives way in proportion to the normal force."""
+    """Fingertip skin that gives way in proportion to the normal force.
+
+    depth = compliance * normal force.
+
+    In data: closing fingers go further with the force.
+    Confused with: `elasticity` of the joints, without a contact sensor.
+    """
 
     name = "tip_compliance"
     constant = "tip_compliance"

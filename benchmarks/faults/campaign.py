@@ -1,0 +1,197 @@
+"""Faults of all kinds at random moments of `+experiment=smoke`: is anything lost, does anything hang or stay behind?
+
+    python -m benchmarks.faults.campaign --faults 100 --seed 0 --out docs/results/reliability
+
+The run is as short as it can be with three barriers, two workers and learning from a replay; words at the end
+change it.
+After each fault the same command is given until it ends by itself; policy, checkpoint and metrics must then be those of
+the undisturbed run, bit for bit.
+"""
+
+import argparse
+import csv
+import json
+import random
+import shutil
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from benchmarks.faults.command import Command, be_ready
+from benchmarks.faults.kinds import KINDS, Kind
+from tactile_cube.agent.policy_file import current_commit, load_policy
+from tactile_cube.errors import InputError
+from tactile_cube.training.checkpoint import BEFORE, FILE, Checkpoints, load_checkpoint
+
+SHORT = (
+    "collector.worlds=4",
+    "training.steps=240",
+    "training.barrier_iterations=2",
+    "training.learning_starts=80",
+    "training.random_steps=80",
+)
+TIMES = ("simulating_hours", "learning_hours", "wall_hours")
+"""Columns of metrics.csv that no two runs share."""
+
+
+@dataclass
+class Outcome:
+    """What a fault did.
+
+    Attributes:
+        kind: of fault.
+        moment: when it struck, from the start [s].
+        struck: False when the run had ended before.
+        seconds: from the fault to the end of the command.
+        status: its exit status; None: it hung.
+        orphans: processes left behind.
+        damaged: checkpoints that were not whole.
+        again: times the command was given again.
+        equal: whether it ended with the bits of the undisturbed run.
+    """
+
+    kind: str
+    moment: float
+    struck: bool
+    seconds: float
+    status: int | None
+    orphans: int
+    damaged: int
+    again: int
+    equal: bool
+
+
+def undisturbed(folder: Path, settings: Sequence[str]) -> tuple[dict[str, Any], float]:
+    """What the command gives without a fault, and how long it takes [s]."""
+    be_ready()
+    command = Command(folder, tuple(settings))
+    began = time.monotonic()
+    command.start()
+    if command.wait() != 0:
+        raise RuntimeError(f"the undisturbed run failed: {folder.with_suffix('.txt').read_text()[-500:]}")
+    return results(folder), time.monotonic() - began
+
+
+def strike(kind: Kind, folder: Path, moment: float, settings: Sequence[str], reference: dict[str, Any]) -> Outcome:
+    """One fault and what comes of it."""
+    command = Command(folder, tuple(settings))
+    command.start()
+    began = time.monotonic()
+    while time.monotonic() - began < moment and not command.ended:
+        time.sleep(0.02)
+    struck = kind.strike(command)
+    at = time.monotonic()
+    status = command.wait()
+    seconds, orphans = time.monotonic() - at, command.orphans()
+    kind.undo(command)
+    damaged, again = damaged_checkpoints(folder), 0
+    while again == 0 or (status != 0 and again < 3):
+        command.start()
+        status_again, again = command.wait(), again + 1
+        if status_again == 0:
+            break
+    equal = same(results(folder), reference)
+    return Outcome(kind.name, round(moment, 1), struck, round(seconds, 1), status, orphans, damaged, again, equal)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """All numbers that a run leaves, but for its times."""
+    state = Checkpoints(folder).load() or {}
+    with (folder / "metrics.csv").open(newline="") as file:
+        rows = [{key: value for key, value in row.items() if key not in TIMES} for row in csv.DictReader(file)]
+    policy = load_policy(folder / "policy.safetensors")[0].state_dict()
+    replay = state["learner"]["replay"]["rows"]
+    return {"agent": state["learner"]["agent"], "replay": replay, "rows": rows, "policy": policy}
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two trees of tensors and plain values are equal bit for bit."""
+    if isinstance(a, torch.Tensor):
+        return torch.equal(a, b)
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
+    if isinstance(a, list | tuple):
+        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
+    return bool(a == b)
+
+
+def damaged_checkpoints(folder: Path) -> int:
+    """Checkpoints that cannot be read; the replay's files are read with the newest."""
+    damaged = 0
+    for path in (folder / FILE, folder / BEFORE):
+        try:
+            if path.is_file():
+                load_checkpoint(path)
+        except InputError:
+            damaged += 1
+    try:
+        Checkpoints(folder).load()
+    except InputError:
+        damaged += 1
+    return damaged
+
+
+def table(outcomes: Sequence[Outcome], seconds: float) -> str:
+    """One line a kind of fault."""
+    head = ["fault", "struck", "hung", "orphans", "damaged checkpoints", "other bits", "longest to the end [s]"]
+    lines = [head, ["---"] * len(head)]
+    for name in dict.fromkeys(outcome.kind for outcome in outcomes):
+        of_kind = [outcome for outcome in outcomes if outcome.kind == name]
+        lines.append(
+            [
+                name,
+                f"{sum(outcome.struck for outcome in of_kind)} of {len(of_kind)}",
+                str(sum(outcome.status is None for outcome in of_kind)),
+                str(sum(outcome.orphans for outcome in of_kind)),
+                str(sum(outcome.damaged for outcome in of_kind)),
+                str(sum(not outcome.equal for outcome in of_kind)),
+                f"{max(outcome.seconds for outcome in of_kind):.0f}",
+            ]
+        )
+    rows = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return f"{len(outcomes)} faults; the undisturbed run took {seconds:.0f} s; commit {current_commit()}\n\n{rows}\n"
+
+
+def campaign(faults: int, seed: int, out: Path | None, settings: Sequence[str] = SHORT) -> list[Outcome]:
+    """Strike with all kinds in turn, at moments spread over the run; write the table after each."""
+    moments = random.Random(seed)
+    outcomes: list[Outcome] = []
+    with tempfile.TemporaryDirectory() as place:
+        first, _ = undisturbed(Path(place) / "first", settings)
+        reference, seconds = undisturbed(Path(place) / "undisturbed", settings)
+        if not same(first, reference):
+            raise RuntimeError("two undisturbed runs differ")
+        for number in range(faults):
+            kind = KINDS[number % len(KINDS)]
+            folder = Path(place) / f"fault{number}"
+            outcomes.append(strike(kind, folder, moments.uniform(0.0, seconds), settings, reference))
+            print(outcomes[-1], flush=True)
+            shutil.rmtree(folder)
+            if out is not None:
+                out.mkdir(parents=True, exist_ok=True)
+                (out / "faults.json").write_text(json.dumps([asdict(one) for one in outcomes], indent=1) + "\n")
+                (out / "faults.md").write_text(table(outcomes, seconds))
+    return outcomes
+
+
+def main() -> None:
+    """The command."""
+    words = argparse.ArgumentParser(description=__doc__)
+    words.add_argument("--faults", type=int, default=100)
+    words.add_argument("--seed", type=int, default=0)
+    words.add_argument("--out", type=Path)
+    words.add_argument("settings", nargs="*", help="further settings of the run, e.g. training.steps=1800")
+    given = words.parse_args()
+    outcomes = campaign(given.faults, given.seed, given.out, [*SHORT, *given.settings])
+    lost = [one for one in outcomes if one.status is None or one.orphans or one.damaged or not one.equal]
+    print(f"{len(outcomes)} faults, {len(lost)} with a loss")
+    raise SystemExit(1 if lost else 0)
+
+
+if __name__ == "__main__":
+    main()

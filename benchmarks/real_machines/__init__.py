@@ -1,0 +1,1 @@
+"""Published recordings of real machines, and whether a diagnosis names what is documented of them."""

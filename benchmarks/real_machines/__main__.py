@@ -1,0 +1,141 @@
+"""Take recordings of real machines through the whole loop and write the table of what was found.
+
+    python -m benchmarks.real_machines DATA [--only emps tx40] [--out outputs/real_machines]
+
+DATA holds the folders of the data sets; README.md beside this file says where they come from and how to add one. A
+stage whose result exists is left out, so the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.real_machines.bam_xl330 import BamXl330
+from benchmarks.real_machines.dfki_double import DfkiDouble
+from benchmarks.real_machines.dfki_pendulum import DfkiPendulum
+from benchmarks.real_machines.emps import Emps
+from benchmarks.real_machines.shadow_lfj3 import ShadowLfj3
+from benchmarks.real_machines.so101_sage import So101Sage
+from benchmarks.real_machines.tx40 import Tx40
+from tactile_cube.measurement.recordings.writing import write_recording
+from tactile_cube.measurement.sources.source import Source
+
+KEY = Path(__file__).parent / "key.yaml"
+MACHINES: dict[str, Callable[[Path], Source]] = {
+    "emps": lambda data: Emps(str(data / "emps")),
+    "dfki_double": lambda data: DfkiDouble(str(data / "dfki_double")),
+    "dfki_pendulum": lambda data: DfkiPendulum(str(data / "dfki_pendulum" / "dfki_pendulum.npz")),
+    "bam_xl330": lambda data: BamXl330(str(data / "bam_xl330" / "xl330.npz")),
+    "shadow_lfj3": lambda data: ShadowLfj3(str(data / "shadow_lfj3" / "lfj3_openloop.npz")),
+    "so101_roll": lambda data: So101Sage(str(data / "so101_sage"), "Wrist_Roll"),
+    "so101_rotation": lambda data: So101Sage(str(data / "so101_sage"), "Rotation"),
+    "tx40": lambda data: Tx40(str(data / "tx40")),
+}
+
+
+def command(name: str, out: Path, *words: str) -> None:
+    """Run one of the public commands, as a user types it, unless its result is there."""
+    if out.is_dir() and any(out.glob("*.json")):
+        return
+    line = ["python", "-m", f"tactile_cube.{name}", *words, f"hydra.run.dir={out}"]
+    print(shlex.join(line), flush=True)
+    out.mkdir(parents=True, exist_ok=True)
+    with (out / "terminal.txt").open("w") as terminal:
+        subprocess.run([sys.executable, *line[1:]], check=True, stdout=terminal, stderr=subprocess.STDOUT)
+
+
+def loop(name: str, data: Path, out: Path) -> dict[str, Any]:
+    """Import, diagnose, and compare what was stated and what was found with trials never fitted."""
+    recording, diagnosed = out / name / "recording", out / name / "diagnose"
+    if not (recording / "recording.yaml").is_file():
+        for part, tables in MACHINES[name](data).recordings(0).items():
+            write_recording(recording / part, tables)
+    started = time.perf_counter()
+    fresh = not (diagnosed / "diagnosis.json").is_file()
+    command("diagnose", diagnosed, f"recording={recording}", "engine=fast", "rerun=false")
+    diagnosis = json.loads((diagnosed / "diagnosis.json").read_text())
+    errors = {}
+    for label, model in (("stated", "null"), ("found", str(diagnosed / "model.yaml"))):
+        place = out / name / f"validation_{label}"
+        words = (
+            f"recording={recording / 'validation'}",
+            f"model={model}",
+            "engine=fast",
+            "band.simulations=0",
+            "rerun=false",
+        )
+        command("compare", place, *words)
+        compared = json.loads((place / "comparison.json").read_text())
+        errors[label] = {"raw": compared["raw_error"]["overall"], "error": compared["error"]["overall"]}
+    named = [
+        f"{one['name']}@{joint}"
+        for one in diagnosis["effects"] + diagnosis.get("partial_effects", [])
+        for joint in one["joints"]
+    ]
+    answer = {"verdict": diagnosis["verdict"], "named": named, "sets": diagnosis.get("sets", []), "validation": errors}
+    kept = out / name / "seconds.json"
+    if fresh:
+        kept.write_text(json.dumps(round(time.perf_counter() - started, 1)))
+    return answer | {"seconds": json.loads(kept.read_text()) if kept.is_file() else None}
+
+
+def judged(answer: dict[str, Any], key: dict[str, Any]) -> str:
+    """How many lines of the key are answered, and what is named that the source says is absent."""
+    said = {*answer["named"], *(one for group in answer["sets"] for one in group)}
+    answered = sum(any(_matches(effect, said) for effect in line) for line in key["named"])
+    wrong = [effect for effect in key.get("not_named", []) if _matches(effect, said)]
+    return f"{answered} of {len(key['named'])}" + (f", wrongly {', '.join(wrong)}" if wrong else "")
+
+
+def _matches(effect: str, said: set[str]) -> bool:
+    return any(one == effect or one.partition("@")[0] == effect for one in said)
+
+
+def table(results: dict[str, dict[str, Any]], key: dict[str, Any]) -> str:
+    """The results as Markdown."""
+    digest = hashlib.sha256(KEY.read_bytes()).hexdigest()
+    lines = [
+        f"Answer key: `key.yaml`, SHA-256 `{digest}`. Errors are RMS of free runs from the first state on trials never "
+        "fitted, nothing removed, in mrad (mm for `emps`).",
+        "",
+        "| machine | verdict | named | documented effects named | as stated | found | reference | seconds |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, one in results.items():
+        stated, found = (f"{1e3 * one['validation'][label]['raw']:.3g}" for label in ("stated", "found"))
+        reference = key[name].get("reference")
+        beside = f"{reference['value']} {reference['unit']} ({reference['what']})" if reference else "-"
+        lines.append(
+            f"| {name} | `{one['verdict']}` | {', '.join(one['named']) or '-'} | {judged(one, key[name])} | {stated} | "
+            f"**{found}** | {beside} | {one['seconds']} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Every machine, then the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=Path, help="folder with the data sets")
+    parser.add_argument("--out", type=Path, default=Path("outputs/real_machines"))
+    parser.add_argument("--only", nargs="+", choices=list(MACHINES), default=list(MACHINES))
+    given = parser.parse_args()
+    key = yaml.safe_load(KEY.read_text())
+    results = {name: loop(name, given.data, given.out) for name in given.only}
+    (given.out / "real_machines.json").write_text(json.dumps(results, indent=1))
+    (given.out / "real_machines.md").write_text(table(results, key) + "\n")
+    print(table(results, key))
+
+
+if __name__ == "__main__":
+    main()

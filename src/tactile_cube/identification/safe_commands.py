@@ -1,0 +1,177 @@
+"""Commands that keep a machine within its limits in every model that may be true."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.identification.command_limits import Envelope, Limits, limits_of, share_used, within_limits
+from tactile_cube.identification.excitations import excitations, middle_command
+from tactile_cube.identification.fitting.gauss_newton import Fit, precision
+from tactile_cube.identification.fitting.intervals import NORMAL_95
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import no_offsets
+
+Array = NDArray[np.float64]
+SCALES = 0.8 ** np.arange(11)  # of a command about its middle, down to a tenth
+
+
+@dataclass(frozen=True)
+class Safety:
+    """What a command does in every model that may be true, beside what it may do.
+
+    Attributes:
+        limits: of the machine.
+        margin: part of each stated limit that is kept free.
+        reached: the furthest in any model.
+        scale: of the command, relative to the excitation as it was designed.
+        models: how many were simulated: each explanation, and with its numbers at either end of their intervals.
+        starts: (S, n) positions at which it began, under the joint offsets of each initialisation; the last one is
+            where the machine stands now [rad].
+        open_loop: the commands are torques, and nothing brings the joints back.
+    """
+
+    limits: Limits
+    margin: float
+    reached: Envelope
+    scale: float
+    models: int
+    starts: Array
+    open_loop: bool
+
+    @property
+    def allowed(self) -> Envelope:
+        """The limits less the margin."""
+        return self.limits.allowed(self.margin)
+
+    @property
+    def share_used(self) -> float:
+        """The largest part of what is allowed that is used, in any model."""
+        return share_used(self.reached, self.allowed)
+
+    @property
+    def safe(self) -> bool:
+        """Whether no model leaves the limits less the margin."""
+        return within_limits(self.reached, self.limits, self.margin)
+
+
+@dataclass(frozen=True)
+class PossibleMotions:
+    """What a command may make of a machine.
+
+    Attributes:
+        shooting: simulates the models.
+        recording: of the machine.
+        fits: models as fitted, simulated from every start.
+        ends: of each fit the models with numbers at either end of their intervals, simulated from the last start.
+        limits: of the machine.
+        margin: part of each stated limit that is kept free.
+    """
+
+    shooting: Shooting
+    recording: Recording
+    fits: list[Model]
+    ends: list[list[Model]]
+    limits: Limits
+    margin: float
+
+    @classmethod
+    def of_fits(cls, shooting: Shooting, recording: Recording, fits: Sequence[Fit], margin: float) -> PossibleMotions:
+        """The motions in models that may be true."""
+        zero = no_offsets(recording)
+        models = [_with_offsets(fit.model, zero) for fit in fits]
+        ends = [[_with_offsets(model, zero) for model in interval_ends(fit)] for fit in fits]
+        return cls(shooting, recording, models, ends, limits_of(recording), margin)
+
+    def safe_trials(self, seed: int) -> list[tuple[Trial, Safety]]:
+        """Each excitation, scaled down until it stays within the limits, or as far as that goes."""
+        designed = excitations(self.recording, seed, self.shooting.time)
+        return [self._scaled(kind, commands) for kind, commands in designed.items()]
+
+    def _scaled(self, kind: str, commands: Array) -> tuple[Trial, Safety]:
+        middle = middle_command(self.recording)
+        for scale in SCALES:
+            less = middle + scale * (commands - middle)
+            safety = self.safety(kind, less, float(scale))
+            if safety.safe:
+                break
+        return replace(trials_from_rest(self.recording, kind, less)[-1], initialisation=0), safety
+
+    def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
+        """What commands (T, n) do from rest, simulated freely for their whole duration."""
+        trials = trials_from_rest(self.recording, kind, commands)
+        reached = Envelope.around([*map(self._commanded, trials), *self._simulated(self.fits, trials)])
+        if within_limits(reached, self.limits, self.margin):
+            ends = (one for models in self.ends for one in self._simulated(models, trials[-1:]))
+            reached = Envelope.around([reached, *ends])
+        count = len(self.fits) + sum(map(len, self.ends))
+        open_loop = self.recording.torque_controlled
+        starts = np.array([trial.position[0] for trial in trials])
+        return Safety(self.limits, self.margin, reached, scale, count, starts, open_loop)
+
+    def _commanded(self, trial: Trial) -> Envelope:
+        if self.recording.torque_controlled:
+            return Envelope.of_motion(trial.position, trial.command, trial.step)
+        still = np.zeros(len(self.recording.joints))
+        return Envelope(trial.command.min(axis=0), trial.command.max(axis=0), still, still)
+
+    def _simulated(self, models: Sequence[Model], trials: Sequence[Trial]) -> Iterator[Envelope]:
+        """What each model does in each trial, positions both as the sensors read them and as they are."""
+        for model, runs in zip(models, self.shooting.free_runs(models, trials), strict=True):
+            for trial, run in zip(trials, runs, strict=True):
+                motion = Envelope.of_motion(run.position, run.torque, trial.step)
+                offset = model.offsets[trial.initialisation]
+                low, high = motion.low + np.minimum(offset, 0.0), motion.high + np.maximum(offset, 0.0)
+                yield replace(motion, low=low, high=high)
+
+
+def trials_from_rest(recording: Recording, kind: str, commands: Array) -> list[Trial]:
+    """Trials of these commands that begin at rest, one for each start that the recording has shown, the last one last.
+
+    A joint whose position is controlled begins where its first command puts it, under the joint offsets of each
+    initialisation; one that is driven by torque where any of the trials began.
+    """
+    time: Array = np.arange(len(commands), dtype=np.float64) * recording.step
+    valid = np.ones(len(time), dtype=bool)
+    starts = [
+        (trial.initialisation, tuple(trial.position[0] if recording.torque_controlled else commands[0]))
+        for trial in reversed(recording.trials)
+    ]
+    return [
+        Trial(kind, "", kind, number, time, commands, np.tile(start, (len(time), 1)), None, valid, recording.gains)
+        for number, start in reversed(dict.fromkeys(starts))
+    ]
+
+
+def interval_ends(fit: Fit) -> list[Model]:
+    """Models with each number at either end of its 95 % interval, the others refitted to that.
+
+    A number of one kind is at its end at all joints at once, so that a hand needs no more models than a joint.
+    """
+    covariance, unknowns = covariance_of_numbers(fit)
+    misfit = max(1.0, fit.cost / max(int(np.count_nonzero(fit.residual)), 1))
+    width = NORMAL_95 * np.sqrt(misfit) * np.array([unknown.scale for unknown in unknowns])
+    shifts = width[:, None] * covariance / np.sqrt(np.diag(covariance))
+    values = read_all(fit.model, unknowns)
+    names = [(unknown.kind, unknown.key) for unknown in unknowns]
+    together = [shifts[:, [one == name for one in names]].sum(axis=1) for name in dict.fromkeys(names)]
+    return [put_all(fit.model, unknowns, values + sign * shift) for shift in together for sign in (-1.0, 1.0)]
+
+
+def covariance_of_numbers(fit: Fit) -> tuple[Array, tuple[Unknown, ...]]:
+    """Covariance (P, P) in units of the scales of what was fitted beside joint offsets, and what that is."""
+    kept = [k for k, unknown in enumerate(fit.unknowns) if unknown.kind != "offset"]
+    covariance = np.linalg.pinv(fit.information + np.diag(precision(fit.unknowns)))[np.ix_(kept, kept)]
+    return np.asarray(covariance), tuple(fit.unknowns[k] for k in kept)
+
+
+def _with_offsets(model: Model, zero: Mapping[int, Array]) -> Model:
+    """The model with no joint offset in initialisations that it was not fitted to."""
+    return replace(model, offsets={**zero, **model.offsets})

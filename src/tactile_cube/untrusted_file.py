@@ -1,0 +1,70 @@
+"""Files from elsewhere: where they may lie, that they are regular files, and how large they may be."""
+
+import stat
+from pathlib import Path
+
+from tactile_cube import limits
+from tactile_cube.errors import InputError
+
+KINDS = (("a folder", stat.S_ISDIR), ("a pipe", stat.S_ISFIFO), ("a socket", stat.S_ISSOCK))
+
+
+def below(folder: Path, name: str, where: str, root: Path | None = None) -> Path:
+    """Return the place of a file that another file names; there may be nothing there.
+
+    Args:
+        folder: that the name is relative to.
+        name: as the other file has it; `file://` before it means nothing.
+        where: what an error begins with: the other file, and the key in it.
+        root: what it must lie below once all links are followed; None: `folder`.
+
+    Raises:
+        InputError: it lies elsewhere.
+    """
+    path, root = folder / name.removeprefix("file://"), root or folder
+    try:
+        inside = path.resolve().is_relative_to(root.resolve())
+    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, a NUL
+        raise InputError(f"{where}: '{name}' is no name of a file: {error}") from None
+    if not inside:
+        raise InputError(f"{where}: '{name}' lies outside of {root}; put the file into that folder")
+    return path
+
+
+def regular(path: Path, most: int = limits.TABLE, lacking: str = "") -> Path:
+    """Return `path` if it is a file that can be read to its end.
+
+    Args:
+        path: where it should be.
+        most: size that is read [bytes].
+        lacking: what an error adds where there is no such file.
+
+    Raises:
+        InputError: there is none, it is a folder, a pipe or a device, or too large.
+    """
+    try:
+        status = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{path}: no such file{lacking}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if not stat.S_ISREG(status.st_mode):
+        kind = next((name for name, holds in KINDS if holds(status.st_mode)), "a device")
+        raise InputError(f"{path}: is {kind}; a regular file is needed here")
+    if status.st_size > most:
+        raise InputError(f"{path}: has {status.st_size / 1e6:.4g} MB; up to {most / 1e6:g} MB are read here")
+    return path
+
+
+def read_text(path: Path, lacking: str = "") -> str:
+    """Return the text of a file.
+
+    Raises:
+        InputError: as `regular`, or it is no UTF-8.
+    """
+    try:
+        return regular(path, limits.TEXT, lacking).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is no text in UTF-8: {error.reason} at byte {error.start}") from None
