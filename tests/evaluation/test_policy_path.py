@@ -57,7 +57,7 @@ def test_a_gait_that_was_searched_acts(tmp_path: Path) -> None:
 )
 def test_a_file_without_a_gait_is_refused(content: str, tmp_path: Path) -> None:
     (tmp_path / "gait.yaml").write_text(content)
-    with pytest.raises(InputError, match=r"policy=scripted:.*gait\.yaml"):
+    with pytest.raises(InputError, match=r"gait\.yaml"):
         find_policy(f"scripted:{tmp_path / 'gait.yaml'}")
 
 
