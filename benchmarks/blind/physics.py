@@ -6,12 +6,13 @@ forces are taken at the middle of a step, which makes it second order where noth
 """
 
 import numpy as np
-import plant as at
-from dynamics import mass_and_bias, reduced
 from numba import njit
 from numpy.typing import NDArray
-from plant import Plant
-from rig import Rig
+
+from benchmarks.blind import plant as at
+from benchmarks.blind.dynamics import mass_and_bias, reduced
+from benchmarks.blind.plant import Plant
+from benchmarks.blind.rig import Rig
 
 Array = NDArray[np.float64]
 STEP = 2e-4
@@ -268,7 +269,7 @@ def _run(chain, gravity, select, shift, p, m, command, start, rate, settle, step
         for i in range(n):
             torque[i], level = load_on_joint(p, m, i, t, qm, vm, step, state, relay, bristle, felt)
             low[i], high[i] = -step * level * (1.0 - p[at.ASYMMETRY, i]), step * level * (1.0 + p[at.ASYMMETRY, i])
-        mass, bias = mass_and_bias(*chain, gravity, select @ qm + shift, select @ vm)
+        mass, bias = mass_and_bias(*chain, gravity, select @ qm + shift, select @ vm)  # type: ignore[call-arg]
         inverse, reduced_bias = reduced(mass, bias, select, p[at.REFLECTED_INERTIA])
         free = v + step * (inverse @ (torque - reduced_bias))
         after = _stick_or_slip(free, inverse, low, high, impulse)

@@ -1,6 +1,6 @@
 """Draw a rig with (or without) something hidden in it and write what its bench would have recorded.
 
-    python tests/blind/generator.py --seed 7 --out FOLDER
+    python -m benchmarks.blind.generator --seed 7 --out FOLDER
 
 writes FOLDER/recording (the documented recording format, with fresh commands in recording/validation) and, beside it
 and never inside it, FOLDER/truth.json. Nothing here comes from the package under test.
@@ -15,16 +15,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import hidden
 import numpy as np
 import polars as pl
-import sizes
 import yaml
-from excitation import KINDS
-from forms import BESIDE, FAMILIES
 from numpy.typing import NDArray
-from physics import simulate
-from worlds import Bench, World, command_of, copy, draw_usual, probe
+
+from benchmarks.blind import hidden, sizes
+from benchmarks.blind.excitation import KINDS
+from benchmarks.blind.forms import BESIDE, FAMILIES
+from benchmarks.blind.physics import simulate
+from benchmarks.blind.worlds import Bench, World, command_of, copy, draw_usual, probe
 
 Array = NDArray[np.float64]
 CYCLE = ("none", "named", "named", "unnamed", "named", "named", "two", "named")
@@ -169,7 +169,7 @@ def draw(
 
 def _engine(name: str) -> Callable[..., tuple[Array, Array, Array]]:
     """What moves the measured rig: `own` (physics.py) or `mujoco`."""
-    return simulate if name == "own" else import_module(f"{name}_physics").simulate  # type: ignore[no-any-return]
+    return simulate if name == "own" else import_module(f"benchmarks.blind.{name}_physics").simulate  # type: ignore[no-any-return]
 
 
 def _table(

@@ -1,6 +1,5 @@
 """The blind circle's hand is the package's own, but for what is hidden in it; its table counts what it says."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,12 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-import circle
-import excitation
-from generator import perform, save
-
+from benchmarks.blind import circle, excitation
+from benchmarks.blind.generator import perform, save
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2, finger_urdf
 from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
@@ -103,7 +98,7 @@ def test_the_table_counts_what_was_lost_and_what_came_back() -> None:
         line | {"seed": 1, "before": of(0), "control": of(0), "verdict": "adequate", "named": []},
         line | {"seed": 3, "before": of(6), "after": of(10), "control": of(10)},
     ]
-    text = circle.page(lines, "python tests/blind/circle.py")
+    text = circle.page(lines, "python -m benchmarks.blind.circle")
     assert "lost (at most 5 of 10) on 2 of 3 hands, and came back (at least 8) on 1 of them with the model" in text
     assert "on 0 without." in text
     row = "| 2 | 0.9, 3.0, 0.20 | torque_bias@q2: bias=0.2 | `missing_effect`: torque_bias@q2 | right | 10 of 10, "

@@ -12,19 +12,12 @@ import polars as pl
 import pytest
 import yaml
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-import criteria
-import generator
-import hidden
-import judge
-import page
-from dynamics import mass_and_bias
-from physics import simulate
-from plant import neutral
-from rig import RIGS
-from scoring import pushes_found, score
-
+from benchmarks.blind import criteria, generator, hidden, judge, page
+from benchmarks.blind.dynamics import mass_and_bias
+from benchmarks.blind.physics import simulate
+from benchmarks.blind.plant import neutral
+from benchmarks.blind.rig import RIGS
+from benchmarks.blind.scoring import pushes_found, score
 from tactile_cube.identification.criteria import STANDARD, Criteria
 
 QUICK = 3.0
@@ -77,7 +70,7 @@ def test_a_recommended_command_is_played_on_the_rig_that_was_measured(tmp_path: 
 @pytest.mark.parametrize(("kind", "name"), [("finger", "torque_crosstalk"), ("pendulum", "stribeck_friction")])
 def test_both_engines_measure_the_same(kind: str, name: str) -> None:
     pytest.importorskip("mujoco")
-    import mujoco_physics
+    from benchmarks.blind import mujoco_physics
 
     world = generator.draw(1, QUICK, [name], kind)[0]
     command = np.linspace(world.low, world.high, 200)
@@ -242,7 +235,7 @@ def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
         "diagnosis": _answer("ambiguous", PLAY, rivals=("cogging",)),
         "wall_seconds": 1.0,
     }
-    command = "python tests/blind/judge.py --draws 1 --first-seed 7"
+    command = "python -m benchmarks.blind.judge --draws 1 --first-seed 7"
     judged = [judge.judged({**line, "commit": "abc"})]
     text = page.markdown(judged, judge.summarise(judged), command)
     assert f"Command: `{command}`; commit: abc." in text

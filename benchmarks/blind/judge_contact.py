@@ -1,6 +1,6 @@
 """Run record, diagnose and identify on grasps with a hidden contact effect and judge what they answer.
 
-    python tests/blind/judge_contact.py --draws 20 --first-seed 100
+    python -m benchmarks.blind.judge_contact --draws 20 --first-seed 100
 
 Every draw adds one line to verdicts.jsonl in `--out` as soon as it is judged; the same command goes on where it
 stopped, and writes contact_identification.md beside it. Seeds below 100 are for tuning.
@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from judge import commit
 
+from benchmarks.blind.judge import commit
 from tactile_cube.simulation.contact_effects import contact_catalogue
 
 FIRST_SEED = 100
@@ -167,7 +167,7 @@ def main() -> None:
     file = args.out / "verdicts.jsonl"
     lines = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     wanted = range(args.first_seed, args.first_seed + args.draws)
-    command = f"python tests/blind/judge_contact.py --draws {args.draws} --first-seed {args.first_seed}"
+    command = f"python -m benchmarks.blind.judge_contact --draws {args.draws} --first-seed {args.first_seed}"
     for seed in [seed for seed in wanted if seed not in {line["seed"] for line in lines}]:
         lines.append({**judge(seed, args.out), "commit": commit()})
         with file.open("a") as all_lines:

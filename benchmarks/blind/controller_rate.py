@@ -1,6 +1,6 @@
 """What is left of a controller at 10 kHz in a model that computes its torque at the log's rate, and with the key.
 
-    python -m tests.blind.controller_rate
+    python -m benchmarks.blind.controller_rate
 
 Records a finger and a carriage of 90 kg with true constants in steps of 0.1 ms, logs them at 500 Hz, and simulates the
 recordings without `controller.rate_hz` and with 2 and 10 kHz.

@@ -1,6 +1,5 @@
 """Worlds of the blind rounds: the usual ones stay, machines of any size are sane, forms differ and have limits."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,19 +7,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-import forms
-import generator
-import hidden
-import plant as at
-import sizes
-import worlds
-from dynamics import mass_and_bias
-from excitation import multisine, ramps
-from physics import simulate
-from plant import neutral
-from rig import RIGS, Link, Rig
+from benchmarks.blind import forms, generator, hidden, sizes, worlds
+from benchmarks.blind import plant as at
+from benchmarks.blind.dynamics import mass_and_bias
+from benchmarks.blind.excitation import multisine, ramps
+from benchmarks.blind.physics import simulate
+from benchmarks.blind.plant import neutral
+from benchmarks.blind.rig import RIGS, Link, Rig
 
 USUAL: dict[str, Any] = {
     "parameters": {"order": 23.0, "amplitude": 0.04236506103443329},

@@ -1,6 +1,6 @@
 """How often does `monitor` raise a false alarm, and what does it find? Draws machines, records them twice, counts.
 
-    python -m tests.blind.monitor --draws 20
+    python -m benchmarks.blind.monitor --draws 20
 
 Every draw is a pendulum-like joint of its own with viscous friction of its own size, identified from a first
 recording. A second one, with other commands, noise and joint offsets, is of the same machine (a null); a third of a

@@ -1,6 +1,6 @@
 """The sim-to-real circle, blind: another engine, another contact, drive effects that nobody tells the package of.
 
-    python tests/blind/circle.py --draws 6 --first-seed 500000 --out outputs/blind_circle
+    python -m benchmarks.blind.circle --draws 6 --first-seed 500000 --out outputs/blind_circle
 
 The "real" hand of a draw is MuJoCo's, with soft tips, their friction and one or two effects of the drive drawn by
 chance; the effects grow until the shipped policy fails. A finger of it is measured on a bench whose physics shares no
@@ -19,15 +19,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 import numpy as np
-from generator import perform, save
-from judge import commit, read_lines, validation_error
-from plant import Plant, neutral
-from rig import Link, Rig
-from scoring import score
-from worlds import Bench, World
+
+from benchmarks.blind.generator import perform, save
+from benchmarks.blind.judge import commit, read_lines, validation_error
+from benchmarks.blind.plant import Plant, neutral
+from benchmarks.blind.rig import Link, Rig
+from benchmarks.blind.scoring import score
+from benchmarks.blind.worlds import Bench, World
 
 EPISODES, SECONDS = 10, 20
 """Of every evaluation."""
@@ -215,9 +214,9 @@ def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
     if named:
         effects = ",".join(f'"{one}"' for one in named)
         model = run("identify", place / "identify", "model.yaml", f"recording={bench}", f"effects=[{effects}]")
-    for name, world in (("after", model), ("control", None)):
-        if name == "control" or world is not None:
-            policy_now = learned(place / f"learn_{name}", policy, steps, world)
+    for name, learned_in in (("after", model), ("control", None)):
+        if name == "control" or learned_in is not None:
+            policy_now = learned(place / f"learn_{name}", policy, steps, learned_in)
             line[name] = tried(place / name, str(policy_now), hand, hand["words"])
     return line
 
@@ -269,7 +268,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("outputs/blind_circle"))
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
-    command = f"python tests/blind/circle.py --draws {args.draws} --first-seed {args.first_seed} --steps {args.steps}"
+    command = (
+        f"python -m benchmarks.blind.circle --draws {args.draws} --first-seed {args.first_seed} --steps {args.steps}"
+    )
     done = {line["seed"] for line in read_lines(args.out / "circle.jsonl")}
     for seed in range(args.first_seed, args.first_seed + args.draws):
         if seed not in done:

@@ -6,8 +6,9 @@ answer that was the same law in two words. The catalogue has had LuGre's form it
 """
 
 import numpy as np
-import plant as at
-from hidden import Maker, Scene, Truth, _put
+
+from benchmarks.blind import plant as at
+from benchmarks.blind.hidden import Maker, Scene, Truth, _put
 
 
 def smooth_backlash(s: Scene, i: int) -> Truth:

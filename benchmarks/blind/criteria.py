@@ -1,6 +1,6 @@
 """What half and double each number that decides a diagnosis does to blind draws that are spent.
 
-    python -m tests.blind.criteria outputs/own --draws 20 --out outputs/criteria
+    python -m benchmarks.blind.criteria outputs/own --draws 20 --out outputs/criteria
 
 Takes the draws of a round that judge.py kept (`--keep`), searches each once with the numbers of conf/criteria, then
 with one of them changed at a time; what was fitted before is not fitted again. Errors are halved and doubled in what
@@ -15,13 +15,13 @@ from __future__ import annotations
 import argparse
 import json
 import pickle
-import sys
 from collections.abc import Callable
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import tactile_cube
+from benchmarks.blind.scoring import score
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
@@ -39,10 +39,6 @@ from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from scoring import score
 
 T = TypeVar("T")
 ERRORS = ("floor", "adequate", "tolerated", "far")
@@ -99,7 +95,7 @@ class RememberingSearch(Remembered, Search):
         """The verdict by other criteria."""
         self.criteria, self.leaders = criteria, []
         findings = self.run()
-        asked = simulations or RememberingSimulations(self, findings.base, self.floor, "fast", 0.002)
+        asked = simulations or RememberingSimulations(self, findings.base, self.floor, "fast", 0.002)  # type: ignore[attr-defined]
         return decide(findings, asked, criteria), asked
 
 
@@ -211,12 +207,12 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--out", type=Path, default=Path("outputs/criteria"))
     given = parser.parse_args()
-    searching.Together = RememberingTogether  # type: ignore[misc]
+    searching.Together = RememberingTogether  # type: ignore[misc,attr-defined]
     given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / "answers.jsonl"
     lines = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
     done = {line["draw"] for line in lines}
-    command = f"python -m tests.blind.criteria {given.round} --draws {given.draws}"
+    command = f"python -m benchmarks.blind.criteria {given.round} --draws {given.draws}"
     for draw in sorted(given.round.glob("draw_*"))[: given.draws]:
         if draw.name not in done:
             lines.append(judged(draw))

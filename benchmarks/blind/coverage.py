@@ -1,6 +1,6 @@
 """How often do 95 % intervals hold the truth? Draws recordings, fits the true effect, counts.
 
-    python -m tests.blind.coverage --draws 20
+    python -m benchmarks.blind.coverage --draws 20
 
 Every draw is a pendulum-like joint of its own, recorded in three initialisations with one hidden effect of known size;
 `identify` is told the effect's name and not its size. Counted are the effect's parameters and the constants fitted

@@ -1,14 +1,16 @@
 """A blind round on a page: counts, the confusion matrix, every draw, and its line in the list of all rounds."""
 
+import re
 from pathlib import Path
 from typing import Any
 
-from generator import VISIBLE
 from matplotlib.figure import Figure
 
+from benchmarks.blind.generator import VISIBLE
+
 FIRST_SEED = 10_000
-RULES = "[tests/blind/scoring.py](../../tests/blind/scoring.py)"
-GENERATOR = "[generator](../../tests/blind/generator.py)"
+RULES = "[benchmarks/blind/scoring.py](../../benchmarks/blind/scoring.py)"
+GENERATOR = "[generator](../../benchmarks/blind/generator.py)"
 ROUNDS = "[rounds.md](rounds.md)"
 TITLES = {"usual": "", "sizes": ": machines of other sizes", "forms": ": other forms of the laws"}
 GOAL = 1.3
@@ -107,8 +109,7 @@ def _pushes(summary: dict[str, Any]) -> list[str]:
 
 def _worlds(command: str) -> str:
     """The worlds that a judge's command names."""
-    words = command.split()
-    return words[words.index("--worlds") + 1] if "--worlds" in words else "usual"
+    return command.partition(" --worlds ")[2].partition(" ")[0] or "usual"
 
 
 def markdown(lines: list[dict[str, Any]], s: dict[str, Any], command: str) -> str:
@@ -150,8 +151,7 @@ def markdown(lines: list[dict[str, Any]], s: dict[str, Any], command: str) -> st
 
 def round_row(summary: dict[str, Any], command: str) -> str:
     """The round's line in docs/results/rounds.md, but for what changed since the round before."""
-    words = command.split()
-    options = dict(zip(words[2::2], words[3::2], strict=True))
+    options = dict(re.findall(r"(--\S+) (\S+)", command))
     first = options.pop("--first-seed", str(FIRST_SEED))
     outcomes = ", ".join(str(summary[key]) for key in ("right", "acceptable", "wrong"))
     cells = [

@@ -4,13 +4,14 @@ import dataclasses
 from dataclasses import dataclass, replace
 from typing import Any
 
-import hidden
 import numpy as np
-from excitation import COMMANDS, KINDS
 from numpy.typing import NDArray
-from physics import simulate
-from plant import Plant, neutral
-from rig import RIGS, Rig
+
+from benchmarks.blind import hidden
+from benchmarks.blind.excitation import COMMANDS, KINDS
+from benchmarks.blind.physics import simulate
+from benchmarks.blind.plant import Plant, neutral
+from benchmarks.blind.rig import RIGS, Rig
 
 Array = NDArray[np.float64]
 CONSTANTS = {
@@ -117,7 +118,7 @@ def draw_world(rng: np.random.Generator, kind: str, amplitude: float) -> World:
     )
     span = np.array(MOTION[kind])
     middle, half = span.mean(axis=1), 0.5 * amplitude * (span[:, 1] - span[:, 0])
-    nominal = {
+    nominal: dict[str, Any] = {
         "controller": {"kp": stated["kp"], "kd": stated["kd"], "torque_limit": limit},
         "nominal": {
             "stiffness": stated["stiffness"],

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from plant import Plant
-from rig import Rig
+
+from benchmarks.blind.plant import Plant
+from benchmarks.blind.rig import Rig
 
 Array = NDArray[np.float64]
 Truth = dict[str, Any]

@@ -7,13 +7,14 @@ joints of a machine turn, or all slide: errors in radians and in metres have no 
 
 from dataclasses import replace
 
-import hidden
 import numpy as np
-from dynamics import mass_and_bias, reduced
 from numpy.typing import NDArray
-from plant import neutral
-from rig import Link, Rig
-from worlds import Bench, World, draw_bench, probe
+
+from benchmarks.blind import hidden
+from benchmarks.blind.dynamics import mass_and_bias, reduced
+from benchmarks.blind.plant import neutral
+from benchmarks.blind.rig import Link, Rig
+from benchmarks.blind.worlds import Bench, World, draw_bench, probe
 
 Array = NDArray[np.float64]
 SLIDING = 0.4

@@ -1,6 +1,6 @@
 """Run the public commands on blind recordings and judge what they answer.
 
-    python tests/blind/judge.py --draws 60 --out outputs/blind --jobs 1
+    python -m benchmarks.blind.judge --draws 60 --out outputs/blind --jobs 1
 
 Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped, and
 `--draws 0` only sums up what is there. identification.md, .json and .png (the confusion matrix) beside it sum the
@@ -22,12 +22,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from generator import WORLDS, play, write
-from page import FIRST_SEED, GOAL, markdown, picture, round_row
-from scoring import pushes_found, score
-
+from benchmarks.blind.generator import WORLDS, play, write
+from benchmarks.blind.page import FIRST_SEED, GOAL, markdown, picture, round_row
+from benchmarks.blind.scoring import pushes_found, score
 from tactile_cube.api.batch import each
 
 
@@ -229,7 +226,7 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     done = {x["seed"] for x in read_lines(args.out / "verdicts.jsonl")}
     wanted = [s for s in range(args.first_seed, args.first_seed + args.draws) if s not in done]
-    command = f"python tests/blind/judge.py --draws {args.draws or len(done)} --first-seed {args.first_seed}"
+    command = f"python -m benchmarks.blind.judge --draws {args.draws or len(done)} --first-seed {args.first_seed}"
     command += f" --seconds {args.seconds:g}" if args.seconds else ""
     command += f" --engine {args.engine}" * (args.engine != "own")
     command += f" --worlds {args.worlds}" * (args.worlds != "usual")

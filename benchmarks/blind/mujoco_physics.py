@@ -7,9 +7,10 @@ Its dry friction is made as stiff as its step allows: by default a joint eases i
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from physics import follow, load_on_joint, read_sensors
-from plant import ASYMMETRY, DELAY, MATRICES, VECTORS, Plant
-from rig import Rig
+
+from benchmarks.blind.physics import follow, load_on_joint, read_sensors
+from benchmarks.blind.plant import ASYMMETRY, DELAY, MATRICES, VECTORS, Plant
+from benchmarks.blind.rig import Rig
 
 Array = NDArray[np.float64]
 STEP = 5e-4
