@@ -1,7 +1,7 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
 Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
-`export`, `deploy`, `view`, `monitor` and `effects`; `make_env`, `load_policy`, `read_recording` and
+`export`, `deploy`, `view`, `monitor` and `effects`; `search_grasps`, `make_env`, `load_policy`, `read_recording` and
 `recording_from_arrays` give what they work on. Nothing slow is imported before it is used.
 """
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.environment import env_config, make_env
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.api.export import export, load_policy
+    from tactile_cube.api.grasps import search_grasps
     from tactile_cube.api.identification import identify
     from tactile_cube.api.monitoring import monitor
     from tactile_cube.api.recording import record
@@ -44,6 +45,7 @@ _PLACES = {
     "export": "api.export",
     "load_policy": "api.export",
     "identify": "api.identification",
+    "search_grasps": "api.grasps",
     "monitor": "api.monitoring",
     "record": "api.recording",
     "train": "api.training",
@@ -73,6 +75,7 @@ __all__ = [
     "read_recording",
     "record",
     "recording_from_arrays",
+    "search_grasps",
     "train",
     "view",
 ]

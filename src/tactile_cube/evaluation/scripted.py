@@ -22,7 +22,7 @@ class ScriptedPolicy:
 
     @classmethod
     def from_file(cls, path: Path) -> ScriptedPolicy:
-        """The best gait of a file that `search_gait` wrote.
+        """The best gait of a file that `benchmarks.teacher` wrote.
 
         Raises:
             InputError: it cannot be read, or holds no gait.

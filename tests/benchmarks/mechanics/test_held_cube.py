@@ -1,5 +1,5 @@
+from benchmarks.mechanics.held_cube import TWIST, measure_accuracy
 from tactile_cube.simulation import SimulationOptions
-from tactile_cube.simulation.accuracy import TWIST, measure_accuracy
 
 
 def test_the_fast_preset_holds_and_twists_the_cube() -> None:

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.paper.model_card import read_card
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.model_card import read_card
 from tactile_cube.evaluation.policy_path import SHIPPED
 
 Results = dict[str, Any]
 EVALUATE = "python -m tactile_cube.evaluate"
 TRAIN = "python -m tactile_cube.train +experiment=curriculum`, then `+experiment=finetune"
+HEAD = "| experiment | paper | here | policy, seed | CPU hours | command | commit |"
 SCRIPTED, REPLAY = "scripted", "replay"
 FINGER = "outputs/finger"
 FREE_FINGER = f"python -m tactile_cube.record out={FINGER}` and `python -m tactile_cube.compare recording={FINGER}"
@@ -76,8 +77,7 @@ def paper_rows(results: Sequence[Results], free_finger: Mapping[str, Any] | None
         results: what `read_results` gave, the newest last.
         free_finger: from `read_comparison`.
     """
-    head = ["experiment", "paper", "here", "policy, seed", "CPU hours", "command", "commit"]
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    lines = [HEAD, "|---" * HEAD.count(" |") + "|"]
     for row in ROWS:
         found = newest(results, row.fits)
         if found is None:

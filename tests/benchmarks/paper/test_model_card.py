@@ -4,14 +4,14 @@ from typing import Any
 
 import pytest
 
+from benchmarks.paper.ancestry import Ancestor, ancestry_table, in_words, read_ancestry, read_table, total
+from benchmarks.paper.model_card import model_card, read_card
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.ancestry import Ancestor, ancestry_table, in_words, read_ancestry, read_table, total
-from tactile_cube.evaluation.model_card import model_card, read_card
 from tactile_cube.evaluation.policy_path import SHIPPED
-from tests.evaluation.test_paper_table import results
+from tests.benchmarks.paper.test_page import results
 
 INFO = PolicyInfo(
     observation_size=120,

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.paper.ancestry import NONE, Ancestor, ancestry_table, total
 from tactile_cube.agent.policy_file import PolicyInfo
-from tactile_cube.evaluation.ancestry import NONE, Ancestor, ancestry_table, total
 
 Results = dict[str, Any]
 

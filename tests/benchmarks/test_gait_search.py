@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import yaml
 
+from benchmarks.teacher.gait_search import BOUNDS, search_gait, try_gait, write_gait
 from tactile_cube.env import Moment, RotationEnv, Task
 from tactile_cube.env.task import DROPPED, RUNNING, TIME_LIMIT
-from tactile_cube.evaluation.gait_search import BOUNDS, search_gait, try_gait, write_gait
 from tactile_cube.hand import DLR_HAND2, Gait
 from tactile_cube.hand.gait import GaitRanges
 from tactile_cube.training.ledger import Costs
