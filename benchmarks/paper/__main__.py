@@ -9,8 +9,9 @@ from pathlib import Path
 
 from benchmarks.paper.page import paper_page, read_all
 from benchmarks.paper.rows import read_comparison
-from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table, unfinished
+from tactile_cube.evaluation.sweep_table import RUN, read_sweep, sweep_table
 from tactile_cube.evaluation.training_curve import read_curve
+from tactile_cube.training.finished import FILE as FINISHED
 from tactile_cube.visualization.curves import write_learning_curves
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
@@ -25,7 +26,8 @@ def main() -> None:
     given = parser.parse_args()
     for sweep in given.sweeps:
         print(f"{sweep}\n\n{sweep_table(read_sweep(sweep), intervals=True)}\n")
-        if left := unfinished(sweep):
+        runs = [path for path in sorted(sweep.glob("*seed*")) if path.is_dir() and RUN.match(path.name)]
+        if left := [run.name for run in runs if not (run / FINISHED).is_file()]:
             print(f"not finished: {', '.join(left)}")
     if given.sweeps:
         return

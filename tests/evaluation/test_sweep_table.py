@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.sweep_table import median_interval, read_sweep, sweep_table, unfinished
+from tactile_cube.evaluation.sweep_table import median_interval, read_sweep, sweep_table
 
 
 def run(folder: Path, name: str, angle: float, hours: float = 0.1) -> None:
@@ -63,13 +63,6 @@ def test_medians_over_seeds_have_an_interval_and_runs_that_never_regrasp_count(f
 def test_the_interval_of_a_median_is_the_sign_tests(runs: int, low: int, high: int) -> None:
     # ranks from the table of the sign test at 5 %, counted from zero
     assert median_interval([float(k) for k in reversed(range(runs))])[1:] == (low, high)
-
-
-def test_runs_that_did_not_finish_are_named(tmp_path: Path) -> None:
-    for name in ("a-seed0", "a-seed1", "other"):
-        (tmp_path / name).mkdir()
-    (tmp_path / "a-seed0" / "finished.json").write_text("{}")
-    assert unfinished(tmp_path) == ["a-seed1"]
 
 
 def test_a_folder_without_runs_is_refused(tmp_path: Path) -> None:

@@ -38,11 +38,6 @@ class LoopRun:
     ticks: list[float] = field(default_factory=list, repr=False)
 
     @property
-    def homed(self) -> bool:
-        """Whether the policy came to decide."""
-        return bool(self.log.time)
-
-    @property
     def tick_times(self) -> dict[str, float]:
         """Median, 99.9th percentile and largest computing time of a tick [s]."""
         times = np.array(self.ticks)

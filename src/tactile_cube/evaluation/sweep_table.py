@@ -10,10 +10,9 @@ from statistics import median
 
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, cpu_hours, read_curve, regrasping_begins
-from tactile_cube.training.finished import FILE as FINISHED
 
 INTERVALS = ("million steps: median (interval)", "angle at the end [rad]: median (interval)", "CPU hours of all runs")
-_RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
+RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
 _FILTER_TIME = re.compile(r"task\.filter_time=(?P<time>[\d.]+)-(?P<task>task=\w+)$")
 
 
@@ -29,7 +28,7 @@ def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
     runs: dict[str, dict[int, Curve]] = {}
     for path in sorted(folder.glob("*seed*")):
         name = path.stem if path.suffix == ".csv" else path.name
-        match = _RUN.match(name)
+        match = RUN.match(name)
         if match and (path.suffix == ".csv" or (path / "metrics.csv").is_file()):
             setting = _FILTER_TIME.sub(r"\g<task>, T_s \g<time> s", match["setting"] or folder.name)
             runs.setdefault(setting, {})[int(match["seed"])] = read_curve(path, name)
@@ -79,12 +78,6 @@ def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
         outside += 1
     first = max(outside - 1, 0)
     return median(ordered), ordered[first], ordered[n - 1 - first]
-
-
-def unfinished(folder: Path) -> list[str]:
-    """Names of the run folders of a multirun that failed or were stopped before their end."""
-    runs = (path for path in sorted(folder.glob("*seed*")) if path.is_dir() and _RUN.match(path.name))
-    return [run.name for run in runs if not (run / FINISHED).is_file()]
 
 
 def _over_seeds(curves: Sequence[Curve]) -> list[str]:

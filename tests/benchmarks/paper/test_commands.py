@@ -28,12 +28,18 @@ def test_the_page_in_the_docs_is_the_one_that_the_command_writes(
     assert picture.stat().st_size > 10_000
 
 
-def test_the_table_of_a_multirun_is_printed(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_the_table_of_a_multirun_is_printed_and_runs_that_did_not_finish_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    typed(monkeypatch, "--sweeps", str(paper.RESULTS / "levers"))
+    for name in ("a-seed0", "a-seed1"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "metrics.csv").write_text("steps,final_angle\n1500,0.5\n")
+    (tmp_path / "a-seed0" / "finished.json").write_text("{}")
+    typed(monkeypatch, "--sweeps", str(tmp_path))
     paper.main()
-    assert "| agent.n_step=1-" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "| a | > 0.002 (at 0.5 rad), > 0.002 (at 0.5 rad) |" in said
+    assert said.endswith("not finished: a-seed1\n")
 
 
 def test_a_policy_is_shipped_with_its_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
