@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     from tactile_cube.api.deployment import deploy
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.effects import effects
-    from tactile_cube.api.environment import env_config, make_env
+    from tactile_cube.api.environment import env_config, make_env, search_grasps
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.api.export import export, load_policy
-    from tactile_cube.api.grasps import search_grasps
     from tactile_cube.api.identification import identify
     from tactile_cube.api.monitoring import monitor
     from tactile_cube.api.recording import record
@@ -45,7 +44,7 @@ _PLACES = {
     "export": "api.export",
     "load_policy": "api.export",
     "identify": "api.identification",
-    "search_grasps": "api.grasps",
+    "search_grasps": "api.environment",
     "monitor": "api.monitoring",
     "record": "api.recording",
     "train": "api.training",
@@ -90,4 +89,4 @@ def __getattr__(name: str) -> Any:
 
 
 # Gymnasium 1 loads no entry points of other packages
-gymnasium.register(id="tactile_cube/Rotation-v0", entry_point="tactile_cube.registration:make_rotation")
+gymnasium.register(id="tactile_cube/Rotation-v0", entry_point="tactile_cube.gymnasium_env:make_rotation")

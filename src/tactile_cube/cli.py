@@ -15,8 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from tactile_cube.command_help import CONFIG, RECIPE, help_text
-from tactile_cube.completion import install_script, prepare_query
+from tactile_cube.command_help import CONFIG, RECIPE, help_text, install_script, prepare_query
 from tactile_cube.composition import refuse_unknown_keys
 from tactile_cube.console_log import console_kept_in
 from tactile_cube.did_you_mean import near_key, near_option

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.npz_file import read_npz
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.randomization.start_states import StartPoses, StartStates
 from tactile_cube.simulation import EpisodeConstants, Start
+from tactile_cube.untrusted_file import read_npz
 
 Array = NDArray[np.float64]
 
