@@ -21,9 +21,7 @@ def main() -> None:
     parser.add_argument(
         "--run", type=Path, help="folder of the training run, for its ledger; else where the policy lies"
     )
-    parser.add_argument(
-        "--before", nargs="*", type=Path, default=[], help="runs that it comes from, in their order"
-    )
+    parser.add_argument("--before", nargs="*", type=Path, default=[], help="runs that it comes from, in their order")
     parser.add_argument("--results", nargs="*", type=Path, default=[], help="results files of its evaluations")
     parser.add_argument("--limits", default="", help="what it cannot do, in a sentence or two")
     parser.add_argument("--name", default="default", help="what it is called: evaluate policy=<name>")

@@ -39,9 +39,7 @@ def main() -> None:
     write_gait(given.out / "gait.yaml", found, given.seed, ledger.costs())
     best, cpu_hours = found.best, ledger.costs().simulating / 3600
     print(f"{best.angle:.2f} rad, kept in {best.kept:.0%} of {len(worlds)} fresh episodes; {found.tried} gaits tried")
-    print(
-        f"{cpu_hours:.2f} CPU hours; {given.out / 'gait.yaml'} has `gaits` for conf/exploration/demonstrations.yaml"
-    )
+    print(f"{cpu_hours:.2f} CPU hours; {given.out / 'gait.yaml'} has `gaits` for conf/exploration/demonstrations.yaml")
 
 
 if __name__ == "__main__":
