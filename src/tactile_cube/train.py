@@ -17,10 +17,12 @@ if TYPE_CHECKING:
 def sweep_summary(folders: list[Path]) -> None:
     """Say what came of the runs of a sweep."""
     from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
+    from tactile_cube.visualization.curves import write_sweep_curves
 
     for sweep in dict.fromkeys(folder.parent for folder in folders):
-        print(f"\n{sweep}\n\n{sweep_table(read_sweep(sweep), intervals=True)}\n")
-        print(f"this table again, and its curves: python -m tactile_cube.results sweep={sweep}")
+        runs, picture = read_sweep(sweep), sweep / "learning_curves.png"
+        write_sweep_curves(runs, picture, sweep.name)
+        print(f"\n{sweep}\n\n{sweep_table(runs, intervals=True)}\n\nlearning curves: {picture}")
 
 
 @command("train", after_sweep=sweep_summary)

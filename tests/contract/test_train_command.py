@@ -183,7 +183,7 @@ def test_a_sweep_goes_past_a_run_that_fails_says_what_came_of_it_and_is_given_ag
     assert "1 of 2 runs failed: " in first.stderr
     sweep = tmp_path / "outputs/train/smoke"
     setting = "collector.worlds=4-collector=single-logger=csv"
-    assert {path.name for path in sweep.iterdir()} == {f"{setting}-seed0"}
+    assert {path.name for path in sweep.iterdir()} == {f"{setting}-seed0", "learning_curves.png"}
     assert f"| {setting} | > 0.000 (at" in first.stdout
     checkpoint = sweep / f"{setting}-seed0/checkpoint.pt"
     written = checkpoint.stat().st_mtime_ns
