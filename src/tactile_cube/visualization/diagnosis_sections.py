@@ -26,7 +26,7 @@ COLUMNS = {
     "gain": "share of the squared error it takes off",
     "p_value": "p (no better than without)",
 }
-INTERVALS = "Values and 95 % intervals, each on a scale of its own; effects that the model lacks are not allowed for."
+INTERVALS = "Values and 95 % intervals, each on a scale of its own; they do not allow for effects that the model lacks."
 REACHED = ("joint", "position in any model", "speed", "torque")
 HELD = "How the error with an object falls"
 
