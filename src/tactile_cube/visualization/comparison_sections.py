@@ -110,7 +110,7 @@ def overlay_section(
             left, said = figures.residual(comparison, trial, joint), "Shaded red: more than three noise floors."
         else:
             left = figures.before_and_after(before, comparison, trial, joint)
-            said = "Before and after, with the noise floor."
+            said = "Before and after, beside what noise alone leaves."
         blocks.append(Figure(left, f"What the simulation did not follow. {said}"))
     return Section(title, (), blocks)
 
