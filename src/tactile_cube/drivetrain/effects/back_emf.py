@@ -29,8 +29,8 @@ class BackEmf(Effect):
     stage = Stage.MOTOR_TORQUE
     contains = ("torque_saturation",)
     parameters = (
-        Parameter("stall", "N m", UNLIMITED, 0.005, UNLIMITED, 0.5, "data sheet", scale=0.02),
-        Parameter("no_load", "rad/s", 10.0, 0.5, 1e3, 10.0, "data sheet"),
+        Parameter("stall", "N m", UNLIMITED, 0.005, UNLIMITED, 0.2, "data sheet", scale=0.02),
+        Parameter("no_load", "rad/s", 10.0, 0.5, 1e3, 5.0, "data sheet"),
     )
 
     @classmethod

@@ -24,7 +24,7 @@ class MountTilt(Effect):
         Parameter("first", "1", 0.0, -0.6, 0.6, 0.1, "1-15 deg, in rad"),
         Parameter("second", "1", 0.0, -0.6, 0.6, 0.1, "1-15 deg, in rad"),
     )
-    forms = ({"first": 0.1}, {"second": 0.1}, {"first": 0.1, "second": 0.1})
+    forms = ({"second": 0.1}, {"first": 0.1}, {"first": 0.1, "second": 0.1})
 
     @classmethod
     def forms_at(cls, scales: Scales) -> list[dict[str, float]]:
