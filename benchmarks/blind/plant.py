@@ -118,16 +118,9 @@ class Plant(NamedTuple):
 
 MATRICES = ("crosstalk", "viscous_coupling", "dry_coupling", "neighbour_friction")
 INFINITE = (
-    "integral_limit",
+    "soft_limit", "knee", "rate_limit", "saturation", "stop_upper", "torque_limit", "stiffness", "integral_limit",
     "stall",
-    "soft_limit",
-    "knee",
-    "rate_limit",
-    "saturation",
-    "stop_upper",
-    "torque_limit",
-    "stiffness",
-)
+)  # fmt: skip
 ONES = (
     "gain", "stribeck_velocity", "transmission_order", "cogging_order", "detent_width", "drift_time", "angle_unit",
     "speed_unit", "time_unit", "smooth_torque", "knee_stiffness", "no_load",
