@@ -1,6 +1,7 @@
 """Logs and controllers as strangers have them: parts of a controller that its owner does not state, poor logs.
 
-Every log reads its positions up to half a row before or after the end of the row, one number a machine. Ten turns hide:
+Every log reads its positions up to half a row before or after the end of the row, one number a machine, and begins
+some seconds after its controller was switched on. Ten turns hide:
 
 | turn | hidden | right answer |
 |---|---|---|
@@ -31,6 +32,8 @@ LATE = 0.02
 """Most that a command is logged late [s]."""
 ACROSS = 8.0
 """Gravity along a joint's axis above which the joint hardly feels its weight [m/s^2]."""
+SWITCHED_ON = (2.0, 5.0)
+"""How long before a log its controller was switched on [s]."""
 OUTLIERS, OFF = 1e-3, 0.05
 """Share of readings that are nonsense, and by how much of a finger's angle [rad]."""
 
@@ -111,4 +114,5 @@ def draw_log(
             break
     late = int(rng.integers(1, max(2, round(LATE * bench.rate) + 1))) if "late_command" in chosen else 0
     outliers = OUTLIERS if "outliers" in chosen else 0.0
-    return world, replace(bench, skew=float(rng.uniform(-0.5, 0.5)), late=late, outliers=outliers), poor
+    skew, settle = float(rng.uniform(-0.5, 0.5)), float(rng.uniform(*SWITCHED_ON))
+    return world, replace(bench, settle=settle, skew=skew, late=late, outliers=outliers), poor
