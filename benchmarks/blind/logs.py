@@ -67,8 +67,9 @@ def mount_tilt(s: Scene, i: int) -> Truth:
     axis = np.cross(down, s.rng.normal(size=3))
     angle = np.deg2rad(s.size(3.0, 15.0))
     across = np.cross(axis / np.linalg.norm(axis), down)
-    s.rig.felt = tuple(float(x) for x in 9.81 * (np.cos(angle) * down + np.sin(angle) * across))
-    return {"angle": float(angle), "gravity": list(s.rig.felt)}
+    x, y, z = (9.81 * (np.cos(angle) * down + np.sin(angle) * across)).tolist()
+    s.rig.felt = (x, y, z)
+    return {"angle": float(angle), "gravity": [x, y, z]}
 
 
 def back_emf(s: Scene, i: int) -> Truth:

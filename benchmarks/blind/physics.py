@@ -268,8 +268,8 @@ def _run(chain, gravity, stated, select, shift, p, m, command, start, rate, sett
         t = k * step
         qm, vm = q + 0.5 * step * v, v + 0.5 * step * acceleration
         if compensates:
-            still = mass_and_bias(*chain, stated, select @ qm + shift, np.zeros(select.shape[0]))
-            weight = reduced(still[0], still[1], select, p[at.REFLECTED_INERTIA])[1]
+            mass, bias = mass_and_bias(*chain, stated, select @ qm + shift, select @ np.zeros(n))  # type: ignore[call-arg]
+            weight = reduced(mass, bias, select, p[at.REFLECTED_INERTIA])[1]
         for i in range(n):
             wait = p[at.DELAY, i]
             if p[at.JITTER, i] > 0.0:  # anew every 20 ms, in every trial otherwise
