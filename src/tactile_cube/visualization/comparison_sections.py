@@ -2,7 +2,6 @@
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import common_unit, milli, short
 from tactile_cube.visualization import comparison_figures as figures
@@ -108,10 +107,10 @@ def overlay_section(
         caption = f"{name}, its worst trial {one.name} ({one.kind}): {fell}."
         blocks.append(Figure(figures.overlay(comparison, trial, joint, before), caption))
         if before is None:
-            left, said = figures.residual(comparison, trial, joint), "Shaded red: more than three noise floors."
+            said = "Shaded: more than three noise floors."
         else:
-            left = figures.before_and_after(before, comparison, trial, joint)
             said = "Before and after, beside what noise alone leaves."
+        left = figures.residual(comparison, trial, joint, before)
         blocks.append(Figure(left, f"What the simulation did not follow. {said}"))
     return Section(title, (), blocks)
 
@@ -195,23 +194,3 @@ def method_section() -> Section:
         "for the memory of both signals.",
     ]
     return Section("How this was computed", (), [Listing(lines)], folded=True)
-
-
-def floor_source(floor: NoiseFloor) -> str:
-    """Where the noise floor comes from, in words."""
-    if floor.source == "contact":
-        return "what a world with the true effects leaves of a grasp"
-    return f"scatter of {floor.repeats} repeats" if floor.source == "repeats" else "sensor noise, a guess: no repeats"
-
-
-def floor_in_words(floor: NoiseFloor, unit: str, step: float) -> list[str]:
-    """The noise floor and what stands beside it, each by its name; `step` is the simulator's [s]."""
-    lines = [f"noise floor: {floor_source(floor)}"]
-    for name, by_joint in (
-        ("sensor noise", floor.sensor),
-        (f"the simulator's own time step, {1e3 * step:g} ms,", floor.step_size),
-    ):
-        if by_joint:
-            size = (sum(value**2 for value in by_joint.values()) / len(by_joint)) ** 0.5
-            lines.append(f"beside it: {name} {milli(size, unit)}")
-    return lines
