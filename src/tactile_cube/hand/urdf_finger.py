@@ -9,8 +9,8 @@ import numpy as np
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.chain import Chain
+from tactile_cube.hand.hand import Array, CollisionShape
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.hand.shape import Array, Shape
 from tactile_cube.hand.urdf import number_list, origin_element
 from tactile_cube.hand.urdf_elements import Placement, placement_of
 from tactile_cube.hand.urdf_shapes import collision_element, moved, read_shapes, visual_elements
@@ -46,7 +46,7 @@ class UrdfFinger:
     mass: Array
     com: Array
     inertia: Array
-    shapes: tuple[tuple[Shape, ...], ...]
+    shapes: tuple[tuple[CollisionShape, ...], ...]
     tip: Array
 
     def chain(self, position: Array, rotation: Array) -> Chain:
@@ -174,9 +174,9 @@ def _carried_links(text: str, moving: tuple[str, ...]) -> dict[str, tuple[str, P
 
 def _shapes(
     text: str, carried: dict[str, tuple[str, Placement]], joints: tuple[str, ...], turns: list[Array]
-) -> tuple[tuple[Shape, ...], ...]:
+) -> tuple[tuple[CollisionShape, ...], ...]:
     """Collision shapes of what each joint carries, in the turned frames."""
-    found: list[list[Shape]] = [[] for _ in joints]
+    found: list[list[CollisionShape]] = [[] for _ in joints]
     for link in ElementTree.fromstring(text).findall("link"):
         joint, place = carried[str(link.get("name"))]
         if joint in joints:
@@ -185,7 +185,7 @@ def _shapes(
     return tuple(map(tuple, found))
 
 
-def palm_shapes(text: str, moving: tuple[str, ...]) -> list[Shape]:
+def palm_shapes(text: str, moving: tuple[str, ...]) -> list[CollisionShape]:
     """Collision shapes of what no joint moves, in the root link's frame: for pictures only."""
     carried = _carried_links(text, moving)
     links = ElementTree.fromstring(text).findall("link")
