@@ -11,7 +11,7 @@ from tactile_cube.visualization.comparison_sections import (
     test_section,
     where_section,
 )
-from tactile_cube.visualization.comparison_summary import answer, floor_source
+from tactile_cube.visualization.comparison_summary import floor_source, outcome
 from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
 
 
@@ -26,7 +26,7 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
     good = comparison.at_the_floor
     return Report(
         title=f"Model and measurement: {comparison.recording.name}",
-        answer=answer(comparison),
+        answer=outcome(comparison),
         tone="good" if good else "warn",
         tiles=_tiles(comparison),
         sections=[
@@ -36,7 +36,7 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
             overlay_section(comparison),
             *band_section(comparison),
             test_section(comparison),
-            next_section(comparison, model_path),
+            _next_section(comparison, model_path),
             method_section(),
         ],
         footer=f"Made by tactile_cube: {command}",
@@ -61,7 +61,7 @@ def _tiles(comparison: Comparison) -> list[Tile]:
     return tiles
 
 
-def next_section(comparison: Comparison, model_path: str | None) -> Section:
+def _next_section(comparison: Comparison, model_path: str | None) -> Section:
     """What to type next."""
     folder = comparison.recording.folder
     model = f" model={model_path}" if model_path else ""

@@ -5,7 +5,6 @@ from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparis
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import common_unit, milli, short
 from tactile_cube.visualization import comparison_figures as figures
-from tactile_cube.visualization.numbers import p_value
 from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Section, Table
 
 MOST_OVERLAYS = 6
@@ -163,7 +162,7 @@ def test_section(comparison: Comparison) -> Section:
         "correlation between unrelated signals that remember themselves as these do."
     ]
     strongest = [
-        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", p_value(c.p_value))
+        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", probability(c.p_value))
         for c in comparison.cross_correlations
         if c.joint in above
     ][:MOST_CORRELATIONS]
@@ -194,3 +193,8 @@ def method_section() -> Section:
         "for the memory of both signals.",
     ]
     return Section("How this was computed", (), [Listing(lines)], folded=True)
+
+
+def probability(value: float) -> str:
+    """A probability; very small ones are only said to be small."""
+    return "< 0.001" if value < 1e-3 else f"{value:.3f}"

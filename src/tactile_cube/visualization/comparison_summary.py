@@ -9,7 +9,7 @@ def summary(comparison: Comparison) -> str:
     """What the command line prints: the answer, one line a joint, where it fails."""
     units = comparison.recording.units
     said = THOUSANDTHS[common_unit(units.values())]
-    lines = [answer(comparison), "", f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor      raw      fit"]
+    lines = [outcome(comparison), "", f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor      raw      fit"]
     for joint, error in comparison.errors.joints.items():
         floor, raw = comparison.floor.joints[joint], comparison.raw[0].joints[joint]
         numbers = f"{1e3 * error:>9.3f}{1e3 * floor:>9.3f}{error / floor:>15.2f}{1e3 * raw:>9.3f}"
@@ -41,10 +41,10 @@ def markdown(comparison: Comparison) -> str:
     ]
     table = ["| joint | error | noise floor |", "|---|---|---|", *rows]
     where = [f"- {sentence}" for sentence in comparison.sentences]
-    return "\n".join([f"# {comparison.recording.name}", "", answer(comparison), "", *table, "", *where])
+    return "\n".join([f"# {comparison.recording.name}", "", outcome(comparison), "", *table, "", *where])
 
 
-def answer(comparison: Comparison) -> str:
+def outcome(comparison: Comparison) -> str:
     """The result in one or two sentences."""
     error, floor, ratio = comparison.errors.overall, comparison.floor.overall, comparison.ratio
     unit = common_unit(comparison.recording.units.values())

@@ -18,7 +18,7 @@ from tactile_cube.visualization.charts import (
     svg,
     time_chart,
 )
-from tactile_cube.visualization.numbers import p_value
+from tactile_cube.visualization.comparison_sections import probability
 from tactile_cube.visualization.report import Callout, Figure, Listing, Section, Table
 
 WIDE = 6  # joints from which on a table has them in its rows
@@ -87,7 +87,7 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
         if "heldout_gain" in effect:
             lines.append(
                 f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off "
-                f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {p_value(effect['p_value'])})"
+                f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {probability(effect['p_value'])})"
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
     blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
