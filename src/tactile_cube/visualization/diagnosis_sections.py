@@ -146,6 +146,14 @@ def value_section(comparison: Comparison) -> Section:
     return Section("The constants", (), [Table(("", "value", "95 % interval", "owner's value", "unit"), rows)])
 
 
+def train_section(model_path: str) -> Section:
+    """What to type after an identification."""
+    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
+    return Section(
+        "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
+    )
+
+
 def next_section(
     diagnosis: Mapping[str, Any], model_path: str | None, before: Comparison, experiment: Experiment | None
 ) -> Section:
