@@ -29,8 +29,8 @@ from tactile_cube.evaluation.environment import environment
 from tactile_cube.evaluation.policies import HoldPolicy
 from tactile_cube.evaluation.policy_source import PolicySource
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2
+from tactile_cube.hand.model import finger_urdf
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.hand.urdf import finger_urdf
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import write_whole

@@ -59,7 +59,7 @@ class EvaluationResult:
             write_robustness_map(self.variants, self.evaluation.nominal_values, folder / "robustness.png")
             print(f"robustness map: {folder / 'robustness.png'}")
         if film:
-            from tactile_cube.visualization.showcase import showcase
+            from tactile_cube.visualization.film import showcase
 
             showcase(self.evaluation, self.variants, folder)
 

@@ -2,11 +2,9 @@
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import common_unit, milli, short
 from tactile_cube.visualization import comparison_figures as figures
-from tactile_cube.visualization.numbers import p_value
 from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Section, Table
 
 MOST_OVERLAYS = 6
@@ -107,10 +105,10 @@ def overlay_section(
         caption = f"{name}, its worst trial {one.name} ({one.kind}): {fell}."
         blocks.append(Figure(figures.overlay(comparison, trial, joint, before), caption))
         if before is None:
-            left, said = figures.residual(comparison, trial, joint), "Shaded red: more than three noise floors."
+            said = "Shaded: more than three noise floors."
         else:
-            left = figures.before_and_after(before, comparison, trial, joint)
             said = "Before and after, beside what noise alone leaves."
+        left = figures.residual(comparison, trial, joint, before)
         blocks.append(Figure(left, f"What the simulation did not follow. {said}"))
     return Section(title, (), blocks)
 
@@ -163,7 +161,7 @@ def test_section(comparison: Comparison) -> Section:
         "between unrelated signals with the same autocorrelation."
     ]
     strongest = [
-        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", p_value(c.p_value))
+        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", probability(c.p_value))
         for c in comparison.cross_correlations
         if c.joint in above
     ][:MOST_CORRELATIONS]
@@ -196,21 +194,6 @@ def method_section() -> Section:
     return Section("How this was computed", (), [Listing(lines)], folded=True)
 
 
-def floor_source(floor: NoiseFloor) -> str:
-    """Where the noise floor comes from, in words."""
-    if floor.source == "contact":
-        return "what a world with the true effects leaves of a grasp"
-    return f"scatter of {floor.repeats} repeats" if floor.source == "repeats" else "sensor noise, a guess: no repeats"
-
-
-def floor_in_words(floor: NoiseFloor, unit: str, step: float) -> list[str]:
-    """The noise floor and what stands beside it, each by its name; `step` is the simulator's [s]."""
-    lines = [f"noise floor: {floor_source(floor)}"]
-    for name, by_joint in (
-        ("sensor noise", floor.sensor),
-        (f"the simulator's own time step, {1e3 * step:g} ms,", floor.step_size),
-    ):
-        if by_joint:
-            size = (sum(value**2 for value in by_joint.values()) / len(by_joint)) ** 0.5
-            lines.append(f"beside it: {name} {milli(size, unit)}")
-    return lines
+def probability(value: float) -> str:
+    """A probability; very small ones are only said to be small."""
+    return "< 0.001" if value < 1e-3 else f"{value:.3f}"

@@ -33,6 +33,7 @@ from tactile_cube.visualization.diagnosis_sections import (
     ranking_section,
     shape_section,
     staircase_section,
+    train_section,
     value_section,
 )
 from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
@@ -122,7 +123,6 @@ def identification_report(
     found = [{"name": e.name, "joints": [e.joint or "object"], "parameters": e.parameters} for e in effects]
     units = after.recording.units
     unit = common_unit(units.values())
-    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
     return Report(
         title=f"Identified: {after.recording.name}",
         answer=f"The error on trials that the fit never saw fell from {milli(steps[0], unit)} to "
@@ -138,9 +138,7 @@ def identification_report(
             overlay_section(after),
             *band_section(after),
             test_section(after),
-            Section(
-                "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
-            ),
+            train_section(model_path),
         ],
         footer=f"Made by tactile_cube: {command}",
     )

@@ -77,7 +77,7 @@ def com_arm(constants: EpisodeConstants, quaternion: Array) -> Array:
     return Rotation.from_quat(quaternion).as_matrix() @ com if com.any() else np.zeros(3)
 
 
-class Scene:
+class BulletBodies:
     """The hand, the cube and the table of one world.
 
     Attributes:

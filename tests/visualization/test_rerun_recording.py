@@ -6,7 +6,7 @@ import psutil
 import rerun as rr
 import rerun.blueprint as rrb
 
-from tactile_cube.visualization.recording_file import recording_file
+from tactile_cube.visualization.rerun_recording import recording_file
 
 
 def write(path: Path) -> int:
