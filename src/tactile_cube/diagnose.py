@@ -1,4 +1,4 @@
-"""Find out which physical effect a model lacks, from a recording of the real mechanism."""
+"""Find which physical effect a model lacks, from a recording of the machine."""
 
 from __future__ import annotations
 

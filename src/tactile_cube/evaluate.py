@@ -1,4 +1,4 @@
-"""Try a policy, judge every episode, film the best one."""
+"""Evaluate a policy: a verdict for every episode, a film of the best one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fit a rig's constants and the effects that you name, and see the error fall."""
+"""Fit a rig's constants and the effects that you name."""
 
 from __future__ import annotations
 

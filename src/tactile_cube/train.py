@@ -1,4 +1,4 @@
-"""Train a policy, or go on training it: the same command resumes.
+"""Train a policy; the same command resumes it.
 
 What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and policy_best.safetensors,
 checkpoint.pt, checkpoint_before.pt and replay/ (to go on from), train.log (what the console showed), ledger.json

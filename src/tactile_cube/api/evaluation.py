@@ -1,4 +1,4 @@
-"""Try a policy from a program."""
+"""Evaluate a policy from a program."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class EvaluationResult:
 def evaluate(
     policy: PathLike | None = None, *settings: str, model: PathLike | None = None, say: Say = print
 ) -> EvaluationResult:
-    """Try a policy as a protocol says, and judge every episode.
+    """Evaluate a policy by a protocol, with a verdict for every episode.
 
     Args:
         policy: a policy file, a training run's folder, a policy that ships with the package, `hold`, `random` or

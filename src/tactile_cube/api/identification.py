@@ -1,4 +1,4 @@
-"""Identify effects from a program: fit them, with intervals, and see the error fall."""
+"""Identify effects from a program: fit them, with intervals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Try a policy as a protocol says: every variant with the same seeds, one verdict an episode."""
+"""Evaluate a policy by a protocol: every variant with the same seeds, one verdict an episode."""
 
 from __future__ import annotations
 

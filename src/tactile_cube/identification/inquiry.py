@@ -1,4 +1,4 @@
-"""What a recording answers: in segments of which length, and beside which stretches that follow no model."""
+"""Choose the window length and mask disturbed intervals."""
 
 from __future__ import annotations
 
