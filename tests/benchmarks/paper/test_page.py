@@ -1,3 +1,5 @@
+"""Rows of the paper's page; what the page in the docs shows is compared in test_commands.py."""
+
 import json
 from pathlib import Path
 from typing import Any
@@ -5,7 +7,7 @@ from typing import Any
 import pytest
 
 from benchmarks.paper.model_card import read_card
-from benchmarks.paper.page import DIFFERENCES, paper_page, read_all
+from benchmarks.paper.page import DIFFERENCES, paper_page
 from benchmarks.paper.rows import HEAD, ROWS, read_comparison
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import SHIPPED
@@ -51,12 +53,6 @@ def test_rows_that_were_not_run_give_their_command() -> None:
     assert "robustness.png" not in page
 
 
-def test_our_number_stands_beside_the_papers() -> None:
-    row = line(paper_page([results("paper")]), "10 runs of 40 s")
-    assert "simulation 9/10 | 8/10 kept, 9/10 successful (95 %: 60 to 98 %), 11.0 +- 0.5 rad |" in row
-    assert "0.25" in row
-
-
 def test_baselines_do_not_pass_for_a_trained_policy() -> None:
     page = paper_page([results("paper", "scripted", angle=2.0), results("paper", "hold", angle=0.0)])
     assert "not run" in line(page, "10 runs of 40 s")
@@ -85,11 +81,6 @@ def test_a_replay_does_not_pass_for_the_policy() -> None:
     assert "not run" in line(page, "the policy in the same worlds")
 
 
-def test_a_row_names_the_commit_of_its_results() -> None:
-    row = line(paper_page([results("paper") | {"commit": "abc123"}]), "best of these runs")
-    assert row.endswith("`python -m tactile_cube.evaluate protocol=paper` | abc123 |")
-
-
 def test_a_dirty_tree_is_called_one() -> None:
     clean, dirty = (paper_page([results("paper") | {"commit": name}]) for name in ("abc123", "abc123-dirty"))
     assert "working tree" not in clean
@@ -105,34 +96,6 @@ def test_the_newest_run_counts() -> None:
     assert "13.0 rad" in line(page, "best of these runs")
 
 
-def test_variants_are_listed() -> None:
-    assert "| nominal | 11.0 | 8/10 | 8/10 |" in paper_page([results("sim_to_sim")])
-
-
-def variant(name: str, angle: float, kept: int = 5, **where: object) -> dict[str, Any]:
-    summary = {"mean_angle": angle, "std_angle": 0.5, "best_angle": angle, "kept": kept, "episodes": 5, "verdicts": {}}
-    return {"variant": {"name": name, **where}, "summary": summary, "episodes": []}
-
-
-def test_one_axis_of_the_map_is_one_row() -> None:
-    found = results("perturbations")
-    found["variants"] = [
-        variant("nominal", 15.0),
-        variant("cube 70 mm", 10.62, 4, axis="cube edge [mm]", value=70),
-        variant("cube 90 mm", 4.7, 2, axis="cube edge [mm]", value=90),
-        variant("mass 25 g", 12.0, 3, axis="cube mass [g]", value=25),
-    ]
-    assert "robustness.png)" in paper_page([found])
-    shown = "cube edge [mm] 70: 4/5 kept; 90: 2/5 kept"
-    assert f"| {shown} |" in line(paper_page([found]), "other cubes")
-
-
-def test_what_breaks_the_policy_is_named_the_worst_first() -> None:
-    found = results("sim_to_sim")
-    found["variants"] = [variant("nominal", 10.0), variant("cogging", 8.1), variant("delay", 7.9), variant("lag", 2.0)]
-    assert "the first to identify: lag (2.0 rad), delay (7.9 rad)." in paper_page([found])
-
-
 def test_what_training_cost_is_read_from_the_shipped_card() -> None:
     card = read_card(SHIPPED / "published.md")
     assert float(card["CPU hours"].split()[0]) > 0
@@ -142,28 +105,11 @@ def test_what_training_cost_is_read_from_the_shipped_card() -> None:
     )
 
 
-def test_a_finger_in_free_space_stands_beside_figure_4(tmp_path: Path) -> None:
-    trials = [{"initialisation": 0}, {"initialisation": 0}, {"initialisation": 1}]
-    file = tmp_path / "comparison.json"
-    file.write_text(json.dumps({"band": {"inside": 0.934, "simulations": 40}, "trials": trials, "seconds": 36}))
-    row = line(paper_page([], free_finger=read_comparison(file)), "one finger")
-    assert (
-        "| 93 % of the samples of 3 recordings of 2 initialisations of a simulated finger lie among 40 | | 0.01" in row
-    )
-
-
 def test_a_comparison_without_a_band_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "comparison.json"
     file.write_text(json.dumps({"band": None}))
     with pytest.raises(InputError, match=r"no band of randomised simulations; run compare with band\.simulations=50"):
         read_comparison(file)
-
-
-def test_results_files_are_found(tmp_path: Path) -> None:
-    (tmp_path / "a").mkdir()
-    (tmp_path / "a" / "paper.json").write_text(json.dumps(results("paper")))
-    assert [one["protocol"] for one in read_all(tmp_path)] == ["paper"]
-    assert read_all(tmp_path / "none") == []
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.what)
