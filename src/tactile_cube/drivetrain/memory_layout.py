@@ -104,7 +104,7 @@ def _joint_constants(joints: int) -> dict[str, Shape]:
         "angle_offset",
         "goal",
     )
-    single = ("time_constant", "tendon_stiffness", "tendon_damping", "contact_torque_limit")
+    single = ("time_constant", "tendon_stiffness", "tendon_damping", "contact_torque_limit", "weighed")
     return {**dict.fromkeys(per_joint, (joints,)), **dict.fromkeys(single, (1,))}
 
 

@@ -42,5 +42,5 @@ LEAD = 17
 GAP = 18
 """Where the motor stands in its transmission: 0 there is no gap, 1 on a flank, 2 free, so that it does not show q."""
 WEIGHT = 19
-"""Torque that holds the links against gravity [N m]: a part of LOAD."""
+"""Torque that holds the links against gravity [N m]: a part of LOAD. Zero unless some effect `weighs`."""
 ROWS = 20

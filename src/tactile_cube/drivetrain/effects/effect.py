@@ -115,6 +115,8 @@ class Effect:
     """Parameters that a search frees last, where a form fits the data already."""
     contains: ClassVar[tuple[str, ...]] = ()
     """Names of simpler effects that are special cases of this one."""
+    weighs: ClassVar[bool] = False
+    """Whether the law reads WEIGHT, which makes a step several per cent slower."""
     constant_reading: ClassVar[str] = ""
     """The parameter that adds a constant to the measured position, as the joint offset of an initialisation does."""
     from_residual: ClassVar[tuple[str, ...]] = ("harmonic", "torque_0")

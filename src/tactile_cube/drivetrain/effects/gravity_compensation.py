@@ -18,6 +18,7 @@ class GravityCompensation(Effect):
 
     name = "gravity_compensation"
     stage = Stage.MOTOR_TORQUE
+    weighs = True
     parameters = (Parameter("share", "1", 0.0, -0.5, 1.5, 0.8, "0 none, 1 all of it"),)
 
     @staticmethod
