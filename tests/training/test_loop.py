@@ -105,7 +105,7 @@ def test_run_gives_up_without_regrasping_and_finishes_early_when_good(tmp_path: 
     assert "no regrasping" in tiny_run(tmp_path / "a", stop_if_no_regrasp_by=80).train()
     good = tiny_run(tmp_path / "b", stop_when_angle_above=0.0001, random_steps=0)
     good.learner.episodes.angles.append(1.0)
-    assert "stop_when_angle_above" in good.train()
+    assert good.train() == "mastered: above 0.0001 rad"
 
 
 def test_warm_start_takes_networks_from_checkpoint_and_policy(tmp_path: Path) -> None:

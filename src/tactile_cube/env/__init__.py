@@ -2,11 +2,12 @@
 
 from tactile_cube.env.conditions import Conditions, Curriculum
 from tactile_cube.env.cube_pose import CubePose, cube_pose
-from tactile_cube.env.reward import REWARD_TERMS, Reward
+from tactile_cube.env.reward import BORNE_TERMS, REWARD_TERMS, Reward
 from tactile_cube.env.rotation import Moment, RotationEnv
 from tactile_cube.env.task import OUTCOMES, Task
 
 __all__ = [
+    "BORNE_TERMS",
     "OUTCOMES",
     "REWARD_TERMS",
     "Conditions",

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tactile_cube.env import reward as terms
 from tactile_cube.env.conditions import Conditions
 from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
-from tactile_cube.env.reward import REWARD_TERMS, Reward
+from tactile_cube.env.reward import Reward
 from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
+from tactile_cube.env.touch import borne, normal_forces
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses
 from tactile_cube.simulation import EpisodeConstants, World
@@ -35,7 +36,7 @@ class Moment:
         object_state: what only the critic may see `(13 + joints,)`: cube position (3) [m], sin 4theta, cos 4theta, phi,
             psi, linear velocity (3) [m/s], angular velocity (3) [rad/s], q_f (joints) [rad]. Source: paper, section II.
         theta: rotation since the start in the rewarded direction, unwrapped [rad].
-        reward_terms: the terms before weighing, in the order of REWARD_TERMS `(8,)`.
+        reward_terms: the terms before weighing, in the order of `Reward.terms`.
         reward: their weighted sum.
         outcome: index into OUTCOMES; anything but 0 ends the episode.
         step: policy steps since the start.
@@ -131,7 +132,7 @@ class RotationEnv:
         self._limit = self.reward.fastest * self.world.options.policy_dt
         self._first = self._pose = self._pose_now(None)
         self._tips = self._azimuths()
-        self._moment = self._observe(np.zeros(len(REWARD_TERMS)), RUNNING, 0)
+        self._moment = self._observe(np.zeros(len(self.reward.terms)), RUNNING, 0)
         return self._moment
 
     def step(self, action: Array) -> Moment:
@@ -168,6 +169,7 @@ class RotationEnv:
     def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
         turned = terms.spin(before, after, self.task.direction, self._limit)
         tips, self._tips = self._tips, self._azimuths()
+        held = (terms.climb(self._first, after), *borne(normal_forces(self.world))) if self.reward.borne_terms else ()
         return np.array(
             (
                 turned,
@@ -178,6 +180,7 @@ class RotationEnv:
                 terms.off_centre(self._first, after),
                 terms.leaving(outcome in LOST),
                 terms.advance(turned, self.task.direction, tips, self._tips),
+                *held,
             )
         )
 
@@ -196,6 +199,6 @@ class RotationEnv:
 
     def _fault(self, step: int) -> Moment:
         last = self._moment
-        nothing = np.zeros(len(REWARD_TERMS))
+        nothing = np.zeros(len(self.reward.terms))
         state = (last.joint_position, last.control_error, last.object_state, last.theta)
         return Moment(*state, nothing, 0.0, FAULTY, step)

@@ -12,19 +12,18 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from tactile_cube.env.conditions import Conditions, Curriculum
-from tactile_cube.env.reward import REWARD_TERMS
 from tactile_cube.env.rotation import OBJECT, Moment, RotationEnv
 from tactile_cube.env.task import FAULTY, OUTCOMES
 
 
-def float_sizes(joints: int) -> dict[str, int]:
+def float_sizes(joints: int, terms: int) -> dict[str, int]:
     """Keys and sizes of the real-valued observations of a hand with so many joints, as Moment describes them."""
     return {
         "joint_position": joints,
         "control_error": joints,
         "object_state": OBJECT + joints,
         "theta": 1,
-        "reward_terms": len(REWARD_TERMS),
+        "reward_terms": terms,
     }
 
 
@@ -32,9 +31,9 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
     """Rotation tasks side by side, batch size `[worlds]`.
 
     Keys, for a hand with 12 joints: "joint_position" (12), "control_error" (12), "object_state" (25), "theta" (1),
-    "reward_terms" (8), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1), "action" (12),
-    "reward" (1), "done", "terminated", "truncated" (1). Transitions whose "faulty" is true come from broken physics
-    and must not be learned from.
+    "reward_terms" (8, or 12, see Reward.terms), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1),
+    "action" (12), "reward" (1), "done", "terminated", "truncated" (1). Transitions whose "faulty" is true come from
+    broken physics and must not be learned from.
 
     Example:
         >>> env = WorldsEnv([RotationEnv(...), RotationEnv(...)])
@@ -53,8 +52,8 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         self._seed_tasks(0)
 
     def _make_specs(self) -> None:
-        n, joints = len(self.tasks), self.tasks[0].hand.joints
-        spec = Composite({key: Unbounded((n, size)) for key, size in float_sizes(joints).items()}, shape=(n,))
+        n, joints, terms = len(self.tasks), self.tasks[0].hand.joints, len(self.tasks[0].reward.terms)
+        spec = Composite({key: Unbounded((n, size)) for key, size in float_sizes(joints, terms).items()}, shape=(n,))
         spec["episode_step"] = Unbounded((n, 1), dtype=torch.int64)
         spec["outcome"] = Categorical(len(OUTCOMES), shape=(n, 1), dtype=torch.int64)
         spec["faulty"] = Categorical(2, shape=(n, 1), dtype=torch.bool)

@@ -11,7 +11,7 @@ from torchrl.envs import TransformedEnv
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
-from tactile_cube.env import OUTCOMES, REWARD_TERMS, Conditions
+from tactile_cube.env import OUTCOMES, Conditions
 from tactile_cube.env.rotation import OBJECT
 from tactile_cube.training.collection import MakeEnv
 from tactile_cube.training.loop import RewardWeights
@@ -29,6 +29,7 @@ class Environment:
         reward_terms: number of reward terms.
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
+        logged_terms: names of the last reward terms, whose means the training curves show.
         approximations: what its worlds compute less well than they could, in words.
     """
 
@@ -37,6 +38,7 @@ class Environment:
     reward_terms: int
     reward_weights: RewardWeights
     outcomes: tuple[str, ...] = ()
+    logged_terms: tuple[str, ...] = ()
     approximations: tuple[str, ...] = ()
 
 
@@ -46,9 +48,10 @@ def rotation_environment(config: EnvConfig) -> Environment:
     return Environment(
         make=functools.partial(_make, config),
         sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
-        reward_terms=len(REWARD_TERMS),
+        reward_terms=len(config.reward.terms),
         reward_weights=functools.partial(_weights, config),
         outcomes=tuple(OUTCOMES),
+        logged_terms=config.reward.borne_terms,
         approximations=tuple(config.approximations()),
     )
 

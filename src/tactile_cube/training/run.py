@@ -19,6 +19,8 @@ from tactile_cube.training.loop import Learner
 from tactile_cube.training.progress import ProgressLine, clock
 
 INTERRUPTED = "interrupted"
+MASTERED = "mastered:"
+"""How the reason begins for which a run ended that came to its goal."""
 POLICY, BEST_POLICY = "policy.safetensors", "policy_best.safetensors"
 
 
@@ -148,11 +150,11 @@ class Run:
 
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
-        angle = self.learner.episodes.mean_angle
+        angle, kept = self.learner.episodes.mean_angle, self.learner.episodes.kept
         if steps >= settings.steps:
             return f"all {settings.steps} steps done"
-        if settings.stop_when_angle_above is not None and angle > settings.stop_when_angle_above:
-            return f"mean final angle {angle:.2f} rad is above training.stop_when_angle_above"
+        if settings.mastered(angle, kept):
+            return f"{MASTERED} above {settings.goal}"
         deadline = settings.stop_if_no_regrasp_by
         if deadline is not None and steps >= deadline and self.best_angle < settings.regrasp_angle:
             return f"no regrasping (mean final angle never above {settings.regrasp_angle:g} rad) by {deadline} steps"
