@@ -15,7 +15,7 @@ from tactile_cube.env.reward import Reward
 from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
 from tactile_cube.env.touch import borne, normal_forces
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
-from tactile_cube.randomization import GraspTable, Randomization, StartPoses
+from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places
 from tactile_cube.simulation import EpisodeConstants, World
 
 Array = NDArray[np.float64]
@@ -72,6 +72,9 @@ class RotationEnv:
         world: what simulates.
         constants: constants of the running episode.
         conditions: conditions of the next episode.
+        steered: names of the constants that are drawn by `odds`.
+        odds: probability of each part of their ranges, in the next episode.
+        places: where in their ranges they lie in the running episode, each in [0, 1).
         target: q_n of the last step `(joints,)` [rad].
 
     Example:
@@ -107,6 +110,9 @@ class RotationEnv:
         self.start_poses = start
         self._frame = frame_along(task.axis_vector())
         self.conditions = task.conditions()
+        unknown = randomization.learnability(self.nominal)
+        self.steered, self.odds = tuple(unknown.ranges), unknown.odds
+        self.places = np.zeros(len(self.steered))
         self.constants = self.nominal
         self.target = np.asarray(hand.start_angles, dtype=np.float64)
         self._middle = 0.5 * (np.asarray(hand.action_lower) + np.asarray(hand.action_upper))
@@ -125,7 +131,9 @@ class RotationEnv:
         """Starts the next episode."""
         rng = np.random.default_rng([self._seed, self._index, self._episode])
         self._episode += 1
-        drawn = self.randomization.constants(self.nominal, rng)
+        self.places = drawn_places(self.odds, rng)
+        places = dict(zip(self.steered, self.places.tolist(), strict=True))
+        drawn = self.randomization.constants(self.nominal, rng, places)
         self.constants = self.task.apply(drawn, self.conditions)
         self.world.reset(self.constants, self.start_poses.sample(self.randomization, self.constants, rng))
         self._weights = self.reward.weights(self.conditions.penalty_scale)

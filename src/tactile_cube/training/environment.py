@@ -1,6 +1,7 @@
 """What training needs to know about an environment besides how to make one."""
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.env import OUTCOMES, Conditions
 from tactile_cube.env.rotation import OBJECT
+from tactile_cube.randomization import Learnability
 from tactile_cube.training.collection import MakeEnv
 from tactile_cube.training.loop import RewardWeights
 from tactile_cube.transforms import EnvConfig, make_env
@@ -29,6 +31,7 @@ class Environment:
         reward_terms: number of reward terms.
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
+        learnability: makes what keeps account of the worlds; None: nothing does.
         logged_terms: names of the last reward terms, whose means the training curves show.
         approximations: what its worlds compute less well than they could, in words.
     """
@@ -39,6 +42,7 @@ class Environment:
     reward_weights: RewardWeights
     outcomes: tuple[str, ...] = ()
     logged_terms: tuple[str, ...] = ()
+    learnability: Callable[[], Learnability] | None = None
     approximations: tuple[str, ...] = ()
 
 
@@ -52,6 +56,7 @@ def rotation_environment(config: EnvConfig) -> Environment:
         reward_weights=functools.partial(_weights, config),
         outcomes=tuple(OUTCOMES),
         logged_terms=config.reward.borne_terms,
+        learnability=functools.partial(config.randomization.learnability, config.constants),
         approximations=tuple(config.approximations()),
     )
 

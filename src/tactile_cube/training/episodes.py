@@ -4,7 +4,10 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from tensordict import TensorDictBase
+
+from tactile_cube.randomization import Learnability
 
 WINDOW = 50
 """Episodes, and blocks of steps, that the statistics go back."""
@@ -16,10 +19,14 @@ class EpisodeStatistics:
     Args:
         outcomes: names of the outcome codes, e.g. ("running", "time", "dropped", ...); empty if the world has none.
         terms: names of the last reward terms; their means over all steps of the last blocks are logged.
+        worlds: what becomes of the worlds that episodes draw.
     """
 
-    def __init__(self, outcomes: Sequence[str] = (), terms: Sequence[str] = ()):
+    def __init__(
+        self, outcomes: Sequence[str] = (), terms: Sequence[str] = (), worlds: Learnability | None = None
+    ) -> None:
         self.outcomes, self.terms = tuple(outcomes), tuple(terms)
+        self.worlds = worlds or Learnability({}, 0.0)
         self.measured: deque[list[float]] = deque(maxlen=WINDOW)
         self.angles: deque[float] = deque(maxlen=WINDOW)
         self.lengths: deque[float] = deque(maxlen=WINDOW)
@@ -44,6 +51,8 @@ class EpisodeStatistics:
         last = following.transpose(0, 1)[counted.t()]
         self.angles.extend(last["theta"].flatten().tolist())
         self.lengths.extend(last["episode_step"].float().flatten().tolist())
+        if self.worlds.ranges:
+            self.worlds.add(last["places"].double().numpy(), last["terminated"].squeeze(-1).numpy())
         if self.outcomes:
             self.endings.extend(last["outcome"].flatten().tolist())
 
@@ -77,10 +86,11 @@ class EpisodeStatistics:
     def state_dict(self) -> dict[str, Any]:
         """The window and the counts."""
         windows = {name: list(getattr(self, name)) for name in ("angles", "lengths", "endings", "measured")}
-        return {**windows, "episodes": self.episodes, "faulty": self.faulty}
+        return {**windows, "episodes": self.episodes, "faulty": self.faulty, "lost": self.worlds.lost.tolist()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Inverse of `state_dict`."""
         for name in ("angles", "lengths", "endings", "measured"):
             setattr(self, name, deque(state.get(name, ()), maxlen=WINDOW))
         self.episodes, self.faulty = state["episodes"], state["faulty"]
+        self.worlds.lost = np.array(state.get("lost", [])).reshape(self.worlds.lost.shape)

@@ -30,7 +30,14 @@ class ProgressLine:
         self._printed = time.perf_counter()
         self._at_print = (steps, updates)
 
-    def show(self, steps: int, updates: int, summary: Mapping[str, float], conditions: Mapping[str, float]) -> None:
+    def show(
+        self,
+        steps: int,
+        updates: int,
+        summary: Mapping[str, float],
+        conditions: Mapping[str, float],
+        worlds: str = "",
+    ) -> None:
         """Print if the last line is old enough.
 
         Args:
@@ -38,6 +45,7 @@ class ProgressLine:
             updates: gradient steps so far.
             summary: statistics of episodes, see EpisodeStatistics.summary.
             conditions: the curriculum's values in force.
+            worlds: in which of them most is lost, in words.
         """
         now = time.perf_counter()
         if now - self._printed < INTERVAL:
@@ -55,6 +63,7 @@ class ProgressLine:
             f"{step_rate:4.0f} steps/s {update_rate:4.0f} updates/s",
             f"final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps",
             *kept,
+            *filter(None, [worlds]),
             values,
             f"{clock(left)} left",
         ]

@@ -138,7 +138,7 @@ class Run:
         now = time.perf_counter()
         self._iteration_ended, self._iteration_seconds = now, now - self._iteration_ended
         summary = learner.episodes.summary()
-        self.line.show(learner.steps, learner.updates, summary, conditions)
+        self.line.show(learner.steps, learner.updates, summary, conditions, learner.episodes.worlds.hardest)
         if learner.iteration % learner.settings.log_iterations == 0:
             losses = {key: float(value) for key, value in learner.metrics.items()}
             costs = self.ledger.costs()
