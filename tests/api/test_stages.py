@@ -1,7 +1,6 @@
 """A training in stages, by the one command."""
 
 import csv
-import json
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from tactile_cube.agent.policy_file import load_policy
 from tactile_cube.api import stages
 from tactile_cube.api.job import Job, called_job
 from tactile_cube.api.training import TrainingResult
+from tactile_cube.evaluation.ancestry import read_ancestry
 from tactile_cube.training.run import INTERRUPTED, Run
 
 TINY = [
@@ -132,7 +132,7 @@ def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_poli
     same, other = (load_policy(one / "policy.safetensors")[0].state_dict() for one in (tmp_path / "whole", parts))
     assert all(torch.equal(same[key], other[key]) for key in same)
     assert all((parts / engine / "results.json").is_file() for engine in ("bullet", "mujoco"))
-    assert json.loads((parts / "ledger.json").read_text())["steps"] == 96
+    assert [(run.name, run.steps) for run in read_ancestry([parts])] == [("parts", 96)]
     with (parts / "metrics.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [(row["stage"], int(row["steps"])) for row in rows][3:5] == [("gaiting", 32), ("holding", 40)]
