@@ -54,9 +54,9 @@ def test_climb_is_the_squared_height_above_the_start_and_a_lower_object_costs_no
 
 def test_terms_of_how_the_object_is_held_are_there_only_with_a_weight() -> None:
     assert Reward().terms == REWARD_TERMS
-    held = Reward(climb=400, tips=0.25, links=0.5, link_force=2)
+    held = Reward(climb=400, link_spin=8, tips=0.25, links=0.5, link_force=2)
     assert held.terms == REWARD_TERMS + BORNE_TERMS
-    assert held.weights().tolist() == [*Reward().weights().tolist(), -400, 0.25, -0.5, -2]
+    assert held.weights().tolist() == [*Reward().weights().tolist(), -400, -8, 0.25, -0.5, -2]
 
 
 def test_published_weights_and_their_signs() -> None:

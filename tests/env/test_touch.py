@@ -47,6 +47,20 @@ def test_a_grasp_is_held_by_tips_alone(engine: Any) -> None:
     env = RotationEnv(world, Task("full"), Reward(tips=1.0), Randomization(), start)
     env.reset()
     grasp = (world.q_f - env._middle) / env._half_range
-    held = dict(zip(BORNE_TERMS, env.step(grasp).reward_terms[-4:].tolist(), strict=True))
+    held = dict(zip(BORNE_TERMS, env.step(grasp).reward_terms[-5:].tolist(), strict=True))
     assert (held["tips"], held["links"], held["link_force"]) == (1.0, 0.0, 0.0)
     world.close()
+
+
+@pytest.mark.parametrize(("link", "paid"), [(-1, 0.0), (1, 0.05)])
+def test_a_turn_counts_as_the_links_own_only_while_one_touches(
+    link: int, paid: float, scripted_world: Any, rotation_task: Any
+) -> None:
+    world = scripted_world(turn=0.05)
+    name = DLR_HAND2.fingers[2].name
+    touch = SimpleNamespace(finger=name, link=DLR_HAND2.link_names(2)[link], other="cube", force=1.0)
+    world.contacts, world.hand = lambda: [touch], DLR_HAND2
+    env = rotation_task(world, task=Task("full", direction=1), reward=Reward(link_spin=8.0))
+    env.reset()
+    terms = dict(zip(BORNE_TERMS, env.step(np.zeros(12)).reward_terms[-5:].tolist(), strict=True))
+    assert terms["link_spin"] == pytest.approx(paid)

@@ -32,16 +32,19 @@ class Stage:
     """One training of several.
 
     Attributes:
-        name: also of its folder.
         job: what it trains; its networks come from the stage before.
         title: which one it is and what it comes to an end at, in words.
         steps: environment steps, at most.
     """
 
-    name: str
     job: Job
     title: str
     steps: int
+
+    @property
+    def name(self) -> str:
+        """That of its folder."""
+        return self.job.folder.name
 
 
 def run_stages(job: Job) -> TrainingResult:
@@ -75,21 +78,19 @@ def stages_of(job: Job) -> list[Stage]:
     jobs: list[Job] = []
     for name, words in job.config.stages.items():
         asked = {_key(word): word for word in (*words, *own, f"name={name}")}
-        jobs.append(called_job("train", tuple(asked.values()), job.folder / name))
+        jobs.append(called_job("train", tuple(asked.values()), job.folder / name, model=job.config.model))
         config: Any = jobs[-1].config
         if len(jobs) > 1:
             config.training.init_from = str(jobs[-2].folder / "checkpoint.pt")
         if "file" in config.start and config.start.file is None:
             config.start.file = _own_grasps(jobs[-1], job.folder / "grasps.npz")
-    settings = [TrainingSettings(**dict(one.config.training)) for one in jobs]
-    titles = [
-        f"stage {number} of {len(jobs)}, {one.folder.name}" + (f", until {given.goal}" if given.goal else "")
-        for number, (one, given) in enumerate(zip(jobs, settings, strict=True), 1)
-    ]
-    return [
-        Stage(one.folder.name, one, title, given.steps)
-        for one, title, given in zip(jobs, titles, settings, strict=True)
-    ]
+    return [_stage(one, f"stage {number} of {len(jobs)}") for number, one in enumerate(jobs, 1)]
+
+
+def _stage(job: Job, which: str) -> Stage:
+    training = TrainingSettings(**dict(job.config.training))
+    until = f", until {training.goal}" if training.goal else ""
+    return Stage(job, f"{which}, {job.folder.name}{until}", training.steps)
 
 
 def overview(stages: Sequence[Stage], results: Sequence[TrainingResult]) -> str:

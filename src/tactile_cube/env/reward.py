@@ -18,7 +18,7 @@ from tactile_cube.errors import InputError
 
 REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "off_centre", "leaving", "advance")
 """Names and order of the terms in the key "reward_terms"."""
-BORNE_TERMS = ("climb", "tips", "links", "link_force")
+BORNE_TERMS = ("climb", "link_spin", "tips", "links", "link_force")
 """Further terms, of how the object is held: measured, and part of that key, only where one of them has a weight."""
 
 
@@ -100,6 +100,8 @@ class Reward:
         advance: of fingertips that go ahead of the object [1/rad]; 0 in the paper.
         fastest: rotation above this rate earns nothing more [rad/s].
         climb: penalty for an object above where it began [1/m^2]; 0 in the paper, as all that follow.
+        link_spin: penalty for rotation in a step at whose end another link than a fingertip touches the object [1/rad].
+            Below `spin` a hand that rests has nothing to gain by it.
         tips: of a step at whose end three or more fingertips touch the object.
         links: penalty for one at whose end another link touches it.
         link_force: penalty for the share of these links in the normal force.
@@ -115,6 +117,7 @@ class Reward:
     advance: float = 0.0
     fastest: float = 1.0
     climb: float = 0.0
+    link_spin: float = 0.0
     tips: float = 0.0
     links: float = 0.0
     link_force: float = 0.0
@@ -145,5 +148,5 @@ class Reward:
         """
         motion = [-penalty_scale * w for w in (self.height, self.plane, self.tilt)]
         others = [-self.proximal, -self.off_centre, -self.leaving, self.advance]
-        borne = [-self.climb, self.tips, -self.links, -self.link_force] if self.borne_terms else []
+        borne = [-self.climb, -self.link_spin, self.tips, -self.links, -self.link_force] if self.borne_terms else []
         return np.array([self.spin, *motion, *others, *borne], dtype=np.float32)

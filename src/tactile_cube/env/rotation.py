@@ -177,7 +177,6 @@ class RotationEnv:
     def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
         turned = terms.spin(before, after, self.task.direction, self._limit)
         tips, self._tips = self._tips, self._azimuths()
-        held = (terms.climb(self._first, after), *borne(normal_forces(self.world))) if self.reward.borne_terms else ()
         return np.array(
             (
                 turned,
@@ -188,9 +187,16 @@ class RotationEnv:
                 terms.off_centre(self._first, after),
                 terms.leaving(outcome in LOST),
                 terms.advance(turned, self.task.direction, tips, self._tips),
-                *held,
+                *self._held(turned, after),
             )
         )
+
+    def _held(self, turned: float, after: CubePose) -> tuple[float, ...]:
+        """The terms of how the object is held; none where they earn nothing."""
+        if not self.reward.borne_terms:
+            return ()
+        tips, links, share = borne(normal_forces(self.world))
+        return terms.climb(self._first, after), max(turned, 0.0) * links, tips, links, share
 
     def _observe(self, measured: Array, outcome: int, step: int) -> Moment:
         world, pose = self.world, self._pose

@@ -31,7 +31,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
     """Rotation tasks side by side, batch size `[worlds]`.
 
     Keys, for a hand with 12 joints: "joint_position" (12), "control_error" (12), "object_state" (25), "theta" (1),
-    "reward_terms" (8, or 12, see Reward.terms), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1),
+    "reward_terms" (8, or 13, see Reward.terms), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1),
     "action" (12), "reward" (1), "done", "terminated", "truncated" (1); where constants are steered also "places", see
     RotationEnv. Transitions whose "faulty" is true come from broken physics and must not be learned from.
 
