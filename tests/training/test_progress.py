@@ -28,9 +28,9 @@ def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytes
         "T_s 0.25",
         "90 % kept",
         "stage 1 of 2",
-        "0 min 30 s left",
+        "| at most 0 min 30 s left",
     ):
         assert part in text
     line.later = 0
     line.show(12_000, 3000, summary, {"T_s": 0.25})  # the last barrier lies beyond the end
-    assert stream.getvalue().rstrip().endswith("0 min 00 s left")
+    assert stream.getvalue().rstrip().endswith("at most 0 min 00 s left")

@@ -65,7 +65,7 @@ class ProgressLine:
             *kept,
             *filter(None, [worlds]),
             values,
-            f"{clock(left)} left",
+            f"{'at most ' if self.stage else ''}{clock(left)} left",
         ]
         self.say(" | ".join(parts), in_place=self._stream.isatty())
 
