@@ -25,6 +25,7 @@ class Asked:
         repeats: bool = False,
     ) -> None:
         self.run: list[int] = []
+        self.known: list[tuple[object, ...]] = []
         self.levels: tuple[object, ...] = ((),)
         self.kinds, self.left, self.bases, self.rows, self.repeats = kinds, left, bases, rows, repeats
 
@@ -32,13 +33,15 @@ class Asked:
         rows, error = (50, self.bases[0]) if longer == 1 else (self.rows, self.bases[1])
         return SimpleNamespace(rows=rows, criteria=STANDARD, base=SimpleNamespace(largest_error=error))
 
-    def answered(self, search: SimpleNamespace) -> object:
+    def answered(self, search: SimpleNamespace, known: tuple[object, ...]) -> object:
         place = len(self.run)
         self.run.append(search.rows)
         error = self.bases[place]
         findings = SimpleNamespace(base=SimpleNamespace(largest_error=error, error=error), levels=self.levels)
         simulations = SimpleNamespace(as_repeats=lambda one: self.repeats)
-        verdict = SimpleNamespace(kind=self.kinds[place], chosen=SimpleNamespace(largest_error=self.left[place]))
+        chosen = SimpleNamespace(largest_error=self.left[place])
+        verdict = SimpleNamespace(kind=self.kinds[place], chosen=chosen, rivals=("another",))
+        self.known.append(known)
         return inquiry.Answer(search, findings, simulations, verdict)  # type: ignore[arg-type]
 
     def rows_taken(self) -> int:
@@ -66,6 +69,7 @@ def test_longer_segments_answer_where_only_they_name_all(
     asked = Asked(kinds, left)
     assert asked.rows_taken() == taken
     assert asked.run == [50, 200]
+    assert [len(known) for known in asked.known] == [0, 2 if kinds[0] == "ambiguous" else 0], "only those are asked of"
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
+from tactile_cube.identification.late_commands import in_time
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import judge
 from tactile_cube.identification.search.explanation import Explanation
@@ -109,7 +110,7 @@ def diagnose(
         known: the model to begin with, whose effects are no news; None: what the recording's owner states.
         criteria: what decides.
     """
-    recording = resolved(recording, effects, say, known)
+    recording = in_time(resolved(recording, effects, say, known), effects, say, known)
     inquiry, left_out, suspected = beside_disturbances(
         Inquiry(recording, effects, engine, step, seed, say, known, criteria)
     )

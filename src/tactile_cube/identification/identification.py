@@ -14,6 +14,7 @@ from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
+from tactile_cube.identification.late_commands import in_time
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_starts import residual_candidates
@@ -117,7 +118,7 @@ def _divided(
     recording: Recording, effects: Sequence[type[Effect]], seed: int, say: Callable[[str], None]
 ) -> tuple[Search, NoiseFloor]:
     """The trials to fit and those to judge by, with the effects compiled in."""
-    recording = resolved(recording, effects, say)
+    recording = in_time(resolved(recording, effects, say), effects, say)
     fitted, held_out = held_out_split(recording, seed=seed)
     return Search(fitted, held_out, sensor_noise(recording), effects, say), noise_floor(recording)
 

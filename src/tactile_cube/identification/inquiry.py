@@ -11,6 +11,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.disturbances import Disturbance, disturbances, undisturbed
+from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.simulations import Simulations
 from tactile_cube.identification.verdict import Verdict, decide
@@ -95,9 +96,9 @@ class Inquiry:
         """What is found, in usual segments or longer ones."""
         return asked(self.search, self.search_in, self.answered, self.say)
 
-    def answered(self, search: Search) -> Answer:
-        """What one search finds."""
-        findings = search.run()
+    def answered(self, search: Search, known: Sequence[Explanation] = ()) -> Answer:
+        """What one search finds, or says of explanations that are `known`."""
+        findings = search.among(known) if known else search.run()
         simulations = Simulations(search, findings.base, noise_floor(self.recording), self.engine, self.step)
         return Answer(search, findings, simulations, decide(findings, simulations, self.criteria))
 
@@ -143,7 +144,7 @@ def beside_disturbances(inquiry: Inquiry) -> Inquired:
 def asked(
     usual: Search,
     search_in: Callable[[int], Search],
-    answered: Callable[[Search], Answer],
+    answered: Callable[[Search, Sequence[Explanation]], Answer],
     say: Callable[[str], None],
 ) -> Answer:
     """The answer of a search in usual segments, or in longer ones, where only those name all that is missing.
@@ -155,10 +156,10 @@ def asked(
     Args:
         usual: the search in usual segments.
         search_in: prepares one in segments so many times as long as usual.
-        answered: runs it.
+        answered: runs it, or judges those explanations only.
         say: takes progress lines.
     """
-    first = answered(usual)
+    first = answered(usual, ())
     base, criteria = first.findings.base, first.search.criteria
     nothing_left = base.largest_error <= criteria.floor
     if first.simulations.as_repeats(base) if nothing_left else first.says == ALL:
@@ -170,6 +171,7 @@ def asked(
         return first
     say(f"{first.verdict.kind}; once more in segments of {longer.rows} samples instead of {first.search.rows}")
     if nothing_left:
-        return first if longer.base.largest_error <= criteria.adequate else answered(longer)
-    second = answered(longer)
+        return first if longer.base.largest_error <= criteria.adequate else answered(longer, ())
+    told_apart = (first.verdict.chosen, *first.verdict.rivals) if first.verdict.kind == "ambiguous" else ()
+    second = answered(longer, told_apart)
     return second if second.verdict.kind not in NOT_ALL and second.says > first.says else first

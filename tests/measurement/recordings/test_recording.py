@@ -5,7 +5,7 @@ import polars
 import pytest
 
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.measurement.small_rig import table, write
+from tests.measurement.small_rig import URDF, table, write
 
 SHARED = Path(__file__).parents[4] / "shared" / "recordings"
 
@@ -65,3 +65,32 @@ def test_the_velocity_is_that_of_the_motion(tmp_path: Path) -> None:
 def test_the_shared_recordings_are_read_without_warnings(name: str) -> None:
     assert read_recording(SHARED / name).warnings == ()
     assert len(read_recording(SHARED / name / "validation").trials) == 4
+
+
+def test_jumps_by_a_whole_turn_are_taken_out_and_said(tmp_path: Path) -> None:
+    def wrapped(columns: dict) -> None:
+        for key in ("a.command", "a.position"):
+            columns[key] = (columns[key] + np.pi) % (2.0 * np.pi) - np.pi
+
+    def wide(columns: dict) -> None:
+        for key in ("a.command", "a.position"):
+            columns[key] += 3.0
+
+    def both(columns: dict) -> None:
+        wide(columns)
+        wrapped(columns)
+
+    urdf = URDF.replace('lower="-0.5" upper="0.5"', 'lower="-6" upper="6"')
+    true, found = (read_recording(write(tmp_path / n, spoil=s, urdf=urdf)) for n, s in (("w", wide), ("b", both)))
+    assert not any("whole turn" in line for line in true.warnings)
+    assert np.allclose(found.trials[0].position, true.trials[0].position, atol=1e-12)
+    assert np.allclose(found.trials[0].command, true.trials[0].command, atol=1e-12)
+    assert sum("whole turn" in line and "a." in line for line in found.warnings) == 2
+
+
+def test_a_command_that_scatters_beside_a_smooth_position_may_be_the_position(tmp_path: Path) -> None:
+    def exchanged(columns: dict) -> None:
+        columns["a.command"], columns["a.position"] = columns["a.position"], columns["a.command"]
+
+    (line,) = [one for one in read_recording(write(tmp_path, spoil=exchanged)).warnings if "exchanged" in one]
+    assert "'a.command' scatters" in line

@@ -30,6 +30,7 @@ from tactile_cube.identification.search.simplicity import simplest
 from tactile_cube.identification.search.special_laws import special_candidates
 from tactile_cube.identification.search.standard_model import standard_explanation
 from tactile_cube.identification.search.together import Proposal, Together
+from tactile_cube.identification.search.twins import twins
 from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
@@ -143,11 +144,21 @@ class Search(Division):
             ]
             if sets := Together(self, base, folds).run(self.leaders, best):
                 levels, surpassed, doubtful = [sets], found, []
+        found = [e for level in levels for e in level]
+        if found and (chosen := simplest(found, self.criteria)).explained(base) > self.criteria.most:
+            levels[-1] = (*levels[-1], *twins(self, chosen, base, found))
         if not levels and base.largest_error <= self.criteria.floor:
             shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
             levels = [(shared,)] if shared else []
         unproven = tuple(sorted(doubtful, key=lambda e: e.error))
         return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed))
+
+    def among(self, known: Sequence[Explanation]) -> Findings:
+        """The same of explanations that are known, and no others."""
+        base = self.base
+        self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
+        refitted = tuple(self.explanation(base, one.effects, one.fit.model, len(known)) for one in known)
+        return Findings(base, self.judged(self.start), (refitted,), ())
 
     def one_by_one(
         self, base: Explanation, standard: Explanation | None = None
@@ -183,7 +194,7 @@ class Search(Division):
         self.last_scores = screen(self.problem, frozen, wanted)
         chosen = with_groups(self.last_scores, least_gain(parent, base, self.criteria) * frozen.cost)[:REFITTED]
         self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
-        raced = of_each(self.race(frozen, chosen), FINALISTS)
+        raced = of_each(self.race(frozen, self.brief(frozen, chosen)), FINALISTS)
         raced = [*(self.restarted(frozen, *pair) for pair in raced[:RESTARTED]), *raced[RESTARTED:]]
         special = [one for pair in raced for one in self.special(frozen, *pair)]
         judged = (*raced, *special)
@@ -213,9 +224,12 @@ class Search(Division):
         self.tell(tried)
         return [pair for pair in tried if pair[1].cost <= FAR_BEHIND * fitted.cost]
 
-    def race(self, frozen: Fit, chosen: Sequence[Candidate]) -> list[tuple[Candidate, Fit]]:
-        """Refit briefly, then the leaders at length; those that stay far behind drop out. Best first."""
-        brief = sorted((self.refit(frozen, candidate, BRIEF) for candidate in chosen), key=lambda pair: pair[1].cost)
+    def brief(self, frozen: Fit, chosen: Sequence[Candidate]) -> list[tuple[Candidate, Fit]]:
+        """Brief refits, best first."""
+        return sorted((self.refit(frozen, candidate, BRIEF) for candidate in chosen), key=lambda pair: pair[1].cost)
+
+    def race(self, frozen: Fit, brief: Sequence[tuple[Candidate, Fit]]) -> list[tuple[Candidate, Fit]]:
+        """The leaders of brief refits, best first, at length; those that stay far behind drop out."""
         leaders = self.and_richer(frozen, [(c, self.continued(frozen, f)) for c, f in of_each(brief, RACED)])
         leaders.sort(key=lambda pair: pair[1].cost)
         self.tell(leaders)

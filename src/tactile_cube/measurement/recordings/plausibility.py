@@ -1,6 +1,7 @@
 """Do the numbers fit the rig? Degrees, swapped joints, a flipped sign, a joint that never moves."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ MILLIMETRE = 1e-3
 IN_DEGREES = "this looks like degrees, recordings are in rad: import it by record source=csv source.angle_unit=deg"
 IN_MILLIMETRES = "this looks like mm, recordings are in m: import it by record source=csv source.length_unit=mm"
 SLACK = 0.1  # [rad] beyond a joint's limit that offsets and soft stops explain
+WRAP = 0.5  # [rad] within which a jump is a whole turn; no joint turns so far in a row
+SMOOTH = 0.05  # of the command's scatter, below which a position is none that a sensor measured
 MOVES = 0.02  # [rad] range below which a signal says nothing about its neighbours
 
 
@@ -121,6 +124,40 @@ def check_assignment(columns: Columns, joints: list[RigJoint], path: Path) -> li
                 "are the joints swapped?"
             )
     return warnings
+
+
+def check_roles(columns: Columns, joints: tuple[str, ...], path: Path) -> list[str]:
+    """Warnings about a command that scatters as a sensor beside a position that does not: exchanged columns."""
+    return [
+        f"{path}: column '{joint}.command' scatters by {asked:.2g} from row to row and '{joint}.position' by "
+        f"{moved:.2g}, as if the one was measured and the other commanded: are they exchanged?"
+        for j, joint in enumerate(joints)
+        if (moved := _scatter(columns.position[:, j])) < SMOOTH * (asked := _scatter(columns.command[:, j]))
+        and np.ptp(columns.position[:, j]) > 0
+    ]
+
+
+def without_wraps(columns: Columns, joints: list[RigJoint], path: Path) -> tuple[Columns, list[str]]:
+    """Positions and commands [rad] without jumps by a whole turn from one row to the next, and warnings of them."""
+    turning, warnings, unwrapped = [not joint.prismatic for joint in joints], [], {}
+    for key in ("position", "command"):
+        values = getattr(columns, key)
+        steps = np.diff(values, axis=0)
+        wraps = (np.abs(np.abs(steps) - 2.0 * math.pi) < WRAP) & np.array(turning)
+        for j in np.flatnonzero(wraps.any(axis=0)):
+            row = int(np.argmax(wraps[:, j])) + 1
+            warnings.append(
+                f"{path}: column '{joints[j].name}.{key}', row {row}: {values[row, j]:.4g} after "
+                f"{values[row - 1, j]:.4g}: jumps by a whole turn are taken out ({np.count_nonzero(wraps[:, j])})"
+            )
+        turns = np.cumsum(np.where(wraps, -np.sign(steps), 0.0), axis=0)
+        unwrapped[key] = values + 2.0 * math.pi * np.vstack([np.zeros(values.shape[1]), turns])
+    return replace(columns, **unwrapped), warnings
+
+
+def _scatter(values: Array) -> float:
+    """Usual size of the third differences: zero of what is held, next to nothing of a smooth curve."""
+    return float(np.median(np.abs(np.diff(values, 3)))) if len(values) > 3 else 0.0
 
 
 def _correlation(first: Array, second: Array) -> float:

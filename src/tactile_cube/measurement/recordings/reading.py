@@ -21,7 +21,12 @@ from tactile_cube.measurement.recordings.consistency import (
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.excluded import without_excluded
 from tactile_cube.measurement.recordings.outliers import without_outliers
-from tactile_cube.measurement.recordings.plausibility import check_assignment, check_units
+from tactile_cube.measurement.recordings.plausibility import (
+    check_assignment,
+    check_roles,
+    check_units,
+    without_wraps,
+)
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.statics import swap_warning
@@ -90,9 +95,12 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
     columns, warnings = pick_columns(read_table(path, most), joints, path)
     columns, time_warnings = check_time(columns, description.rate_hz, path)
     ranges = [rig.joints[joint] for joint in joints]
+    columns, wrapped = without_wraps(columns, ranges, path)
+    warnings += wrapped
     if description.controller.mode == "position":
         warnings += check_units(columns, ranges, gains, path)
         warnings += check_assignment(columns, ranges, path) if entry.object is None else []
+        warnings += check_roles(columns, joints, path)
     columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, description.rate_hz)
     stamps = (columns.time[outlying] - columns.time[0]) * description.rate_hz
