@@ -14,6 +14,7 @@ from tactile_cube.api.environment import env_config
 from tactile_cube.composition import composed
 from tactile_cube.curriculum import NoCurriculum
 from tactile_cube.errors import InputError
+from tactile_cube.sweep import sweep_folder
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
 
@@ -89,3 +90,12 @@ def test_a_value_that_another_choice_of_a_group_had_is_named() -> None:
 @pytest.mark.parametrize("experiment", ["alone", "curriculum"])
 def test_any_curriculum_can_be_left_out(experiment: str) -> None:
     assert isinstance(env_config(f"+experiment={experiment}", "curriculum=none").curriculum, NoCurriculum)
+
+
+def test_folders_of_a_sweep_neither_begin_with_a_dash_nor_nest_nor_grow_too_long() -> None:
+    assert sweep_folder("", 3) == "seed3"
+    assert sweep_folder("task=table", 3) == "task=table-seed3"
+    assert sweep_folder("training.init_from=a/b.pt", 3) == "training.init_from=a_b.pt-seed3"
+    long = [sweep_folder("x" * 300 + end, 0) for end in "ab"]
+    assert len(long[0]) < 255
+    assert long[0] != long[1]

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from tactile_cube.completion import install_script
+from tactile_cube.command_help import install_script
 
 COMPLETE = """
 eval "$({python} -m tactile_cube.train -sc install=bash)"

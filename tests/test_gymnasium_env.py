@@ -18,8 +18,8 @@ from tactile_cube import gymnasium_env
 from tactile_cube.env import REWARD_TERMS, Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.policies import ScriptedPolicy
 from tactile_cube.evaluation.rollout import run_episode
-from tactile_cube.evaluation.scripted import ScriptedPolicy
 from tactile_cube.evaluation.verdict import Verdict, judge
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.randomization import Randomization
@@ -49,7 +49,7 @@ def test_checker_of_gymnasium_is_content() -> None:
         ("import tactile_cube; import gymnasium", "tactile_cube/Rotation-v0"),
         ("import tactile_cube.env; import gymnasium", "tactile_cube/Rotation-v0"),
         ("import gymnasium", "tactile_cube:tactile_cube/Rotation-v0"),
-        ("import gymnasium", "tactile_cube.registration:tactile_cube/Rotation-v0"),
+        ("import gymnasium", "tactile_cube.gymnasium_env:tactile_cube/Rotation-v0"),
     ],
 )
 def test_the_name_is_registered_whatever_the_order_of_imports(imports: str, name: str) -> None:

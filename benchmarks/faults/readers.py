@@ -19,7 +19,7 @@ from benchmarks.faults.mutations import VALUES, damaged
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy, sealed
-from tactile_cube.api.input_errors import as_input_errors
+from tactile_cube.api.job import as_input_errors
 from tactile_cube.composition import composed
 from tactile_cube.deployment.interface_contract import interface_contract
 from tactile_cube.deployment.network import read_network
@@ -33,7 +33,7 @@ from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import finger_urdf
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.rig import read_rig
-from tactile_cube.measurement.recordings.whole import write_whole
+from tactile_cube.measurement.recordings.writing import write_whole
 from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tactile_cube.measurement.sources.ros_bag import RosBag
 from tactile_cube.training.checkpoint import FILE, HEAD, Checkpoints, require_same_settings

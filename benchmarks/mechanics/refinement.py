@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from benchmarks.mechanics.held_cube import measure_accuracy
 from tactile_cube.hand import DLR_HAND2, Gait
 from tactile_cube.hand.gait import joint_angles
-from tactile_cube.simulation.accuracy import measure_accuracy
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.world import World

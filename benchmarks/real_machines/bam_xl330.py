@@ -12,7 +12,7 @@ from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import ControllerChange, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import read_npz
 
 MASS, LENGTH = 0.49, 0.10  # [kg], [m] of the pendulum
 STALL_TORQUE = (

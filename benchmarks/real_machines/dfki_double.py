@@ -12,7 +12,7 @@ from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.foreign_log import cut
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import read_npz
 
 RATE = 500.0  # [Hz]
 MASSES, LENGTHS, CENTRES = (0.5235, 0.6256), (0.2, 0.3), (0.2, 0.2557)  # [kg], [m], [m]

@@ -13,7 +13,7 @@ from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.foreign_log import cut
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import read_npz
 
 MASS, LENGTH = 0.676, 0.45  # [kg], [m] of weight, rod and mounting together
 INERTIA = 0.0096  # [kg m^2] about their centre: 0.546 kg at 0.5 m beside a rod of 0.13 kg

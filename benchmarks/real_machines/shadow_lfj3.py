@@ -12,7 +12,7 @@ from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import read_npz
 
 EFFORT = 1e-3  # [N m] taken for one unit of effort: the true scale is unknown, all torques and inertias share it
 RATE = 1000.0  # [Hz]

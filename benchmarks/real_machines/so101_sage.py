@@ -15,7 +15,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import read_npz
 
 Array = NDArray[np.float64]
 RATE = 50.0  # [Hz]

@@ -15,7 +15,7 @@ from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.foreign_log import cut
 from tactile_cube.measurement.sources.source import described
-from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import read_npz
 
 Array = NDArray[np.float64]
 LOGGED = 5000.0  # [Hz]

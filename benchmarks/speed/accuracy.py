@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.mechanics.held_cube import REFERENCE, Accuracy, measure_accuracy
 from benchmarks.speed.report import Figure, Section
 from tactile_cube.simulation import SimulationOptions
-from tactile_cube.simulation.accuracy import REFERENCE, Accuracy, measure_accuracy
 
 OPTIONS = {
     "fast": SimulationOptions.fast(),

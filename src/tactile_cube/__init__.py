@@ -1,7 +1,7 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
 Each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
-`export`, `deploy`, `view`, `monitor` and `effects`; `make_env`, `load_policy`, `read_recording` and
+`export`, `deploy`, `view`, `monitor` and `effects`; `search_grasps`, `make_env`, `load_policy`, `read_recording` and
 `recording_from_arrays` give what they work on. Nothing slow is imported before it is used.
 """
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.deployment import deploy
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.effects import effects
-    from tactile_cube.api.environment import env_config, make_env
+    from tactile_cube.api.environment import env_config, make_env, search_grasps
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.api.export import export, load_policy
     from tactile_cube.api.identification import identify
@@ -44,6 +44,7 @@ _PLACES = {
     "export": "api.export",
     "load_policy": "api.export",
     "identify": "api.identification",
+    "search_grasps": "api.environment",
     "monitor": "api.monitoring",
     "record": "api.recording",
     "train": "api.training",
@@ -73,6 +74,7 @@ __all__ = [
     "read_recording",
     "record",
     "recording_from_arrays",
+    "search_grasps",
     "train",
     "view",
 ]
@@ -87,4 +89,4 @@ def __getattr__(name: str) -> Any:
 
 
 # Gymnasium 1 loads no entry points of other packages
-gymnasium.register(id="tactile_cube/Rotation-v0", entry_point="tactile_cube.registration:make_rotation")
+gymnasium.register(id="tactile_cube/Rotation-v0", entry_point="tactile_cube.gymnasium_env:make_rotation")

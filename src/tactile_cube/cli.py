@@ -15,11 +15,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from tactile_cube.command_help import CONFIG, RECIPE, help_text
-from tactile_cube.completion import install_script, prepare_query
+from tactile_cube.command_help import CONFIG, RECIPE, help_text, install_script, prepare_query
 from tactile_cube.composition import refuse_unknown_keys
 from tactile_cube.console_log import console_kept_in
-from tactile_cube.did_you_mean import did_you_mean
+from tactile_cube.did_you_mean import near_key, near_option
 from tactile_cube.errors import InputError
 from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in
 
@@ -155,8 +154,7 @@ def usage_error(error: BaseException) -> str | None:
     for kinds in (InputError, ValidationError, (HydraException, OmegaConfBaseException)):
         cause = _find(error, kinds)
         if cause is not None:
-            message = _one_line(cause)
-            return message + did_you_mean(message, CONFIG)
+            return _one_line(cause)
     plain = _find(error, (TypeError, ValueError))
     if plain is not None and _raised_in(plain, NOT_AN_OPTION):
         return f"a choice from a group of conf/ is the name of a file there, e.g. task=table: {_one_line(plain)}"
@@ -195,7 +193,7 @@ def _one_line(error: BaseException) -> str:
         return "; ".join(_describe(error.title, dict(entry)) for entry in error.errors())
     # Hydra appends where it searched, which nobody asked for
     text = " ".join(str(error).partition("Config search path:")[0].split())
-    return _superfluous(text) or text or type(error).__name__
+    return _superfluous(text) or (text or type(error).__name__) + near_option(error)
 
 
 def _superfluous(text: str) -> str | None:
@@ -216,5 +214,5 @@ def _describe(title: str, entry: dict[str, Any]) -> str:
     key = ".".join([*prefix, *(str(part) for part in entry["loc"])])
     message = str(entry["msg"]).removeprefix("Value error, ")
     if entry["type"] == "extra_forbidden":
-        return f"{key}: no such setting"
+        return f"{key}: no such setting{near_key(key)}"
     return f"{key}={entry['input']}: {message}" if entry["loc"] else f"{group}: {message}"

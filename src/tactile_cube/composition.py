@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from tactile_cube.command_help import CONFIG
+from tactile_cube.did_you_mean import near_key
 from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
@@ -55,4 +56,4 @@ def refuse_unknown_keys(name: str, config: DictConfig) -> None:
     known = {"hydra", *own, *placed}
     for key in map(str, config.keys() - known):
         if not (CONFIG / key).is_dir():
-            raise InputError(f"{key}: no such setting of {name}; --help lists them")
+            raise InputError(f"{key}: no such setting of {name}; --help lists them{near_key(key)}")

@@ -1,15 +1,13 @@
 """What a mistyped name may have meant: a command, an option, a key, a policy, an effect or a joint."""
 
 import difflib
-import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-_OPTION = re.compile(r"Could not find '(?P<group>[\w/]+)/(?P<option>[^'/]+)'")
-_KEY = re.compile(r"Could not override '(?P<key>[^']+)'|^(?P<setting>[\w.]+): no such setting")
+from tactile_cube.command_help import CONFIG
 
 
 def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
@@ -29,23 +27,26 @@ def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
     return f"; did you mean {prefix}{near[0]}?" if near else ""
 
 
-def did_you_mean(message: str, tree: Path) -> str:
-    """Return the suggestion for an error of the configuration.
+def near_option(error: BaseException) -> str:
+    """Return the suggestion for an option or a key that Hydra did not find, or nothing.
 
     Args:
-        message: of Hydra or of our settings.
-        tree: folder of the configuration.
-
-    Example:
-        >>> did_you_mean("Could not override 'agent.gama'.", CONFIG)
-        '; did you mean agent.gamma?'
+        error: of Hydra; one of OmegaConf caused it where a key is unknown.
     """
-    if option := _OPTION.search(message):
-        options = (path.stem for path in (tree / option["group"]).glob("*.yaml"))
-        return suggestion(option["option"], options, f"{option['group']}=")
-    key, keys = _KEY.search(message), _keys(tree)
-    name = (key["key"] or key["setting"]) if key else ""
-    if not name or name in keys:  # another command may have that very key
+    from hydra.errors import MissingConfigException
+    from omegaconf.errors import OmegaConfBaseException
+
+    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
+        group, _, option = error.missing_cfg_file.rpartition("/")
+        return suggestion(option, map(str, error.options or ()), f"{group}=")
+    cause = error.__cause__ or error.__context__
+    return near_key(str(cause.full_key)) if isinstance(cause, OmegaConfBaseException) else ""
+
+
+def near_key(name: str) -> str:
+    """Return the suggestion for a key of the configuration that does not exist, e.g. `agent.gama`."""
+    keys = _keys(CONFIG)
+    if name in keys:  # another command may have that very key
         return ""
     last = name.rpartition(".")[2]
     same_name = [known for known in sorted(keys) if known.rpartition(".")[2] == last]

@@ -2,8 +2,8 @@
 
 What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and policy_best.safetensors,
 checkpoint.pt, checkpoint_before.pt and replay/ (to go on from), train.log (what the console showed), ledger.json
-(CPU-hours), finished.json (how it ended) and .hydra/ (configuration). A training in stages has such a folder for each of
-them in its own, and bullet/ and mujoco/ with the judgement.
+(CPU-hours), finished.json (how it ended) and .hydra/ (configuration). A training in stages has such a folder for each
+of them in its own, and bullet/ and mujoco/ with the judgement.
 """
 
 from pathlib import Path
@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 def sweep_summary(folders: list[Path]) -> None:
     """Say what came of the runs of a sweep."""
     from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
+    from tactile_cube.visualization.curves import write_sweep_curves
 
     for sweep in dict.fromkeys(folder.parent for folder in folders):
-        print(f"\n{sweep}\n\n{sweep_table(read_sweep(sweep), intervals=True)}\n")
-        print(f"this table again, and its curves: python -m tactile_cube.results sweep={sweep}")
+        runs, picture = read_sweep(sweep), sweep / "learning_curves.png"
+        write_sweep_curves(runs, picture, sweep.name)
+        print(f"\n{sweep}\n\n{sweep_table(runs, intervals=True)}\n\nlearning curves: {picture}")
 
 
 @command("train", after_sweep=sweep_summary)

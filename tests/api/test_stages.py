@@ -8,12 +8,12 @@ import pytest
 import torch
 
 import tactile_cube
+from benchmarks.paper.ancestry import read_ancestry
 from tactile_cube import InputError
 from tactile_cube.agent.policy_file import load_policy
 from tactile_cube.api import stages
 from tactile_cube.api.job import Job, called_job
 from tactile_cube.api.training import TrainingResult
-from tactile_cube.evaluation.ancestry import read_ancestry
 from tactile_cube.training.run import INTERRUPTED, Run
 
 TINY = [

@@ -156,7 +156,7 @@ def test_a_sweep_keeps_its_record_in_its_own_folder(tmp_path: Path, monkeypatch:
     code = (
         "import sys\nfrom pathlib import Path\nfrom tactile_cube.cli import command\n"
         "def seen(config): print([*map(str, Path().rglob('.sweep-*'))], [*map(str, Path().iterdir())])\n"
-        "sys.argv = ['export', '-m', 'seed=1,2']\ncommand('export')(seen)()"
+        "sys.argv = ['export', '-m', 'name=one,two']\ncommand('export')(seen)()"
     )
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert re.search(r"\['outputs/export/\.sweep-\w+'\] \['outputs'\]", run.stdout)
@@ -183,7 +183,7 @@ def test_a_sweep_goes_past_a_run_that_fails_says_what_came_of_it_and_is_given_ag
     assert "1 of 2 runs failed: " in first.stderr
     sweep = tmp_path / "outputs/train/smoke"
     setting = "collector.worlds=4-collector=single-logger=csv"
-    assert {path.name for path in sweep.iterdir()} == {f"{setting}-seed0"}
+    assert {path.name for path in sweep.iterdir()} == {f"{setting}-seed0", "learning_curves.png"}
     assert f"| {setting} | > 0.000 (at" in first.stdout
     checkpoint = sweep / f"{setting}-seed0/checkpoint.pt"
     written = checkpoint.stat().st_mtime_ns

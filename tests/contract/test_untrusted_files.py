@@ -176,7 +176,6 @@ COMMANDS = {
     "export": ["policy=evil.safetensors"],
     "deploy": ["policy=evil.safetensors", "seconds=0.1"],
     "average": ["run=run", "last=1"],
-    "ship": ["policy=evil.safetensors", "name=evil"],
     "train": ["+experiment=smoke", "training.init_from=evil.safetensors", *RUN],
     "train with a teacher": [
         "+experiment=smoke",

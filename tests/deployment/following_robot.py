@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
-from tactile_cube.deployment.limits import Limits
+from tactile_cube.deployment.limits import Limits, StopRules
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.deployment.stop_rules import StopRules
 
 TICK = 1e-3  # [s]
 SMALL = 1e-9

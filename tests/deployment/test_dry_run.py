@@ -11,8 +11,7 @@ from hydra.utils import instantiate
 import tactile_cube
 from tactile_cube.composition import composed
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.limits import RATE
-from tactile_cube.deployment.stop_rules import StopRules
+from tactile_cube.deployment.limits import RATE, StopRules
 
 
 def quiet(line: str) -> None:

@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 
 from tactile_cube.deployment.control_loop import ControlLoop
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.limits import Limits
+from tactile_cube.deployment.limits import Limits, StopRules
 from tactile_cube.deployment.run_loop import run_loop
-from tactile_cube.deployment.stop_rules import StopRules
 from tests.deployment.following_robot import (
     FollowingRobot,
     Spoil,

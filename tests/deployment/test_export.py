@@ -11,10 +11,9 @@ from tactile_cube.deployment.controller import Controller
 from tactile_cube.deployment.export import export_policy
 from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.interface_contract import interface_contract
-from tactile_cube.deployment.limits import Limits
+from tactile_cube.deployment.limits import Limits, StopRules
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, hand_urdf, tip_positions
 

@@ -11,11 +11,10 @@ import pytest
 
 from tactile_cube.deployment.control_loop import ControlLoop
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.limits import Limits
+from tactile_cube.deployment.limits import Limits, StopRules
 from tactile_cube.deployment.played_targets import PlayedTargets
 from tactile_cube.deployment.ros2_hand import Ros2Hand
 from tactile_cube.deployment.run_loop import LoopRun, run_loop
-from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 from tests.deployment.fake_rclpy import Empty, JointState, Node, Stamp, node

@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from tactile_cube.env import OUTCOMES, CubePose, Task
-from tactile_cube.env.conditions import Conditions
+from tactile_cube.env.task import Conditions
 from tactile_cube.errors import InputError
 from tactile_cube.simulation import EpisodeConstants
 

@@ -1,10 +1,14 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import tactile_cube
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.grasp_search import GraspSearch, search_grasps
 from tactile_cube.hand import DLR_HAND2, tip_positions
+from tactile_cube.randomization import GraspStarts
 from tactile_cube.simulation import EpisodeConstants, World
 
 CONSTANTS = EpisodeConstants(tip_spinning_friction=0.003)
@@ -30,3 +34,12 @@ def test_what_the_fingers_cannot_bear_is_not_kept() -> None:
 def test_no_grasps_wanted_is_refused() -> None:
     with pytest.raises(InputError, match="grasps is 0"):
         search_grasps(World(), CONSTANTS, GraspSearch(), 0, seed=0)
+
+
+def test_a_program_searches_grasps_of_its_object_and_starts_in_them(tmp_path: Path) -> None:
+    found = tactile_cube.search_grasps("object=cylinder", grasps=2, seed=1)
+    found.save(tmp_path / "grasps.npz")
+    starts = GraspStarts(str(tmp_path / "grasps.npz"))
+    config = tactile_cube.env_config("object=cylinder")
+    assert len(starts.of(config.hand, config.constants).grasps.angles) == 2
+    assert found.origin["command"] == "tactile_cube.search_grasps('object=cylinder', grasps=2, seed=1)"

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.env import RotationEnv
-from tactile_cube.evaluation.replay import NearlyEqualStart
+from tactile_cube.evaluation.evaluation import NearlyEqualStart
 
 
 def displacement(env: RotationEnv, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -3,8 +3,7 @@ import pytest
 
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.senses import NumbPolicy, numb_reading
-from tactile_cube.evaluation.variant import Variant
+from tactile_cube.evaluation.variant import NumbPolicy, Variant, numb_reading
 from tactile_cube.transforms import EnvConfig
 
 

@@ -45,7 +45,7 @@ class Asked:
         return inquiry.Answer(search, findings, simulations, verdict)  # type: ignore[arg-type]
 
     def rows_taken(self) -> int:
-        usual = self.search_in(1)
+        usual = self.answered(self.search_in(1), ())
         return inquiry.asked(usual, self.search_in, self.answered, lambda line: None).search.rows  # type: ignore[arg-type]
 
 

@@ -1,12 +1,9 @@
-import platform
-import sys
-
 import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, grasp_angles
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, native_library
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 from tactile_cube.simulation import loop as loop_module
 from tactile_cube.simulation.native_library import find_compiler
 
@@ -46,42 +43,3 @@ def test_auto_runs_without_a_compiler_and_says_so(monkeypatch: pytest.MonkeyPatc
 def test_an_unknown_loop_is_refused() -> None:
     with pytest.raises(InputError, match=r"simulation\.loop is 'rust'; choose one of auto, c, python"):
         SimulationOptions(loop="rust")  # type: ignore[arg-type]
-
-
-needs_layout = pytest.mark.skipif(
-    sys.platform != "linux" or platform.machine() != "x86_64", reason="known for this layout only"
-)
-
-
-@needs_compiler
-@needs_layout
-def test_the_compiled_loop_reads_where_bullet_writes_and_gives_the_same_bits_as_from_the_copy(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    ends = []
-    for known in (True, False):
-        if not known:
-            monkeypatch.setattr(native_library.metadata, "version", lambda name: "3.2.8")
-        world = World(options=SimulationOptions(loop="c"))
-        found = world._engine._loop._who[1]  # type: ignore[attr-defined]
-        assert bool(found) == known, "PyBullet's layout is not the known one: the loop is 6 % slower"
-        world.reset(EpisodeConstants(), Start(DLR_HAND2.start_angles))
-        for _ in range(5):
-            world.step(DLR_HAND2.start_angles + 0.1)
-        ends.append(np.concatenate([world.q, world.dq, world.cube_position]))
-        world.close()
-    np.testing.assert_array_equal(*ends)
-
-
-@needs_compiler
-@needs_layout
-@pytest.mark.parametrize("wrong", [0x800310 + 8, 0x800310 - 4096, 1 << 40, 0x7FFF00000000, 0, -8])
-def test_a_status_buffer_that_is_elsewhere_or_not_mapped_is_refused(wrong: int) -> None:
-    world = World(options=SimulationOptions(loop="c"))
-    world.reset(EpisodeConstants(), Start(DLR_HAND2.start_angles))
-    engine = world._engine
-    library, handle = engine._loop._library, engine._loop._handle  # type: ignore[attr-defined]
-    finger = engine._scene.fingers[0]  # type: ignore[attr-defined]
-    assert library.locate_status_buffer(handle, finger, native_library.status_offset())
-    assert not library.locate_status_buffer(handle, finger, wrong)
-    world.close()

@@ -7,7 +7,7 @@ import pytest
 from tactile_cube.env import Task
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
-from tactile_cube.simulation.resolution import unresolved, unresolved_among
+from tactile_cube.simulation.health import unresolved, unresolved_among
 from tactile_cube.transforms import EnvConfig
 
 PAPER = 0.1

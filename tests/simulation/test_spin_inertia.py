@@ -2,8 +2,8 @@ import numpy as np
 
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.simulation.drive import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia, spin_shares
 from tactile_cube.simulation.options import SimulationOptions
-from tactile_cube.simulation.spin_inertia import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia, spin_shares
 
 SHARES = spin_shares(RigidBodyTree.from_urdf(DLR_HAND2.finger_urdf(0)))
 

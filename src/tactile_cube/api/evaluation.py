@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactile_cube.api.input_errors import as_input_errors
-from tactile_cube.api.job import Job, PathLike, Say, called_job
+from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.evaluation.episode_record import EpisodeRecord

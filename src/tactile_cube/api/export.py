@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_cube.api.input_errors import as_input_errors
-from tactile_cube.api.job import Job, PathLike, called_job
+from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.deployment.network import Network

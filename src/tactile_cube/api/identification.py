@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_cube.api.comparison import opened, recording_name
-from tactile_cube.api.input_errors import as_input_errors
-from tactile_cube.api.job import Job, PathLike, Say, called_job
+from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.drivetrain.model_file import ModelFile

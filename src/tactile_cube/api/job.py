@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from tactile_cube.cli import with_recipe
+from tactile_cube.cli import usage_error, with_recipe
 from tactile_cube.composition import composed, refuse_unknown_keys
+from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -112,3 +114,26 @@ def _effects(part: Any) -> Iterator[str]:
         if key in EFFECTS and isinstance(value, list):
             yield from (name for name in value if isinstance(name, str))
         yield from _effects(value)
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+
+def as_input_errors(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """The function with everything that the command line would tell in one line raised as an `InputError`.
+
+    Hydra's own errors, those of pydantic and those wrapped in either say the same in many more lines.
+    """
+
+    @functools.wraps(function)
+    def told(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        try:
+            return function(*args, **kwargs)
+        except Exception as error:
+            message = usage_error(error)
+            if message is None or (isinstance(error, InputError) and message == str(error)):
+                raise
+            raise InputError(message) from error
+
+    return told

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
-from tactile_cube.api.input_errors import as_input_errors
-from tactile_cube.api.job import Job, PathLike, Say, called_job
+from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactile_cube.api.input_errors import as_input_errors
-from tactile_cube.api.job import Job, PathLike, called_job
+from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.measurement.recordings.recording import Recording
@@ -39,8 +38,8 @@ def run_recording(job: Job) -> dict[str, Recording]:
     from omegaconf import OmegaConf
 
     from tactile_cube.measurement.recordings.reading import read_recording
-    from tactile_cube.measurement.recordings.whole import require_free, write_whole
-    from tactile_cube.measurement.sources.missing import require_settings
+    from tactile_cube.measurement.recordings.writing import require_free, write_whole
+    from tactile_cube.measurement.sources.source import require_settings
 
     out = Path(job.config.out)
     require_free(out)

@@ -8,9 +8,8 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.limits import Limits
+from tactile_cube.deployment.limits import Limits, StopRules
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.deployment.stop_rules import StopRules
 
 Array = NDArray[np.float64]
 AGREEING = 5

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.controller import POLICY_RATE, Controller, TargetFilter
 from tactile_cube.deployment.homing import Homing, Move
-from tactile_cube.deployment.limits import Limits, require_positive
+from tactile_cube.deployment.limits import Limits, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.deployment.stop_rules import StopRules, Watchdog
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from tactile_cube.deployment.controller import POLICY_RATE, reading_size
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.limits import RATE
+from tactile_cube.deployment.limits import RATE, StopRules
 from tactile_cube.deployment.network import Network
-from tactile_cube.deployment.stop_rules import StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.hand import Hand, HandModel
 

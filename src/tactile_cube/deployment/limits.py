@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import inf
 
 import numpy as np
@@ -65,3 +65,57 @@ class Limits:
     def reach(self) -> Array:
         """How far a command may be from the measured angle: torque / K_P `(joints,)` [rad], inf without stiffness."""
         return np.asarray(np.divide(self.torque, self.kp, out=np.full(self.kp.shape, inf), where=self.kp > 0))
+
+
+@dataclass(frozen=True)
+class StopRules:
+    """What a measurement may be, and bounds beyond which the loop stops and holds position.
+
+    Attributes:
+        silence: longest time without an accepted measurement [s]; also how far a time stamp may be off the clock.
+        lateness: longest time between two ticks [s].
+        margin: how far a measured angle may lie outside the hand's range [rad]: joint offsets are up to 0.06 rad.
+        speed: fastest that a measured angle may move [rad/s]: a simulated finger that slips off an edge reaches 12
+            for some ms.
+        saturation: longest time that a joint may demand all the torque it has [s].
+    """
+
+    silence: float = 0.02
+    lateness: float = 0.02
+    margin: float = 0.1
+    speed: float = 15.0
+    saturation: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse bounds that no hand can keep."""
+        require_positive({f"stop.{name}": value for name, value in asdict(self).items()})
+
+
+class Watchdog:
+    """Judges every tick by the stop rules.
+
+    Args:
+        rules: the bounds.
+        names: of the joints.
+    """
+
+    def __init__(self, rules: StopRules, names: tuple[str, ...]) -> None:
+        self._rules, self._names = rules, names
+        self._saturated = np.zeros(len(names))
+
+    def judge(self, dt: float, silent: float, saturated: NDArray[np.bool_]) -> str:
+        """Return why the hand must stop, in words; "" if it need not.
+
+        Args:
+            dt: since the tick before [s].
+            silent: since the last accepted measurement [s].
+            saturated: joints that demand all their torque `(joints,)`.
+        """
+        rules = self._rules
+        if dt > rules.lateness:
+            return f"tick {1e3 * dt:.0f} ms after the one before, allowed {1e3 * rules.lateness:.0f} ms"
+        if silent > rules.silence:
+            return f"no measurement for {1e3 * silent:.0f} ms, allowed {1e3 * rules.silence:.0f} ms"
+        self._saturated = np.where(saturated, self._saturated + dt, 0.0)
+        names = ", ".join(self._names[at] for at in np.flatnonzero(self._saturated > rules.saturation))
+        return f"{names}: all its torque for {rules.saturation:g} s" if names else ""

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import select
+import signal
+import sys
+import termios
+import threading
 import time
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
+from types import FrameType
 
 import numpy as np
 
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
 from tactile_cube.deployment.robot import Robot
 from tactile_cube.deployment.run_log import RunLog
-from tactile_cube.deployment.terminal import EnterKey, noted_signals
 
 NO_HAND = 5.0  # [s] without believable measurements at the beginning
 HOLD_TICKS = 200  # of the hold at the end: the command comes to rest, and a lost message does no harm
@@ -36,11 +41,6 @@ class LoopRun:
     ended: float = 0.0
     log: RunLog = field(default_factory=RunLog)
     ticks: list[float] = field(default_factory=list, repr=False)
-
-    @property
-    def homed(self) -> bool:
-        """Whether the policy came to decide."""
-        return bool(self.log.time)
 
     @property
     def tick_times(self) -> dict[str, float]:
@@ -129,3 +129,45 @@ def _announce(loop: ControlLoop, robot: Robot, say: Say, key: str) -> None:
     if loop.mode is Mode.RUNNING:
         robot.release()
     say(f"{loop.mode}: {loop.doing}" + (key if loop.mode is Mode.WAIT_FOR_OBJECT else ""))
+
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class EnterKey:
+    """Enter on the terminal, from now on: what was typed before does not count.
+
+    Attributes:
+        usable: whether there is a terminal to type at.
+    """
+
+    def __init__(self) -> None:
+        self.usable = sys.stdin is not None and sys.stdin.isatty()
+        if self.usable:
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+
+    def pressed(self) -> bool:
+        """Whether Enter has been pressed; never waits."""
+        return self.usable and bool(select.select([sys.stdin], [], [], 0.0)[0]) and sys.stdin.readline() != ""
+
+
+@contextmanager
+def noted_signals() -> Iterator[list[str]]:
+    """Note SIGINT (Ctrl-C), SIGTERM and SIGHUP by name instead of ending the program.
+
+    The second one raises KeyboardInterrupt. A signal that was ignored at the start, as by nohup, stays ignored.
+    """
+    noted: list[str] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        noted.append(signal.Signals(number).name)
+        if len(noted) > 1:
+            raise KeyboardInterrupt
+
+    kinds = ENDING if threading.current_thread() is threading.main_thread() else ()
+    before = {kind: signal.signal(kind, note) for kind in kinds if signal.getsignal(kind) is not signal.SIG_IGN}
+    try:
+        yield noted
+    finally:
+        for kind, handler in before.items():
+            signal.signal(kind, handler)

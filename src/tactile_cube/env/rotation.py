@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.env import reward as terms
-from tactile_cube.env.conditions import Conditions
 from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
 from tactile_cube.env.reward import Reward
-from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
+from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Conditions, Task
 from tactile_cube.env.touch import borne, normal_forces
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places

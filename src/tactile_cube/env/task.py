@@ -4,16 +4,52 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.env.conditions import Conditions
 from tactile_cube.env.cube_pose import CubePose
 from tactile_cube.errors import InputError
 from tactile_cube.simulation import EpisodeConstants
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Conditions that an episode starts with and keeps to its end.
+
+    Attributes:
+        filter_time: T_s, time constant of the low-pass that turns q_n into q_f [s].
+        gravity_scale: part of the cube's weight that acts.
+        penalty_scale: factor on the weights of height, plane and tilt.
+    """
+
+    filter_time: float
+    gravity_scale: float
+    penalty_scale: float
+
+    def columns(self) -> dict[str, float]:
+        """By the names that they have in logs: "T_s" [s], "gravity" and "penalty" (scales)."""
+        return {"T_s": self.filter_time, "gravity": self.gravity_scale, "penalty": self.penalty_scale}
+
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, float]) -> Self:
+        """What `columns` gave; further columns, as a row of metrics has, are passed over.
+
+        Raises:
+            KeyError: a column is missing.
+        """
+        return cls(columns["T_s"], columns["gravity"], columns["penalty"])
+
+
+class Curriculum(Protocol):
+    """Gives the conditions for the episodes that start now."""
+
+    def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
+        """Conditions after `environment_steps` with mean final angle `performance` [rad] on the way to `final`."""
+
 
 OUTCOMES = ("running", "time_limit", "dropped", "left_range", "tilted", "lifted", "faulty")
 """What an episode's step can lead to; the key "outcome" is an index into it."""

@@ -11,9 +11,8 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from tactile_cube.env.conditions import Conditions, Curriculum
 from tactile_cube.env.rotation import OBJECT, Array, Moment, RotationEnv
-from tactile_cube.env.task import FAULTY, OUTCOMES
+from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions, Curriculum
 
 
 def float_sizes(joints: int, terms: int) -> dict[str, int]:

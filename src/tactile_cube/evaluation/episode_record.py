@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tactile_cube.errors import InputError
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import ObjectShape
-from tactile_cube.npz_file import read_npz
+from tactile_cube.untrusted_file import read_npz
 
 Array = NDArray[np.float64]
 

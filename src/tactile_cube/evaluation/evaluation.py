@@ -6,20 +6,22 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from scipy.spatial.transform import Rotation
 from torchrl.envs import TransformedEnv
 
+from tactile_cube.env import RotationEnv
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.lost_worlds import drawn, lost_where
 from tactile_cube.evaluation.policies import Policy, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
-from tactile_cube.evaluation.replay import NearlyEqualStart
 from tactile_cube.evaluation.rollout import Interference, run_episode
-from tactile_cube.evaluation.senses import NumbPolicy
 from tactile_cube.evaluation.summary import Summary, sentence, succeeded, summarise
-from tactile_cube.evaluation.variant import Variant
+from tactile_cube.evaluation.variant import NumbPolicy, Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge
 from tactile_cube.hand import Hand
-from tactile_cube.simulation.resolution import unresolved_among
+from tactile_cube.simulation import Start
+from tactile_cube.simulation.health import unresolved_among
 from tactile_cube.transforms import EnvConfig, make_env
 
 Report = Callable[[str, EpisodeResult], None]
@@ -157,3 +159,31 @@ def _with_time_limit(config: EnvConfig, seconds: float | None) -> EnvConfig:
         return config
     steps = round(seconds / config.simulation.policy_dt)
     return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_steps=steps))
+
+
+POSITION_SPREAD = 0.0005
+"""Standard deviation of the cube's displacement in x and y [m]: half of what the start is randomised by."""
+YAW_SPREAD = 0.01
+"""Standard deviation of its turn about the vertical [rad]."""
+
+
+class NearlyEqualStart:
+    """Displaces the cube a little before the first policy step; everything else of the episode stays."""
+
+    def __init__(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self._shift = np.append(rng.normal(0.0, POSITION_SPREAD, 2), 0.0)
+        self._turn = Rotation.from_euler("z", rng.normal(0.0, YAW_SPREAD))
+
+    def __call__(self, env: RotationEnv, step: int) -> None:
+        """Start the world anew with the displaced cube when `step` is 0."""
+        if step > 0:
+            return
+        world = env.world
+        turned = self._turn * Rotation.from_quat(world.cube_quaternion)
+        start = Start(
+            angles=np.array(world.q),
+            cube_position=np.array(world.cube_position) + self._shift,
+            cube_quaternion=turned.as_quat(),
+        )
+        world.reset(env.constants, start)

@@ -10,10 +10,11 @@ import torch
 from numpy.typing import NDArray
 
 from tactile_cube.agent.networks import Actor
+from tactile_cube.drivetrain.plain_yaml import read_yaml
 from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
-from tactile_cube.hand import grasp_angles
+from tactile_cube.hand import Gait, grasp_angles
 
 SQUEEZE = 0.010
 """How far the targets of the tips lie inside the faces when a baseline holds the cube [m]; gives 1 to 3 N."""
@@ -97,3 +98,31 @@ class ReplayPolicy:
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return the recorded action of this step."""
         return np.asarray(self._actions[min(step, len(self._actions) - 1)])
+
+
+class ScriptedPolicy:
+    """Plays the gait in the rewarded direction."""
+
+    def __init__(self, gait: Gait | None = None) -> None:
+        self._gait = gait or Gait()
+
+    @classmethod
+    def from_file(cls, path: Path) -> ScriptedPolicy:
+        """The best gait of a file that `benchmarks.teacher` wrote.
+
+        Raises:
+            InputError: it cannot be read, or holds no gait.
+        """
+        try:
+            best = read_yaml(path)["best"]
+            return cls(Gait(**best | {"phases": tuple(best["phases"])}))
+        except (KeyError, TypeError) as error:
+            raise InputError(f"policy=scripted:{path}: no gait of search_gait (key 'best')") from error
+
+    def start(self, env: RotationEnv, seed: int) -> None:
+        """Remember hand and direction."""
+        self._hand, self._direction = env.hand, env.task.direction
+
+    def act(self, observation: NDArray[np.float32], step: int) -> Array:
+        """Return the action of the clock's step."""
+        return self._gait.action(self._hand, step, self._direction)

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from tactile_cube.agent.policy_file import load_policy, require_sizes
-from tactile_cube.evaluation.policies import ActorPolicy, HoldPolicy, Policy, RandomPolicy, ReplayPolicy
+from tactile_cube.evaluation.policies import ActorPolicy, HoldPolicy, Policy, RandomPolicy, ReplayPolicy, ScriptedPolicy
 from tactile_cube.evaluation.policy_path import SHIPPED, policy_path
-from tactile_cube.evaluation.scripted import ScriptedPolicy
 
 BASELINES: dict[str, type[HoldPolicy] | type[RandomPolicy] | type[ScriptedPolicy]] = {
     "hold": HoldPolicy,

@@ -10,19 +10,9 @@ from statistics import median
 
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.training_curve import ANGLE, STEPS, Curve, cpu_hours, read_curve, regrasping_begins
-from tactile_cube.training.finished import FILE as FINISHED
 
-PAPER_TABLE_1 = {
-    "task=table, T_s 0.5 s": "0.3, 0.4, 0.3, 0.4",
-    "task=float, T_s 0.5 s": "2.2, 1.7, 0.9, -",
-    "task=full, T_s 0.5 s": "1.8, -, -, 2.3",
-    "task=table, T_s 0.1 s": "0.4, 0.2, 0.2, 0.2",
-    "task=float, T_s 0.1 s": "1.5, 5.8, -, 2.4",
-    "task=full, T_s 0.1 s": "5.1, 1.7, 6.0, 3.9",
-}
-"""Million steps until regrasping of four runs; -: not within 6.5. Source: paper, Table I."""
 INTERVALS = ("million steps: median (interval)", "angle at the end [rad]: median (interval)", "CPU hours of all runs")
-_RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
+RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
 _FILTER_TIME = re.compile(r"task\.filter_time=(?P<time>[\d.]+)-(?P<task>task=\w+)$")
 
 
@@ -38,7 +28,7 @@ def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
     runs: dict[str, dict[int, Curve]] = {}
     for path in sorted(folder.glob("*seed*")):
         name = path.stem if path.suffix == ".csv" else path.name
-        match = _RUN.match(name)
+        match = RUN.match(name)
         if match and (path.suffix == ".csv" or (path / "metrics.csv").is_file()):
             setting = _FILTER_TIME.sub(r"\g<task>, T_s \g<time> s", match["setting"] or folder.name)
             runs.setdefault(setting, {})[int(match["seed"])] = read_curve(path, name)
@@ -47,16 +37,16 @@ def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
     return runs
 
 
-def sweep_table(runs: Mapping[str, Mapping[int, Curve]], settings: Sequence[str] = (), intervals: bool = False) -> str:
-    """Return the table, with the paper's column where a setting is one of its Table I.
+def sweep_table(
+    runs: Mapping[str, Mapping[int, Curve]], paper: Mapping[str, str] | None = None, intervals: bool = False
+) -> str:
+    """Return the table of the runs, a line each setting.
 
     Args:
         runs: from `read_sweep`.
-        settings: lines to show, those without a run as such; all that there are by default.
+        paper: published column by setting; its settings are the lines then, those without a run as such.
         intervals: add columns of medians over the seeds, each with the interval of `median_interval`.
     """
-    shown = list(settings) or sorted(runs)
-    paper = any(setting in PAPER_TABLE_1 for setting in shown)
     head = [
         "setting",
         *(["paper, million steps"] if paper else []),
@@ -65,8 +55,8 @@ def sweep_table(runs: Mapping[str, Mapping[int, Curve]], settings: Sequence[str]
         *(INTERVALS if intervals else []),
     ]
     lines = [head, ["---"] * len(head)]
-    for setting in shown:
-        known = [PAPER_TABLE_1.get(setting, "")] if paper else []
+    for setting in paper or sorted(runs):
+        known = [paper[setting]] if paper else []
         curves = runs.get(setting, {})
         steps = ", ".join(_until(curves[seed]) for seed in sorted(curves))
         more = _over_seeds(list(curves.values())) if intervals else []
@@ -88,12 +78,6 @@ def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
         outside += 1
     first = max(outside - 1, 0)
     return median(ordered), ordered[first], ordered[n - 1 - first]
-
-
-def unfinished(folder: Path) -> list[str]:
-    """Names of the run folders of a multirun that failed or were stopped before their end."""
-    runs = (path for path in sorted(folder.glob("*seed*")) if path.is_dir() and _RUN.match(path.name))
-    return [run.name for run in runs if not (run / FINISHED).is_file()]
 
 
 def _over_seeds(curves: Sequence[Curve]) -> list[str]:

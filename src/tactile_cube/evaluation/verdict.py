@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from tactile_cube.evaluation.episode_record import EpisodeRecord
-from tactile_cube.evaluation.exploits import exploits, tilt
-from tactile_cube.evaluation.touch import finger_history, support
+from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
+from tactile_cube.evaluation.touch import finger_history, support, touching
 
 REGRASP_ANGLE = 2.0
 """Final angle beyond which four fingers that never let go cannot have turned the cube [rad].
@@ -137,3 +137,63 @@ def verdict(final_angle: float, late_angle: float, face_changes: int, *, lost: b
     if final_angle > REGRASP_ANGLE and late_angle > LATE_ANGLE and regrasped:
         return Verdict.REGRASPING
     return Verdict.HOLDING if final_angle < STILL_ANGLE else Verdict.STUCK_TWISTED
+
+
+MAX_ANGLE_MISMATCH = 0.3
+"""Largest difference between the reported angle and the integrated rotation about the task's axis [rad]."""
+CONE = 0.06
+"""Share of the angle that may differ besides: the axis of a cube tilted by up to 20 deg goes around a cone as it turns,
+whose solid angle 1 - cos(20 deg) a turn is in the integrated rotation and not in the angle."""
+MAX_FREE_SPIN_SHARE = 0.2
+"""Largest share of the final angle that may be gained while nothing holds the cube."""
+MAX_TILT = 0.8
+"""Largest tilt of the cube's z axis [rad]; the training episode ends there too."""
+MAX_PENETRATION = 0.006
+"""Deepest overlap of a finger and the cube [m]; a firm grasp of 10 N overlaps by less than 1 mm."""
+MAX_STEP_ANGLE = np.pi / 4
+"""Largest turn within one policy step [rad]: beyond it a quarter turn of the symmetric cube could hide."""
+
+
+def tilt(record: EpisodeRecord) -> Array:
+    """Return the angle between the rotation's axis in the cube and in the world `(n + 1,)` [rad]."""
+    axis = Rotation.from_quat(record.cube_quaternion).apply(record.axis)
+    return np.asarray(np.arccos(np.clip(axis @ np.array(record.axis), -1.0, 1.0)), dtype=np.float64)
+
+
+def integrated_rotation(record: EpisodeRecord) -> Array:
+    """Return the turn about the task's axis from increments of the quaternion `(n + 1,)` [rad].
+
+    It knows nothing of Euler angles or of how the environment unwraps theta: an independent second opinion.
+    """
+    orientation = Rotation.from_quat(record.cube_quaternion)
+    increments = (orientation[1:] * orientation[:-1].inv()).as_rotvec() @ np.array(record.axis)
+    return record.direction * np.concatenate([[0.0], np.cumsum(increments)])
+
+
+def free_spin(record: EpisodeRecord) -> float:
+    """Return the angle gained in steps that begin and end with a cube that nothing holds [rad].
+
+    In the air it takes two fingers to hold it; on a table one is enough to push it around.
+    """
+    needed = 1 if "table_height" in record.constants else 2
+    loose = touching(record).sum(axis=1) < needed
+    gained = np.diff(record.theta)
+    return float(np.sum(np.maximum(gained[loose[1:] & loose[:-1]], 0.0)))
+
+
+def exploits(record: EpisodeRecord) -> list[str]:
+    """Name what is physically wrong with an episode; an empty list when nothing is."""
+    found = []
+    gained = float(record.theta[-1] - record.theta[0])
+    if abs(gained - integrated_rotation(record)[-1]) > MAX_ANGLE_MISMATCH + CONE * abs(gained):
+        found.append("angle_mismatch")
+    if record.steps and np.max(np.abs(np.diff(record.theta))) > MAX_STEP_ANGLE:
+        found.append("angle_jump")
+    if gained > 0.5 and free_spin(record) > MAX_FREE_SPIN_SHARE * gained:
+        found.append("flung")
+    # A cube that falls may tumble as it goes: the tilt counts only while it is held.
+    if not record.cut_short and np.max(tilt(record)) > MAX_TILT:
+        found.append("tumbled")
+    if np.min(record.contacts.distance, initial=0.0) < -MAX_PENETRATION:
+        found.append("penetration")
+    return found

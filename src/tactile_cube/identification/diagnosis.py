@@ -13,7 +13,7 @@ from tactile_cube.identification.disturbances import Disturbance
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import resolved
+from tactile_cube.identification.fitting.resolution import resolved, stated_error
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
 from tactile_cube.identification.late_commands import in_time
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
@@ -26,13 +26,17 @@ from tactile_cube.identification.unseen import Unseen, unseen
 from tactile_cube.identification.verdict import Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
+from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
+from tactile_cube.measurement.replay.windows import steps_per_row
 
 SHOWN_SHAPES = 6
 UNPROVEN = 3
+FAR_OFF = 10.0  # a model as many times further off than its steps hides them, until it is known what it lacks
+MUCH_LONGER = 4  # times as long are steps that are worth a search of their own
 
 
 @dataclass(frozen=True)
@@ -110,9 +114,9 @@ def diagnose(
         known: the model to begin with, whose effects are no news; None: what the recording's owner states.
         criteria: what decides.
     """
-    recording = in_time(resolved(recording, effects, say, known), effects, say, known)
+    recording = in_time(recording, effects, say, known)
     inquiry, left_out, suspected = beside_disturbances(
-        Inquiry(recording, effects, engine, step, seed, say, known, criteria)
+        in_long_steps_first(Inquiry(recording, effects, engine, step, seed, say, known, criteria))
     )
     search, findings, simulations, verdict = inquiry.answer
     _, held_out, tested = inquiry.parts
@@ -147,6 +151,34 @@ def diagnose(
     extended = not diagnosis.rivals
     experiment = next_experiment(search.shooting, inquiry.recording, fits, search.noise, seed, criteria, extended)
     return replace(diagnosis, experiment=experiment)
+
+
+def in_long_steps_first(asked: Inquiry) -> Inquiry:
+    """An inquiry in the steps that its sensors call for; what much longer ones find is asked of first.
+
+    Far from the noise nothing is gained by steps as short as the noise calls for; where an answer stays far from it,
+    they are never needed.
+    """
+    recording, effects, known, said = asked.recording, asked.effects, asked.known, list[str]()
+    fine = resolved(recording, effects, said.append, known)
+    off = stated_error(recording, effects, known) / FAR_OFF
+    quick = resolved(recording, effects, said.append, known, off) if off > 1.0 else fine
+    if MUCH_LONGER * _steps(quick) > _steps(fine):
+        asked.say(f"{_steps(fine)} steps of simulation a sample")
+        return replace(asked, recording=fine)
+    asked.say(f"{_steps(quick)} steps of simulation a sample, {_steps(fine)} where the noise is reached")
+    first = replace(asked, recording=quick)
+    verdict = first.first.verdict
+    needed = resolved(recording, effects, said.append, known, verdict.chosen.error)
+    if _steps(needed) == _steps(quick):
+        return first
+    asked.say(f"{_steps(needed)} steps of simulation a sample")
+    answer = (verdict.chosen, *verdict.rivals) if verdict.chosen.effects else ()
+    return replace(asked, recording=needed, known_answer=answer)
+
+
+def _steps(recording: Recording) -> int:
+    return steps_per_row(recording, joint_scales(recording)[0].time)
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:

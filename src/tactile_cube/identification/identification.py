@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
+from tactile_cube.errors import InputError
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
@@ -71,23 +74,27 @@ def identify(
 
     Args:
         recording: two or more trials.
-        effects: `NAME@JOINT`; `NAME` alone stands for every joint; dotted paths name a user's own effects.
+        effects: `NAME@JOINT`; `NAME` alone stands for every joint; dotted paths name a user's own effects. In brackets
+            the parameters that are to be fitted, as `diagnose` names them: `viscous_friction(damping, difference)@q2`.
         engine: of the free-running errors that are stated.
         step: its simulation step [s].
         seed: which trials are held out.
         say: takes progress lines.
 
     Raises:
-        InputError: an unknown effect or joint, or nothing to hold out.
+        InputError: an unknown effect, joint or parameter, or nothing to hold out.
     """
-    wanted = resolve(effects, recording.joints)
-    classes = tuple(dict.fromkeys(effect for effect, _ in wanted))
+    named = [_with_parameters(text) for text in effects]
+    wanted = [(*place, parameters) for text, parameters in named for place in resolve([text], recording.joints)]
+    for effect, joint, parameters in wanted:
+        _check_parameters(effect, joint, parameters)
+    classes = tuple(dict.fromkeys(effect for effect, *_ in wanted))
     search, floor = _divided(recording, classes, seed, say)
     held_out, base = search.held_out, search.fit_base()
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
     current, judgement = base.fit, base.judgement
-    for effect, joint in wanted:
-        current = _with_effect(search, current, effect, joint)
+    for effect, joint, parameters in wanted:
+        current = _with_effect(search, current, effect, joint, parameters)
         label = current.model.terms[-1].label
         judgement = search.judged(current.model)
         stages[f"+ {label}"] = judgement.model
@@ -123,13 +130,37 @@ def _divided(
     return Search(fitted, held_out, sensor_noise(recording), effects, say), noise_floor(recording)
 
 
-def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str) -> Fit:
-    """The fit with one more effect, in whichever of its forms and from whichever start it does best."""
+def _with_parameters(text: str) -> tuple[str, tuple[str, ...]]:
+    """NAME@JOINT, and the parameters that were named in brackets behind the effect or the joint."""
+    found = re.search(r"\(([^()]*)\)", text)
+    if found is None:
+        return text, ()
+    return text.replace(found.group(), ""), tuple(name.strip() for name in found.group(1).split(",") if name.strip())
+
+
+def _check_parameters(effect: type[Effect], joint: str, parameters: Sequence[str]) -> None:
+    known = [parameter.name for parameter in effect.parameters]
+    for name in parameters:
+        if name not in known:
+            raise InputError(
+                f"effects: '{effect.name}@{joint}({name})': '{name}' is none of its parameters ({', '.join(known)})"
+                f"{suggestion(name, known)}"
+            )
+
+
+def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str, parameters: Sequence[str] = ()) -> Fit:
+    """The fit with one more effect, in whichever of its forms and from whichever start it does best.
+
+    With `parameters`, those of a form are fitted that has them, or beside a form's own.
+    """
     frozen = search.frozen(current)
     every = candidates(search.shooting.sizes, [effect])
     every += residual_candidates(search.problem, search.fitted, frozen, [effect])
     options = [c for c in every if c.joints == (joint,)]
-    refitted = [search.refit(frozen, option)[1] for option in options]
+    if parameters and not (having := [c for c in options if set(parameters) <= c.form.keys()]):
+        neutral = {p.name: p.neutral for p in effect.parameters if p.name in parameters}
+        having = [replace(c, form={**neutral, **c.form}) for c in options]
+    refitted = [search.refit(frozen, option)[1] for option in (having if parameters else options)]
     best = refitted[int(np.argmin([one.cost for one in refitted]))]
     search.problem.linearise_starts(best.model)
     return fit(search.problem, best.model, search.unknowns(best.model), iterations=4)

@@ -30,6 +30,8 @@ NOT_ALL = ("unknown_effect", "partly_explained")
 """Verdicts that say that more is missing than is named."""
 LESS = (*NOT_ALL, "ambiguous")
 """Verdicts that do not say what is missing and that it is all, the one that says least first."""
+AMBIGUOUS = (LESS.index("ambiguous"), True)
+"""What an answer says that names all that may be, and leaves little."""
 ALL = (len(LESS), True)
 """What an answer says that names all, and leaves little."""
 
@@ -62,6 +64,7 @@ class Inquiry:
         say: takes progress lines.
         known: the model to begin with; None: what the recording's owner states.
         criteria: what decides.
+        known_answer: explanations that are asked of first; all others only where those are not the whole of it.
     """
 
     recording: Recording
@@ -72,6 +75,7 @@ class Inquiry:
     say: Callable[[str], None]
     known: ModelFile | None
     criteria: Criteria
+    known_answer: tuple[Explanation, ...] = ()
 
     @cached_property
     def parts(self) -> tuple[Recording, Recording, Recording | None]:
@@ -94,7 +98,14 @@ class Inquiry:
     @cached_property
     def answer(self) -> Answer:
         """What is found, in usual segments or longer ones."""
-        return asked(self.search, self.search_in, self.answered, self.say)
+        if self.known_answer and (first := self.answered(self.search, self.known_answer)).says >= AMBIGUOUS:
+            return first
+        return asked(self.first, self.search_in, self.answered, self.say)
+
+    @cached_property
+    def first(self) -> Answer:
+        """What is found in usual segments."""
+        return self.answered(self.search)
 
     def answered(self, search: Search, known: Sequence[Explanation] = ()) -> Answer:
         """What one search finds, or says of explanations that are `known`."""
@@ -142,7 +153,7 @@ def beside_disturbances(inquiry: Inquiry) -> Inquired:
 
 
 def asked(
-    usual: Search,
+    first: Answer,
     search_in: Callable[[int], Search],
     answered: Callable[[Search, Sequence[Explanation]], Answer],
     say: Callable[[str], None],
@@ -154,12 +165,11 @@ def asked(
     that are fitted hide what is slower than a segment.
 
     Args:
-        usual: the search in usual segments.
+        first: what the search in usual segments found.
         search_in: prepares one in segments so many times as long as usual.
         answered: runs it, or judges those explanations only.
         say: takes progress lines.
     """
-    first = answered(usual, ())
     base, criteria = first.findings.base, first.search.criteria
     nothing_left = base.largest_error <= criteria.floor
     if first.simulations.as_repeats(base) if nothing_left else first.says == ALL:

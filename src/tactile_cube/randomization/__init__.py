@@ -4,13 +4,13 @@ from tactile_cube.randomization.distributions import (
     Choice,
     Constant,
     Distribution,
+    EffectRange,
     LogUniform,
     Normal,
     Uniform,
     UniformPerJoint,
     sample,
 )
-from tactile_cube.randomization.effect_range import EffectRange
 from tactile_cube.randomization.grasp_starts import Grasps, GraspStarts, GraspTable
 from tactile_cube.randomization.identified import identified
 from tactile_cube.randomization.learnability import Learnability, drawn_places

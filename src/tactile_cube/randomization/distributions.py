@@ -6,6 +6,7 @@ transform) becomes one draw.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.errors import InputError
 
 Array = NDArray[np.float64]
@@ -126,3 +128,22 @@ class Normal:
     def quantile(self, u: Array) -> Array:
         """Gaussian quantile; the lowest of 2**53 uniform numbers, 0, becomes the next one so that it stays finite."""
         return np.asarray(self.mean + self.std * ndtri(np.maximum(u, 2.0**-53)), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class EffectRange:
+    """One effect at one joint; each episode draws its parameters.
+
+    Attributes:
+        effect: class of the effect; not one that changes the mechanism, whose bodies are built once.
+        joint: as the world names it, e.g. `ring_q2`.
+        parameters: distribution of each parameter, in SI units.
+    """
+
+    effect: type[Effect]
+    joint: str
+    parameters: Mapping[str, Distribution]
+
+    def draw(self, rng: np.random.Generator) -> Effect:
+        """The effect of one episode."""
+        return self.effect(self.joint, **{key: float(sample(one, rng)) for key, one in self.parameters.items()})

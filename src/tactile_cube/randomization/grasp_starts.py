@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.npz_file import read_npz
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.randomization.start_states import StartPoses, StartStates
 from tactile_cube.simulation import EpisodeConstants, Start
+from tactile_cube.untrusted_file import read_npz
 
 Array = NDArray[np.float64]
 
 SHIPPED = Path(str(resources.files("tactile_cube"))) / "randomization" / "grasps.npz"
-"""Those of the DLR-Hand II around the nominal cube; `python -m tactile_cube.search_grasps` made them."""
+"""Those of the DLR-Hand II around the nominal cube; `tactile_cube.search_grasps` made them."""
 COLUMNS = ("angles", "targets", "positions", "quaternions")
 
 
@@ -96,7 +96,7 @@ class GraspStarts:
     """Starts in stable grasps of every phase of a turn.
 
     Attributes:
-        file: of the grasps, as `python -m tactile_cube.search_grasps` writes it; None: the one of the package.
+        file: of the grasps, as `tactile_cube.search_grasps(...).save` writes it; None: the one of the package.
         share: part of the episodes that start in one; the others start as `otherwise` says.
         otherwise: starts of the other episodes; None: the published one.
     """
@@ -124,7 +124,7 @@ class GraspStarts:
             raise InputError(
                 f"start.file={path}: grasps of hand {grasps.hand} and a {grasps.shape} of {list(grasps.size)} m, "
                 f"not of {wanted[0]} and a {wanted[1]} of {list(wanted[2])} m; "
-                "search with python -m tactile_cube.search_grasps"
+                "search with tactile_cube.search_grasps"
             )
         others = (self.otherwise or StartStates()).of(hand, known)
         return GraspTable(hand, grasps, self.share, others)

@@ -13,8 +13,7 @@ from tactile_cube.drivetrain.effects import Effect, Stage, resolve
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.randomization.distributions import Constant, Distribution, Uniform, UniformPerJoint
-from tactile_cube.randomization.effect_range import EffectRange
+from tactile_cube.randomization.distributions import Constant, Distribution, EffectRange, Uniform, UniformPerJoint
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.simulation.contact_effects import contact_catalogue

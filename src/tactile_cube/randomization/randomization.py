@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.randomization.distributions import Constant, Distribution, sample
-from tactile_cube.randomization.effect_range import EffectRange
+from tactile_cube.randomization.distributions import Constant, Distribution, EffectRange, sample
 from tactile_cube.randomization.learnability import Learnability
 from tactile_cube.simulation import EpisodeConstants
 

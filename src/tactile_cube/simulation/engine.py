@@ -7,11 +7,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.hand import Hand
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
-from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.options import SimulationOptions
 
 Array = NDArray[np.float64]
 
@@ -80,18 +77,3 @@ class Engine(Protocol):
     def close(self) -> None:
         """Ends the simulation."""
         ...
-
-
-def make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
-    """The engine that the options name.
-
-    Raises:
-        InputError: it is not installed.
-    """
-    if options.single_engine == "mujoco":
-        from tactile_cube.simulation.mujoco_engine import MujocoEngine
-
-        return MujocoEngine(hand, options, drive)
-    from tactile_cube.simulation.bullet_engine import BulletEngine
-
-    return BulletEngine(hand, options, drive)

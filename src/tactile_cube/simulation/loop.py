@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain import Plant
 from tactile_cube.errors import InputError
 from tactile_cube.simulation.engine import OBJECT_STATE
-from tactile_cube.simulation.native_library import find_compiler, load_native, native_library, status_offset
+from tactile_cube.simulation.native_library import find_compiler, load_native, native_library
 from tactile_cube.simulation.options import Loop
 
 Array = NDArray[np.float64]
@@ -77,8 +77,7 @@ class NativeLoop:
         """See `PhysicsLoop.bind`."""
         self._chains = np.array(chains, dtype=np.int32)
         self._bound = (q, v, np.zeros_like(q), memory)  # kept alive: C sees their addresses
-        buffer = self._library.locate_status_buffer(self._handle, chains[0], status_offset())
-        self._who = (self._handle, buffer, self._chains.ctypes.data, len(chains), q.size // len(chains))
+        self._who = (self._handle, self._chains.ctypes.data, len(chains), q.size // len(chains))
         self._what = (self._control, *(array.ctypes.data for array in self._bound))
 
     def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:

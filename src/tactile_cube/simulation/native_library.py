@@ -9,7 +9,6 @@ import os
 import shutil
 import subprocess
 import tempfile
-from importlib import metadata
 from pathlib import Path
 
 import pybullet
@@ -19,8 +18,6 @@ from tactile_cube.errors import InputError
 
 _FOLDER = Path(__file__).parent / "native"
 BULLET_STEPS, MUJOCO_STEPS = "physics_steps", "mujoco_steps"
-STATUS_OFFSETS = {"3.2.7": 0x800310}
-"""How far before its copy PyBullet's status buffer stands, by version [bytes]: a stream of 8 MiB and what follows."""
 _FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
 
 
@@ -61,11 +58,6 @@ def _compile(source: Path, library: Path) -> None:
         fresh.replace(library)
 
 
-def status_offset() -> int:
-    """Offset of the status buffer in the PyBullet that is installed; 0 where it is not known."""
-    return STATUS_OFFSETS.get(metadata.version("pybullet"), 0)
-
-
 @functools.cache
 def load_native() -> ctypes.CDLL:
     """The library for PyBullet, with PyBullet's exported functions made visible to it first."""
@@ -73,11 +65,9 @@ def load_native() -> ctypes.CDLL:
     library = ctypes.CDLL(str(native_library()))
     pointer, number = ctypes.c_void_p, ctypes.c_int
     library.physics_client.restype = pointer
-    library.locate_status_buffer.restype = pointer
-    library.locate_status_buffer.argtypes = [pointer, number, ctypes.c_int64]
     library.run_physics_steps.restype = None
     library.run_physics_steps.argtypes = [
-        *(pointer, pointer, pointer, number, number, ctypes.c_int64),
+        *(pointer, pointer, number, number, ctypes.c_int64),
         *(pointer, pointer, pointer, pointer, pointer),
         *(number, pointer, pointer),
     ]

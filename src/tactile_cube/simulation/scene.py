@@ -21,9 +21,8 @@ from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half, unit_inertia
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import Contact, read_contact
+from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, read_contact
 from tactile_cube.simulation.options import SimulationOptions
-from tactile_cube.simulation.surface import SKIN_RELAXATION
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.disturbance import Disturbance
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, make_engine
+from tactile_cube.simulation.engine import OBJECT_STATE, Engine
 from tactile_cube.simulation.health import find_fault
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.trace import read_trace
@@ -236,3 +236,18 @@ class World:
             ahead, behind = tip_positions(self.hand, q + delta), tip_positions(self.hand, q - delta)
             columns.append((ahead - behind)[finger] / (2.0 * width))
         return np.stack(columns, axis=1)
+
+
+def make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
+    """The engine that the options name.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    if options.single_engine == "mujoco":
+        from tactile_cube.simulation.mujoco_engine import MujocoEngine
+
+        return MujocoEngine(hand, options, drive)
+    from tactile_cube.simulation.bullet_engine import BulletEngine
+
+    return BulletEngine(hand, options, drive)

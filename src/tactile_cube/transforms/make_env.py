@@ -20,7 +20,7 @@ from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import GraspStarts, GraspTable, Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
-from tactile_cube.simulation.resolution import unresolved
+from tactile_cube.simulation.health import unresolved
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
 from tactile_cube.transforms.joint_offset import JointOffset
 from tactile_cube.transforms.observation_stack import ObservationStack

@@ -17,14 +17,13 @@ from benchmarks.faults.readers import GAINS, READERS, Reader, state
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
-from tactile_cube.api.input_errors import as_input_errors
+from tactile_cube.api.job import as_input_errors
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.reading import read_recording
-from tactile_cube.measurement.recordings.whole import write_whole
-from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording, write_whole
 from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.training.checkpoint import Checkpoints

@@ -81,6 +81,15 @@ def test_a_special_case_has_fewer_numbers() -> None:
     assert list(special_cases(model, effects, 0, KNOWN)) == [], "elasticity has as many as a play"
 
 
+def test_a_law_with_a_number_less_is_a_special_case_of_itself() -> None:
+    viscous = find_effect("viscous_friction")
+    by_direction = Candidate(viscous, ("q2",), {"damping": 0.01, "difference": 0.002})
+    model = by_direction.added_to(Model({}, (), {}))[0]
+    ((simpler,), _), *others = special_cases(model, [by_direction], 0, KNOWN)
+    assert not others
+    assert (simpler.effect, tuple(simpler.form)) == (viscous, ("damping",))
+
+
 class Stubbed(Search):
     """A search whose fits end at given costs and whose models do as well on the held-out trials as is said."""
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from tactile_cube.measurement.comparing.failing_intervals import failing_intervals
+from tactile_cube.measurement.comparing.error import failing_intervals
 
 
 def test_a_burst_is_found_where_it_is() -> None:

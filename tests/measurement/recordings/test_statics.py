@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.measurement.recordings.consistency import swap_warning
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.statics import swap_warning
 from tests.measurement.small_rig import write
 
 

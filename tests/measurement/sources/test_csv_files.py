@@ -10,7 +10,7 @@ import pytest
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.whole import write_whole
+from tactile_cube.measurement.recordings.writing import write_whole
 from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tests.measurement.small_rig import URDF, table
 

@@ -86,7 +86,7 @@ def import_own_effects(names: Iterable[str]) -> None:
         InputError: a module that cannot be imported, or has no such effect.
     """
     for name in names:
-        path = name.partition(":")[0].partition("@")[0].strip()
+        path = re.split("[:@(]", name, maxsplit=1)[0].strip()
         module = path.rpartition(".")[0]
         if not module:
             continue

@@ -32,8 +32,9 @@ def resolved(
     effects: Sequence[type[Effect]],
     say: Callable[[str], None],
     known: ModelFile | None = None,
+    beside: float = 1.0,
 ) -> Recording:
-    """The recording with the longest steps whose error the sensors do not show.
+    """The recording with the longest steps whose error does not show.
 
     Where the controller's rate is not stated these may be shorter than usual: rows far apart and a fine encoder show
     what steps leave out that suffice elsewhere, torque limits that are reached between two rows above all. Where it is
@@ -44,12 +45,13 @@ def resolved(
         effects: classes to compile in; their kernel is used again by a search for them.
         say: takes a line where steps become shorter or longer.
         known: the model to simulate; None: what the recording's owner states.
+        beside: error of the model that the steps' error hides behind [sensor noise].
     """
     noise = sensor_noise(recording)
 
     def error(one: Recording, times: int) -> float:
         start = nominal_model(one, known)
-        return step_error(one, Shooting(one, every_effect(effects, start)), start, noise, times)
+        return step_error(one, Shooting(one, every_effect(effects, start)), start, noise, times) / max(beside, 1.0)
 
     unstated = recording.description.controller.rate_hz is None
     rate = (_shorter if unstated else _longer)(recording, joint_scales(recording)[0].time, error)
@@ -78,6 +80,16 @@ def _longer(recording: Recording, time: float, error: StepError) -> float | None
         else:
             steps *= 2
     return None
+
+
+def stated_error(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None = None) -> float:
+    """RMS error [sensor noise] of the model to begin with, nothing refitted, on windows spread over the recording."""
+    start = nominal_model(recording, known)
+    shooting = Shooting(recording, every_effect(effects, start))
+    problem = Problem(shooting, spread(shooting.cut(recording, sensor_noise(recording))))
+    problem.linearise_starts(start)
+    residual = problem.residual(problem.predictions([start])[0])
+    return float(np.sqrt(problem.cost(residual).sum() / np.count_nonzero(problem.weight)))
 
 
 def step_error(recording: Recording, shooting: Shooting, model: Model, noise: Array, times: int) -> float:

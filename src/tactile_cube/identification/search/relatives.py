@@ -47,8 +47,9 @@ def special_cases(
     """
     one, first = effects[place], first_term(model, effects, place)
     for special in known:
-        contained = special.effect.name in one.effect.contains and special.joints == one.joints
-        if contained and special.size < one.size:
+        contained = special.effect.name in one.effect.contains
+        contained |= special.effect == one.effect and special.form.keys() < one.form.keys()
+        if contained and special.joints == one.joints and special.size < one.size:
             added, _ = special.added_to(replace(model, terms=model.terms[:first]))
             rest = model.terms[first + len(one.joints) :]
             yield (*effects[:place], special, *effects[place + 1 :]), replace(model, terms=(*added.terms, *rest))

@@ -157,8 +157,8 @@ class Search(Division):
         """The same of explanations that are known, and no others."""
         base = self.base
         self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
-        refitted = tuple(self.explanation(base, one.effects, one.fit.model, len(known)) for one in known)
-        return Findings(base, self.judged(self.start), (refitted,), ())
+        refitted = [self.explanation(base, one.effects, one.fit.model, len(known)) for one in known]
+        return Findings(base, self.judged(self.start), (tuple(self.pruned(one) for one in refitted),), ())
 
     def one_by_one(
         self, base: Explanation, standard: Explanation | None = None

@@ -22,7 +22,8 @@ def twins(search: Search, chosen: Explanation, base: Explanation, found: Sequenc
     """Return explanations with another law in the place of one of the chosen ones, of those not tried before.
 
     The other effects and all constants are free. Without this, what is named hangs on the order in which effects were
-    added: the second of two laws that do the same finds nothing left to explain.
+    added: the second of two laws that do the same finds nothing left to explain. A law that contains the chosen one
+    always does as well, and is none of them.
 
     Args:
         search: the recording and its effects.
@@ -40,7 +41,9 @@ def twins(search: Search, chosen: Explanation, base: Explanation, found: Sequenc
         wanted = [
             one
             for one in search.new(search.candidates)
-            if one.joints[0] in effect.joints and named_by((*parent.effects, one)) not in known
+            if one.joints[0] in effect.joints
+            and named_by((*parent.effects, one)) not in known
+            and effect.effect.name not in one.effect.contains
         ]
         promising = with_groups(screen(search.problem, frozen, wanted), 0.0)[:REFITTED]
         brief = search.brief(frozen, promising)

@@ -11,12 +11,13 @@ from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.band import Band, simulate_band
 from tactile_cube.measurement.comparing.error import (
     ErrorSummary,
+    FailingInterval,
+    failing_intervals,
     normalised_fit,
     raw_residuals,
     residuals,
     summarise,
 )
-from tactile_cube.measurement.comparing.failing_intervals import FailingInterval, failing_intervals
 from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.joint_offsets import with_fitted_offsets
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor

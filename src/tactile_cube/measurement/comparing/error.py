@@ -87,3 +87,33 @@ def summarise(errors: Sequence[Array], joints: Sequence[str]) -> ErrorSummary:
     squares = np.concatenate([error**2 for error in errors])
     by_joint = np.sqrt(np.nanmean(squares, axis=0))
     return ErrorSummary(float(np.sqrt(np.nanmean(squares))), dict(zip(joints, map(float, by_joint), strict=True)))
+
+
+WINDOW = 0.2  # [s] over which the error is averaged
+FAILING = 3.0  # error / noise floor
+SHORTEST = 0.1  # [s]
+
+
+@dataclass(frozen=True)
+class FailingInterval:
+    """An interval from `start` to `end` [s] of one trial in which a joint's RMS error [rad] is far above the floor."""
+
+    trial: str
+    joint: str
+    start: float
+    end: float
+    error: float
+
+
+def failing_intervals(trial: str, joint: str, time: Array, residual: Array, floor: float) -> list[FailingInterval]:
+    """Intervals where the RMS over 0.2 s exceeds three noise floors; `residual` (n,) [rad], nan where bridged."""
+    step = float(time[1] - time[0])
+    squares = np.nan_to_num(residual) ** 2
+    window = max(1, round(WINDOW / step))
+    rms = np.sqrt(np.convolve(squares, np.ones(window) / window, mode="same"))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (rms > FAILING * floor).astype(int), [0]])))
+    return [
+        FailingInterval(trial, joint, float(time[a]), float(time[b - 1]), float(np.sqrt(squares[a:b].mean())))
+        for a, b in zip(edges[::2], edges[1::2], strict=True)
+        if (b - a) * step >= SHORTEST
+    ]

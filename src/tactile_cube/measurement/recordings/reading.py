@@ -1,5 +1,6 @@
 """A recording on disk: recording.yaml, the rig's URDF and one table a trial, read and checked."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_files import with_own_files
-from tactile_cube.measurement.recordings.columns import pick_columns
+from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, pick_columns
 from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
     check_joints,
@@ -17,9 +18,9 @@ from tactile_cube.measurement.recordings.consistency import (
     check_rate,
     gains_of,
     joints_where,
+    swap_warning,
 )
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
-from tactile_cube.measurement.recordings.excluded import without_excluded
 from tactile_cube.measurement.recordings.outliers import without_outliers
 from tactile_cube.measurement.recordings.plausibility import (
     check_assignment,
@@ -29,7 +30,6 @@ from tactile_cube.measurement.recordings.plausibility import (
 )
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
-from tactile_cube.measurement.recordings.statics import swap_warning
 from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.timing import check_time, on_grid
 from tactile_cube.measurement.recordings.trial import Trial, load_of
@@ -122,4 +122,39 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         entry.touch,
         tuple(warnings + time_warnings + single),
         load_of(description.object, entry.object) if description.object and entry.object else None,
+    )
+
+
+def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key: str) -> list[Trial]:
+    """What lies before, between and after the intervals, as trials that start at 0; shorter rests are dropped.
+
+    Args:
+        trial: on its uniform grid.
+        intervals: start and end [s].
+        key: what an error names.
+
+    Raises:
+        InputError: an interval that ends before it starts.
+    """
+    if not intervals:
+        return [trial]
+    kept = np.ones(len(trial.time), dtype=bool)
+    for start, end in intervals:
+        if end <= start:
+            raise InputError(f"{key}: received [{start:g}, {end:g}]; expected start < end [s]")
+        kept &= (trial.time < start) | (trial.time >= end)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(int)))
+    pieces = [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= MINIMUM_SAMPLES]
+    return [_piece(trial, rows, f"{trial.name}_{number}") for number, rows in enumerate(pieces)]
+
+
+def _piece(trial: Trial, rows: slice, name: str) -> Trial:
+    return replace(
+        trial,
+        name=name,
+        time=trial.time[rows] - trial.time[rows.start],
+        command=trial.command[rows],
+        position=trial.position[rows],
+        torque=None if trial.torque is None else trial.torque[rows],
+        valid=trial.valid[rows],
     )

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.npz_file import read_npz
-from tactile_cube.untrusted_file import regular
+from tactile_cube.untrusted_file import read_npz, regular
 
 Table = dict[str, NDArray[np.float64]]
 Reader = Callable[[Path, int, bool], Table]

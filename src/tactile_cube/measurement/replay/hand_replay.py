@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
@@ -20,7 +21,6 @@ from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 from tactile_cube.simulation.contact_effects import contact_catalogue
 from tactile_cube.simulation.options import EngineName
-from tactile_cube.simulation.pose import to_world
 
 Array = NDArray[np.float64]
 NO_FILTER = 1e-6  # [s] a recording's commands are what reaches the controller, already filtered
@@ -166,3 +166,15 @@ def _require_hand(recording: Recording, hand: HandModel) -> None:
         )
     if recording.torque_controlled:
         raise InputError(f"{file}: key 'controller.mode': received torque; trials with an object need mode position")
+
+
+def to_world(hand: HandModel, position: Array, quaternion: Array) -> tuple[Array, Array]:
+    """Position (3,) [m] and quaternion xyzw (4,) in the world of a pose given in the hand's frame."""
+    turned = Rotation.from_matrix(hand.rotation) * Rotation.from_quat(np.array(quaternion))
+    return hand.position + hand.rotation @ position, np.asarray(turned.as_quat())
+
+
+def to_hand(hand: HandModel, position: Array, quaternion: Array) -> tuple[Array, Array]:
+    """Position (3,) [m] and quaternion xyzw (4,) in the hand's frame of a pose given in the world."""
+    turned = Rotation.from_matrix(hand.rotation.T) * Rotation.from_quat(np.array(quaternion))
+    return hand.rotation.T @ (position - hand.position), np.asarray(turned.as_quat())

@@ -1,7 +1,8 @@
 """Tables of another program (CSV, Parquet or NPZ) as a recording; what is not said of them is guessed, and told."""
 
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from glob import glob
 from pathlib import Path
@@ -11,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.comparing.repeats import lag_between
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.tables import Table, read_table
 from tactile_cube.measurement.recordings.writing import RecordingTables
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
 from tactile_cube.measurement.sources.foreign_log import SaidUnits, cut, understand
-from tactile_cube.measurement.sources.kinds import kinds_of
 from tactile_cube.measurement.sources.source import described, known, median_rate
 
 Array = NDArray[np.float64]
@@ -159,3 +160,46 @@ def _one_each(values: Iterable[Value] | None, paths: list[Path], key: str, defau
     if len(chosen) != len(paths):
         raise InputError(f"source.{key}: {len(chosen)} values for {len(paths)} files; give one each")
     return chosen
+
+
+COUNT = re.compile(r"[ _.-]*(?:(?:run|rep|repeat|trial|take|try|no|nr)[ _.-]*)?\(?\d+\)?$", re.IGNORECASE)
+DATE = re.compile(r"[ _.-]*\d{4}[-_.]?\d{2}[-_.]?\d{2}(?:[ T_.-]*\d{2}[-_.:h]?\d{2}(?:[-_.:m]?\d{2})?)?[ _.-]*")
+NO_NAME = "motion"
+COARSE = 0.005  # [s] between samples is enough to tell two commands apart
+
+
+def kinds_of(names: Sequence[str], commands: Sequence[Array], step: float) -> list[str]:
+    """The kind of each log: logs of one name but for a number or a date, if their commands (n, joints) agree.
+
+    Args:
+        names: of the files, without endings.
+        commands: as logged.
+        step: time between samples [s].
+    """
+    words = [_without_count(name) for name in names]
+    stride = max(1, round(COARSE / step))
+    coarse = [command[::stride] for command in commands]
+    kinds = [""] * len(names)
+    for word in dict.fromkeys(words):
+        members = [k for k, other in enumerate(words) if other == word]
+        groups = _alike(members, coarse, stride * step)
+        for group in groups:
+            for k in group:
+                kinds[k] = word if len(groups) == 1 else names[group[0]]
+    return kinds
+
+
+def _without_count(name: str) -> str:
+    return COUNT.sub("", DATE.sub("_", name)).strip("_ .-") or NO_NAME
+
+
+def _alike(members: Sequence[int], commands: Sequence[Array], step: float) -> list[list[int]]:
+    groups: list[list[int]] = []
+    for k in members:
+        known = (group for group in groups if lag_between(commands[group[0]], commands[k], step) is not None)
+        same = next(known, None)
+        if same is None:
+            groups.append([k])
+        else:
+            same.append(k)
+    return groups

@@ -26,14 +26,13 @@ from tactile_cube.measurement.recordings.description import Coupling, Descriptio
 from tactile_cube.measurement.recordings.rig import parse_rig
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
+from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, to_hand
 from tactile_cube.measurement.replay.model import Model, terms_of
 from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.session import FreeSession, free_command, logged, true_constants, unmeasured
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
 from tactile_cube.simulation.options import EngineName
-from tactile_cube.simulation.pose import to_hand
 
 Array = NDArray[np.float64]
 CLEARANCE, RETRACTED = 3e-3, 2e-2  # [m] of open fingertips and of fingers that do not take part, off their faces

@@ -1,11 +1,14 @@
 """What every source of recordings gives."""
 
+import re
 from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from omegaconf import DictConfig, OmegaConf
 
+from tactile_cube.command_help import CONFIG
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables
@@ -48,3 +51,23 @@ def median_rate(time: NDArray[np.float64], digits: int, where: str) -> float:
     if not 0 < rate < float("inf"):
         raise InputError(f"{where}: the rows are {step:g} s apart in the median; time must go forward by a fixed step")
     return rate
+
+
+def require_settings(source: DictConfig, option: str) -> None:
+    """Refuse a source without its mandatory settings, naming all of them and what its file says of each.
+
+    Raises:
+        InputError: some are missing.
+    """
+    missing = sorted(OmegaConf.missing_keys(source))
+    if missing:
+        text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
+        said = [f"{key}={_meaning(key, text)}" for key in missing]
+        raise InputError(f"source={option} needs {'; '.join(said)}")
+
+
+def _meaning(key: str, text: str) -> str:
+    """What stands behind a key in its file."""
+    found = re.search(rf"^ *{key.rpartition('.')[2]}: \?\?\? *(?:# *(.*))?$", text, re.MULTILINE)
+    said = found.group(1) if found else None
+    return f"... ({said})" if said else "..."

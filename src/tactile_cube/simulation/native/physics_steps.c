@@ -2,13 +2,7 @@
  *
  * PyBullet loads this as a plugin, which gives the handle of its physics client; everything else goes through the C
  * functions that the PyBullet library exports. Only handles and plain numbers cross, so no Bullet header is needed. */
-#define _GNU_SOURCE
 #include <stdint.h>
-#include <string.h>
-#if defined(__linux__) && defined(__x86_64__)
-#include <sys/uio.h>
-#include <unistd.h>
-#endif
 
 typedef void *Handle;
 
@@ -16,8 +10,7 @@ enum {
     SHARED_MEMORY_MAGIC_NUMBER = 202010061, /* what PyBullet 3.2.x wants its plugins to answer */
     TORQUE_CONTROL = 1, /* CONTROL_MODE_TORQUE */
     WORLD_FRAME = 2,    /* EF_WORLD_FRAME */
-    BASE_NUMBERS = 7,   /* position and quaternion stand before the joints in the generalised positions */
-    MOST_NUMBERS = 128  /* a status has room for so many positions, and behind them for so many velocities */
+    BASE_NUMBERS = 7    /* position and quaternion stand before the joints in the generalised positions */
 };
 
 Handle b3InitStepSimulationCommand(Handle client);
@@ -57,48 +50,18 @@ int executePluginCommand_steps(PluginContext *context, const void *arguments) {
 Handle physics_client(void) { return client_of_last_load; }
 
 /* Positions and velocities of a body, valid until the next command. */
-static void read_body(Handle client, const double *buffer, int body, const double **q, const double **v) {
-    Handle command = b3RequestActualStateCommandInit(client, body);
-    if (buffer) {
-        b3SubmitClientCommand(client, command);
-        *q = buffer;
-        *v = buffer + MOST_NUMBERS;
-        return;
-    }
+static void read_body(Handle client, int body, const double **q, const double **v) {
     int id, n_q, n_v;
     const double *frame, *reactions;
-    Handle status = b3SubmitClientCommandAndWaitStatus(client, command);
+    Handle status = b3SubmitClientCommandAndWaitStatus(client, b3RequestActualStateCommandInit(client, body));
     b3GetStatusActualState(status, &id, &n_q, &n_v, &frame, q, v, &reactions);
 }
 
-/* Where the server writes the status of a body, for good; or NULL where that is not known.
- *
- * b3GetStatusActualState points to a copy that PyBullet makes of all its 30 kB, in 6 % of the time of a step. The
- * original stands in the same client, `offset` bytes before the copy. It is believed if it holds the same numbers; the
- * kernel copies them for the comparison, so that an address that is not mapped is an error it returns. */
-const double *locate_status_buffer(Handle client, int body, int64_t offset) {
-#if defined(__linux__) && defined(__x86_64__)
-    const double *q, *v;
-    double there[2 * MOST_NUMBERS];
-    if (offset <= 0) return NULL;
-    read_body(client, NULL, body, &q, &v);
-    if (v != q + MOST_NUMBERS) return NULL;
-    const uintptr_t buffer = (uintptr_t)q - (uintptr_t)offset;
-    struct iovec to = {there, sizeof there}, from = {(void *)buffer, sizeof there};
-    if (process_vm_readv(getpid(), &to, 1, &from, 1, 0) != (ssize_t)sizeof there) return NULL;
-    if (memcmp(there, q, sizeof there) == 0) return (const double *)buffer;
-#else
-    (void)client, (void)body, (void)offset;
-#endif
-    return NULL;
-}
-
 /* Reads the joints of all chains: q and v have n_chains * n_joints numbers. */
-static void read_chains(Handle client, const double *buffer, const int *chains, int n_chains, int n_joints, double *q,
-                        double *v) {
+static void read_chains(Handle client, const int *chains, int n_chains, int n_joints, double *q, double *v) {
     for (int c = 0; c < n_chains; ++c) {
         const double *body_q, *body_v;
-        read_body(client, buffer, chains[c], &body_q, &body_v);
+        read_body(client, chains[c], &body_q, &body_v);
         for (int j = 0; j < n_joints; ++j) {
             q[c * n_joints + j] = body_q[BASE_NUMBERS + j];
             v[c * n_joints + j] = body_v[BASE_NUMBERS - 1 + j];
@@ -116,9 +79,9 @@ static void apply_torques(Handle client, const int *chains, int n_chains, int n_
 }
 
 /* Pose (7) and velocity (6) of the object, linear before angular, in the world frame. */
-static void read_object(Handle client, const double *buffer, int object, double *state) {
+static void read_object(Handle client, int object, double *state) {
     const double *q, *v;
-    read_body(client, buffer, object, &q, &v);
+    read_body(client, object, &q, &v);
     for (int k = 0; k < 7; ++k) state[k] = q[k];
     for (int k = 0; k < 6; ++k) state[7 + k] = v[k];
 }
@@ -134,20 +97,19 @@ static void push_object(Handle client, int object, const double *wrench, const d
     b3SubmitClientCommand(client, command);
 }
 
-/* n_steps physics steps. buffer: from locate_status_buffer. q, v: states of all joints of all chains, current on entry and on
+/* n_steps physics steps. q, v: states of all joints of all chains, current on entry and on
  * return. object: body of the object or -1; object_states: NULL, or its state (13 numbers) before each step and after
  * the last one; wrench: NULL or force and torque on it, for which object_states must be given. */
-void run_physics_steps(Handle client, const double *buffer, const int *chains, int n_chains, int n_joints,
-                       int64_t n_steps, Control control, double *q, double *v, double *torque, double *memory,
+void run_physics_steps(Handle client, const int *chains, int n_chains, int n_joints, int64_t n_steps, Control control, double *q, double *v, double *torque, double *memory,
                        int object, const double *wrench, double *object_states) {
     for (int64_t i = 0; i < n_steps; ++i) {
         double *object_state = object_states ? object_states + 13 * i : 0;
         control(i, q, v, torque, memory);
         apply_torques(client, chains, n_chains, n_joints, torque);
-        if (object_state) read_object(client, buffer, object, object_state);
+        if (object_state) read_object(client, object, object_state);
         if (wrench) push_object(client, object, wrench, object_state);
         b3SubmitClientCommand(client, b3InitStepSimulationCommand(client));
-        read_chains(client, buffer, chains, n_chains, n_joints, q, v);
+        read_chains(client, chains, n_chains, n_joints, q, v);
     }
-    if (object_states) read_object(client, buffer, object, object_states + 13 * n_steps);
+    if (object_states) read_object(client, object, object_states + 13 * n_steps);
 }

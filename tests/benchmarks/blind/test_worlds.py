@@ -1,0 +1,161 @@
+"""Worlds of the blind rounds: the usual ones stay, machines of any size are sane, forms differ and have limits."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+from benchmarks.blind import forms, generator, hidden, sizes, worlds
+from benchmarks.blind import plant as at
+from benchmarks.blind.dynamics import mass_and_bias
+from benchmarks.blind.excitation import multisine, ramps
+from benchmarks.blind.physics import simulate
+from benchmarks.blind.plant import neutral
+from benchmarks.blind.rig import RIGS, Link, Rig
+
+USUAL: dict[str, Any] = {
+    "parameters": {"order": 23.0, "amplitude": 0.04236506103443329},
+    "drawn": [6.23133, 0.00013367121980461215, 2000.0],
+    "means": (0.9988162025316455, 0.13718383014202118, 0.1369413137435913, 0.02870587259531021),
+}
+"""What a seed drew when there were no other worlds."""
+
+
+def test_dynamics_of_sliding_and_turning_joints_equal_those_of_mujoco() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    rng = np.random.default_rng(4)
+    links = []
+    for i, slides in enumerate((True, False, True, False, True)):
+        axis = rng.normal(size=3)
+        axis, origin, com = (tuple(v) for v in (axis / np.linalg.norm(axis), rng.normal(size=3), rng.normal(size=3)))
+        links.append(Link(f"j{i}", axis, origin, com, 1.0 + i, (1.0, 1.5, 2.0), -9.0, 9.0, slides=slides))
+    rig = Rig("mixed", links, (1.0, 2.0, -9.0))
+    header = '<mujoco><compiler fusestatic="false"/></mujoco><link name="base"/>'
+    model = mujoco.MjModel.from_xml_string(rig.urdf().replace('<link name="base"/>', header))
+    model.opt.gravity[:] = rig.gravity
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = rng.normal(size=(2, 5))
+    mujoco.mj_forward(model, data)
+    mass, bias = mass_and_bias(*rig.arrays(), np.array(rig.gravity), data.qpos.copy(), data.qvel.copy())
+    np.testing.assert_allclose(-np.linalg.solve(mass, bias), data.qacc_smooth, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(bias, data.qfrc_bias, rtol=1e-6, atol=1e-9)
+
+
+def test_an_upright_axis_falls_as_mechanics_says_and_sags_by_its_weight() -> None:
+    links = [Link("z", (0, 0, 1), (0, 0, 0), (0, 0, 0), 20.0, (1.0, 1.0, 1.0), -9.0, 9.0, slides=True)]
+    rig, one = Rig("axis", links, (0.0, 0.0, -9.81)), lambda x: np.array([x])
+    loose = neutral(1)._replace(reflected_inertia=one(5.0), static_friction=one(30.0))
+    command = np.zeros((500, 1))
+    fallen = simulate(rig, loose, command, 1000.0, np.zeros(1), step=1e-4)[2][-1, 0]
+    assert fallen == pytest.approx(-0.5 * (20.0 * 9.81 - 30.0) / 25.0 * 0.5**2, rel=1e-3)
+    servo = neutral(1)._replace(kp=one(1e5), kd=one(2e3), stiffness=one(4e5))
+    reading, force, carriage = simulate(rig, servo, command, 1000.0, np.zeros(1), step=1e-4)
+    weight = 20.0 * 9.81
+    assert force[-1, 0] == pytest.approx(weight, rel=1e-4)
+    assert reading[-1, 0] == pytest.approx(-weight / 1e5, rel=1e-4)
+    assert carriage[-1, 0] == pytest.approx(-weight / 1e5 - weight / 4e5, rel=1e-4)
+
+
+def test_the_usual_worlds_are_those_of_earlier_rounds() -> None:
+    world, bench, truth = generator.draw(10_011, 2.0, ["cogging"], "pendulum")
+    assert truth["effects"][0]["parameters"] == pytest.approx(USUAL["parameters"], rel=1e-12)
+    assert [world.plant.kp[0], bench.noise, bench.seconds * bench.rate] == pytest.approx(USUAL["drawn"], rel=1e-12)
+    table = generator.perform(10_011, world, bench)[0]["trials/ramps_0.parquet"][2]
+    means = table.select(pl.selectors.float().abs().mean()).row(0)
+    assert means == pytest.approx(USUAL["means"], rel=1e-6)
+
+
+@pytest.mark.parametrize(("seed", "kind"), [(11, "turning"), (12, "sliding")])
+def test_machines_of_any_size_are_drawn_again_alike_and_follow_their_commands(seed: int, kind: str) -> None:
+    (world, bench, truth), again = (generator.draw(seed, None, [], kind, worlds="sizes") for _ in range(2))
+    assert again[2] == truth
+    assert world.rig.urdf() == again[0].rig.urdf()
+    assert ("prismatic" in world.rig.urdf()) == (kind == "sliding")
+    position, _, command = generator.probe(world, seed)
+    assert (np.abs(position - command).mean(axis=0) < 0.2 * (world.high - world.low)).all()
+    per = 1.0 / (bench.rate * world.step)
+    assert per == pytest.approx(round(per))
+
+
+def test_torques_of_machines_range_from_a_hundredth_of_a_newton_metre_to_a_thousand() -> None:
+    rng = np.random.default_rng(0)
+    arms = [sizes.arm(rng, 1, False, True).links[0] for _ in range(300)]
+    weights = np.array([9.81 * x.mass * abs(x.com[2]) for x in arms])
+    assert 0.004 < weights.min() < 0.05
+    assert 100.0 < weights.max() < 1000.0
+
+
+def test_a_hidden_effect_is_as_large_as_its_machine() -> None:
+    for seed in (21, 22):
+        world = sizes.draw_machine(np.random.default_rng(seed), [], None, None)[0]
+        changed, truth = generator.hide(world, "stribeck_friction", np.random.default_rng(0), 0.5, 0, 1e-4)
+        joint = world.rig.actuated.index(truth["joints"][0])
+        speeds = np.abs(np.diff(generator.probe(world, 0)[2], axis=0))[:, joint]
+        assert truth["parameters"]["velocity"] < 400.0 / world.time_unit * speeds.max()
+        torque = np.abs(generator.probe(world, 0)[1][:, joint])
+        assert 0.05 * torque.max() < changed.plant.stribeck[joint] < torque.max()
+
+
+def _replay(**values: float) -> np.ndarray:
+    """What a hanging servo reads with these constants of its plant, over four seconds of two kinds of motion."""
+    rig = RIGS["pendulum"](np.random.default_rng(0))
+    rig.gravity = (0.0, 0.0, -9.81)
+    known = {"kp": 6.0, "kd": 0.3, "torque_limit": 2.5, "stiffness": 50.0, "static_friction": 0.05}
+    known |= {"reflected_inertia": 0.004, **values}
+    plant = neutral(1)._replace(**{name: np.array([float(value)]) for name, value in known.items()})
+    rng = np.random.default_rng(1)
+    command = np.concatenate([make(rng, *np.array([[-1.2], [1.2]]), 1000, 500.0) for make in (ramps, multisine)])
+    return simulate(rig, plant, command, 500.0, command[0])[0]
+
+
+@pytest.mark.parametrize(
+    ("form", "limit"),
+    [
+        ({"smooth_backlash": 0.02, "smooth_torque": 1e-5}, {"backlash": 0.02}),
+        ({"damped_backlash": 0.02, "gap_damping": 3e-3}, {"backlash": 0.02}),
+        ({"presliding": 0.005, "micro_damping": 1e-4}, {"presliding": 0.005}),
+        ({"presliding": 5e-4, "bristles": at.MAXWELL}, {}),
+        ({"presliding": 5e-4, "bristles": at.BOUC_WEN, "bouc_wen_shape": 0.6}, {}),
+        ({"stribeck": 0.06, "stribeck_exponent": 1.999}, {"stribeck": 0.06}),
+        ({"delay": 0.02, "jitter": 1e-5}, {"delay": 0.02}),
+        ({"soft_limit": 1e3}, {}),
+        ({"torque_bend": 1e-4}, {}),
+        ({"viscous": 0.1, "viscous_difference": 1e-4}, {"viscous": 0.1}),
+        ({"load_friction": 0.1, "backdriven_friction": 1e-4}, {"load_friction": 0.1}),
+        ({"velocity_lag_2": 2.5e-4}, {}),
+        ({"knee": 1e-3, "knee_stiffness": 50.0}, {}),
+        ({"drift_rate": -0.05}, {"drift": -0.05e3, "drift_time": 1e3}),
+    ],
+    ids=lambda values: "-".join(values) or "neutral",
+)  # fmt: skip
+def test_a_form_tends_to_the_form_that_is_known(form: dict[str, float], limit: dict[str, float]) -> None:
+    assert np.sqrt(((_replay(**form) - _replay(**limit)) ** 2).mean()) < 4e-4
+
+
+@pytest.mark.parametrize("name", forms.FAMILIES)
+def test_a_form_differs_visibly_from_a_world_without(name: str) -> None:
+    plain = worlds.draw_world(np.random.default_rng(5), "pendulum", 1.0)
+    expected, torque, _ = generator.probe(plain, 0)
+    changed, again = worlds.copy(plain), worlds.copy(plain)
+    truths = []
+    for world in (changed, again):
+        rng, peak = np.random.default_rng(6), np.abs(torque).max(axis=0)
+        scene = hidden.Scene(world.rig, world.plant, world.low, world.high, peak, peak, rng, 0.5)
+        truths.append(forms.FAMILIES[name][0](scene, 0))
+    assert truths[0] == truths[1]
+    moved = generator.probe(changed, 0)[0]
+    assert np.isfinite(moved).all()
+    assert np.sqrt(((moved - expected) ** 2).mean()) > generator.VISIBLE * 4e-4
+
+
+def test_forms_are_hidden_in_turn_and_nothing_in_every_sixth() -> None:
+    drawn = [generator.names_for(seed, np.random.default_rng(0), "forms")[1] for seed in range(600, 640)]
+    assert sum(not names for names in drawn) == 7
+    assert {name for names in drawn for name in names} == set(forms.FAMILIES)
+
+
+def test_the_other_engine_refuses_worlds_that_it_does_not_know(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="--engine mujoco moves the usual worlds only, got --worlds sizes"):
+        generator.write(1, tmp_path, engine="mujoco", worlds="sizes")
