@@ -1,20 +1,23 @@
-"""Write the pages of the documentation that the code knows better: every effect, every configuration group.
+"""Write the pages of the documentation that the code knows better: commands, configuration, effects, API.
 
-python docs/generate.py            # docs/effects.md and docs/configuration.md
+python docs/generate.py            # docs/commands.md, configuration.md, effects.md, api.md
 python docs/generate.py --pictures # also docs/images/effects/*.png, each effect's signature (some minutes)
 """
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 
+import tactile_cube
 from tactile_cube.api.effects import COLUMNS, effects
 from tactile_cube.command_help import CONFIG, commands
 from tactile_cube.drivetrain.effects import catalogue
+from tactile_cube.errors import InputError
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "images" / "effects"
@@ -25,8 +28,8 @@ ELSEWHERE = {"coupling_error": "q3"}
 
 def main() -> None:
     """Write the pages, and the pictures if they are asked for."""
-    (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
-    (DOCS / "configuration.md").write_text(configuration_page(), encoding="utf-8")
+    for name, page in PAGES.items():
+        (DOCS / name).write_text(page(), encoding="utf-8")
     if "--pictures" in sys.argv:
         write_pictures()
 
@@ -68,23 +71,40 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
+def commands_page() -> str:
+    """Every command with its file, as it stands in conf/."""
+    lines = [
+        "# Commands",
+        "",
+        "`tactile-cube NAME` and `python -m tactile_cube.NAME` are the same. `--help` lists groups and keys,",
+        "`--cfg job` shows the configuration, `-m` runs every combination of comma-separated values.",
+    ]
+    for name, summary in commands().items():
+        lines += ["", f"## {name}", "", summary, "", *_listing(CONFIG / f"{name}.yaml")]
+    return "\n".join(lines) + "\n"
+
+
 def configuration_page() -> str:
-    """Every command's file and every group's options, as they stand in conf/."""
+    """Every group's options, as they stand in conf/."""
     lines = [
         "# Configuration",
         "",
-        "Everything that can be chosen stands in a small file in `conf/`: `group=option` chooses a file, `key=value` a",
-        "value in it, `--cfg job` shows the result. This page is made from those files by `python docs/generate.py`.",
-        "",
-        "## Commands",
+        "`group=option` chooses a file of `conf/`, `key=value` a value in it, `+experiment=option` several at once.",
     ]
-    for name, summary in commands().items():
-        lines += ["", f"### {name}", "", summary, "", *_listing(CONFIG / f"{name}.yaml")]
-    lines += ["", "## Groups"]
     for group in sorted(path for path in CONFIG.iterdir() if path.is_dir() and path.name != "hydra"):
-        lines += ["", f"### {group.name}"]
+        lines += ["", f"## {group.name}"]
         for file in sorted(group.glob("*.yaml")):
             lines += ["", f"`{group.name}={file.stem}`", "", *_listing(file)]
+    return "\n".join(lines) + "\n"
+
+
+def api_page() -> str:
+    """Every public function and class with its signature and docstring."""
+    lines = ["# API", "", "Everything is imported as `tactile_cube.NAME`. [Python](python.md) shows it in use."]
+    for name in tactile_cube.__all__:
+        one = getattr(tactile_cube, name)
+        given = "(message)" if one is InputError else inspect.signature(one)
+        lines += ["", f"## {name}", "", "```text", f"{name}{given}", "", inspect.getdoc(one) or "", "```"]
     return "\n".join(lines) + "\n"
 
 
@@ -92,6 +112,15 @@ def _listing(file: Path) -> list[str]:
     text = file.read_text(encoding="utf-8")
     yaml.safe_load(text)
     return ["```yaml", *text.rstrip().splitlines(), "```"]
+
+
+PAGES = {
+    "commands.md": commands_page,
+    "configuration.md": configuration_page,
+    "effects.md": effects_page,
+    "api.md": api_page,
+}
+"""Name of each generated page in docs/, and what writes it."""
 
 
 def write_pictures() -> None:

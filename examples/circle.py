@@ -7,7 +7,7 @@ result is there already is left out, so that the same call goes on after an inte
     python examples/circle.py
     python examples/circle.py --smoke    # every stage, as small as it can be: shows that it runs, nothing more
     python examples/circle.py --control  # beside it: the same learning in the world without the effect
-    python examples/circle.py --publish docs/results/circle    # also copies tables, model and pictures there
+    python examples/circle.py --publish outputs/circle    # also copies tables, model and pictures there
 
 Results lie in outputs/circle/: circle.md and circle.json (the table), diagnose/report.html, identify/model.yaml,
 finetune/policy.safetensors, after/*.gif.

@@ -20,7 +20,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.policies import ScriptedPolicy
 from tactile_cube.evaluation.rollout import run_episode
-from tactile_cube.evaluation.verdict import Verdict, judge
+from tactile_cube.evaluation.verdict import EpisodeVerdict, judge
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.randomization import Randomization
 from tactile_cube.transforms import EnvConfig, make_env
@@ -82,9 +82,9 @@ def test_another_render_mode_is_refused() -> None:
         GymnasiumRotation(EnvConfig(Task("full")), render_mode="human")
 
 
-@pytest.mark.parametrize("verdict", [Verdict.REGRASPING, Verdict.DROPPED])
+@pytest.mark.parametrize("verdict", [EpisodeVerdict.REGRASPING, EpisodeVerdict.DROPPED])
 def test_success_is_the_verdict_of_evaluate_told_in_the_last_step(
-    env: GymnasiumRotation, verdict: Verdict, monkeypatch: pytest.MonkeyPatch
+    env: GymnasiumRotation, verdict: EpisodeVerdict, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged = []
 
@@ -95,7 +95,7 @@ def test_success_is_the_verdict_of_evaluate_told_in_the_last_step(
     monkeypatch.setattr(gymnasium_env, "judge", judge)
     env.reset(seed=0)
     infos = [env.step(np.zeros(12, dtype=np.float32))[-1] for _ in range(5)]
-    assert [info.get("is_success") for info in infos] == [None] * 4 + [verdict is Verdict.REGRASPING]
+    assert [info.get("is_success") for info in infos] == [None] * 4 + [verdict is EpisodeVerdict.REGRASPING]
     (record,) = judged
     assert record.steps == 5
     assert record.theta[-1] == infos[-1]["theta"]
@@ -117,7 +117,7 @@ def test_the_scripted_gait_earns_the_success_that_evaluate_gives_it() -> None:
     expected = judge(run_episode(made, ScriptedPolicy(), 0), 0, 0)
     made.close()
     assert info["theta"] == pytest.approx(expected.final_angle)
-    assert info["is_success"] == (expected.verdict is Verdict.REGRASPING)
+    assert info["is_success"] == (expected.verdict is EpisodeVerdict.REGRASPING)
 
 
 def test_registered_name_takes_options_of_the_configuration() -> None:

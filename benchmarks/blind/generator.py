@@ -20,7 +20,7 @@ import polars as pl
 import yaml
 from numpy.typing import NDArray
 
-from benchmarks.blind import hidden, sizes
+from benchmarks.blind import hidden, logs, sizes
 from benchmarks.blind.excitation import KINDS
 from benchmarks.blind.forms import BESIDE, FAMILIES
 from benchmarks.blind.physics import simulate
@@ -33,8 +33,9 @@ ATTEMPTS = 4
 """Worlds that a seed may draw until one runs through all its trials; some effects drive their joint."""
 VISIBLE = 1.5
 """A visible effect moves its joint by at least this multiple of the sensor noise, refitted constants removed."""
-WORLDS = {"usual": draw_usual, "sizes": sizes.draw_machine, "forms": draw_usual}
-"""What may be measured: the usual rigs, machines of any size, the usual rigs with laws as other authors write them."""
+WORLDS = {"usual": draw_usual, "sizes": sizes.draw_machine, "forms": draw_usual, "logs": logs.draw_log}
+"""What may be measured: the usual rigs, machines of any size, the usual rigs with laws as other authors write them, the
+usual rigs with controllers and logs as strangers have them."""
 
 
 def visibility(plain: World, changed: World, joint: int, noise: float, seed: int) -> dict[str, float]:
@@ -61,12 +62,18 @@ def visibility(plain: World, changed: World, joint: int, noise: float, seed: int
 
 
 def hide(
-    world: World, name: str, rng: np.random.Generator, strength: float, seed: int, noise: float
+    world: World,
+    name: str,
+    rng: np.random.Generator,
+    strength: float,
+    seed: int,
+    noise: float,
+    place: int | None = None,
 ) -> tuple[World, dict[str, Any]]:
-    """The world with one effect more, and the truth about it."""
+    """The world with one effect more, at a place if it is given, and the truth about it."""
     changed = copy(world)
     n = len(world.rig.actuated)
-    joint = int(rng.integers(n))
+    joint = int(rng.integers(n)) if place is None else place
     if name in hidden.WHOLE_RIG:
         joint = n - 1
     _, torque, command = probe(world, seed)
@@ -84,9 +91,10 @@ def hide(
         world.torque_unit,
         world.time_unit,
     )
-    make, family = FAMILIES.get(name) or (hidden.NAMED.get(name) or hidden.UNNAMED[name], ())
+    others = FAMILIES | logs.MAKERS
+    make, family = others.get(name) or (hidden.NAMED.get(name) or hidden.UNNAMED[name], ())
     joints = [joint]
-    if name == "command_delay" and n > 1 and rng.uniform() < 0.4:
+    if name in logs.EVERY_JOINT or (name == "command_delay" and place is None and n > 1 and rng.uniform() < 0.4):
         joints = list(range(n))
     parameters = make(scene, joint)
     for other in joints:
@@ -95,13 +103,15 @@ def hide(
         "name": name,
         "joints": [world.rig.actuated[i] for i in joints],
         "parameters": parameters,
-        "in_catalogue": name in hidden.NAMED or name in FAMILIES,
+        "in_catalogue": name in hidden.NAMED or name in others,
         "absorbed": name in hidden.ABSORBED,
-        "any_joint": name in hidden.WHOLE_RIG,
+        "any_joint": name in hidden.WHOLE_RIG + logs.WHOLE_RIG,
         **visibility(world, changed, joint, noise, seed),
     }
     if family:
         truth |= {"names": list(family), "beside": list(BESIDE.get(name, ()))}
+    if n == 1 and name in logs.TWINS:
+        truth["twins"] = list(logs.TWINS[name])
     return changed, truth
 
 
@@ -110,6 +120,9 @@ def names_for(seed: int, rng: np.random.Generator, worlds: str = "usual") -> tup
     if worlds == "forms":  # nothing in every sixth
         turn = seed - seed // 6 - 1
         return ("form", [list(FAMILIES)[turn % len(FAMILIES)]]) if seed % 6 else ("none", [])
+    if worlds == "logs":
+        kind = list(logs.TURNS)[seed % len(logs.TURNS)]
+        return kind, list(logs.TURNS[kind])
     kind = CYCLE[seed % len(CYCLE)]
     turn = seed // len(CYCLE) * CYCLE.count(kind) + CYCLE[: seed % len(CYCLE)].count(kind)
     if kind == "none":
@@ -141,8 +154,9 @@ def draw(
         world, bench, poor = WORLDS[worlds](rng, chosen, seconds, kind)
         floor = float(np.hypot(bench.noise, bench.resolution / np.sqrt(12)))
         effects = []
-        for name in chosen:
-            world, truth = hide(world, name, rng, strength if attempt == 0 else 1.0, seed, floor)
+        place = int(rng.integers(len(world.rig.actuated))) if worlds == "logs" else None
+        for name in (one for one in chosen if one not in logs.LOG_FAULTS):
+            world, truth = hide(world, name, rng, strength if attempt == 0 else 1.0, seed, floor, place)
             effects.append(truth)
         weakest = min((e["signal"] if e["absorbed"] else e["distinct"] for e in effects), default=np.inf)
         reached = np.abs(probe(world, seed)[0]).max()
@@ -180,6 +194,10 @@ def _table(
     position, torque, _ = _engine(engine)(world.rig, world.plant, command, bench.rate, start, bench.settle, **step)
     position = position + bench.noise * rng.normal(size=position.shape)
     position = np.round(position / bench.resolution) * bench.resolution
+    if bench.outliers:
+        off = rng.choice([-logs.OFF, logs.OFF], position.shape) * world.plant.angle_unit
+        position += np.where(rng.uniform(size=position.shape) < bench.outliers, off, 0.0)
+    command = np.concatenate([np.repeat(command[:1], bench.late, axis=0), command[: len(command) - bench.late]])
     torque = torque + world.torque_noise * rng.normal(size=torque.shape)
     columns: dict[str, Array] = {"time": np.arange(len(command)) / bench.rate}
     for i, joint in enumerate(world.rig.actuated):
@@ -281,6 +299,7 @@ def _record(
     """The log of one command, played after an initialisation with this offset."""
     there = copy(world)
     there.plant.offset[:] += offset
+    there.plant.early[:] = bench.skew / bench.rate
     command = command.astype(np.float32).astype(float)
     start_error = bench.start_error * rng.uniform(-1, 1, len(offset)) * there.plant.angle_unit
     return _table(there, bench, command, command[0] - there.plant.offset + start_error, rng, engine)

@@ -52,7 +52,7 @@ def simulate(
     p, m = (np.stack([getattr(plant, name) for name in names]) for names in (VECTORS, MATRICES))
     position, torque_out, joint_out = np.empty((samples, n)), np.empty((samples, n)), np.empty((samples, n))
     held, state, filtered, relay = command[0].copy(), np.zeros(n), np.zeros(n), np.ones(n)
-    felt, bristle, memory = np.zeros(n), np.zeros((n, 4)), np.zeros((n, 2))
+    felt, bristle, memory = np.zeros(n), np.zeros((n, 4)), np.zeros((n, 3))
     per, lead = round(1.0 / (rate * step)), round(settle / step)
     for k in range(-lead, samples * per):
         t = k * step
@@ -60,7 +60,7 @@ def simulate(
         for i in range(n):
             late = int(np.floor((t - p[DELAY, i]) * rate + 1e-6))
             target = command[min(max(late, 0), samples - 1), i]
-            follow(p, i, q[i], v[i], target, step, held, filtered, state, relay, memory)
+            follow(p, i, q[i], v[i], target, 0.0, step, held, filtered, state, relay, memory)
         for i in range(n):
             torque, level = load_on_joint(p, m, i, t, q, v, step, state, relay, bristle, felt)
             data.qfrc_applied[dofs[i]] = torque

@@ -12,7 +12,8 @@ FIRST_SEED = 10_000
 RULES = "[benchmarks/blind/scoring.py](../../benchmarks/blind/scoring.py)"
 GENERATOR = "[generator](../../benchmarks/blind/generator.py)"
 ROUNDS = "[rounds.md](rounds.md)"
-TITLES = {"usual": "", "sizes": ": machines of other sizes", "forms": ": other forms of the laws"}
+TITLES = {"usual": "", "sizes": ": machines of other sizes", "forms": ": other forms of the laws",
+          "logs": ": controllers and logs of strangers"}  # fmt: skip
 GOAL = 1.3
 """Error on unseen trials in units of the floor that is aimed at."""
 

@@ -160,10 +160,11 @@ def _friction_level(p, m, i, t, q, v, load, acceleration):
 
 
 @njit(cache=True)
-def follow(p, i, q, v, target, step, held, filtered, state, relay, memory):
+def follow(p, i, q, v, target, fed, step, held, filtered, state, relay, memory):
     """One step of joint i's drive: the command that it holds, its filtered speed, its torque, and a hidden relay.
 
-    `memory` (joints, 2) holds the place of a damped play and the first stage of a filter of second order.
+    `memory` (joints, 3) holds the place of a damped play, the first stage of a filter of second order and the integral
+    of a controller, which adds the torque `fed` to that of its errors.
     """
     most = p[at.RATE_LIMIT, i] * step
     held[i] += min(max(target - held[i], -most), most)
@@ -174,6 +175,12 @@ def follow(p, i, q, v, target, step, held, filtered, state, relay, memory):
         filtered[i] = before + (memory[i, 1] - before) * step / p[at.VELOCITY_LAG_2, i]
     error = held[i] - q - p[at.OFFSET, i]
     error -= p[at.TRANSMISSION, i] * np.sin(p[at.TRANSMISSION_ORDER, i] * q + p[at.TRANSMISSION_PHASE, i])
+    if p[at.INTEGRAL, i] > 0.0:
+        most = p[at.INTEGRAL_LIMIT, i]
+        grown = memory[i, 2] + p[at.INTEGRAL, i] * step * (error - _deflection(p, i, state[i]))
+        memory[i, 2] = min(max(grown, -most), most)
+    if memory[i, 2] + fed != 0.0:
+        error += (memory[i, 2] + fed) / p[at.KP, i]
     if p[at.LAG, i] > 0.0:
         deflection = _deflection(p, i, state[i])
         wanted = p[at.KP, i] * (error - deflection) - p[at.KD, i] * filtered[i]
@@ -187,6 +194,8 @@ def follow(p, i, q, v, target, step, held, filtered, state, relay, memory):
         memory[i, 0] = min(max(memory[i, 0] + state[i] * step / p[at.GAP_DAMPING, i], -half), half)
     else:
         state[i] = _drive(p, i, error, filtered[i])[0]
+    lost = p[at.STALL, i] * v / p[at.NO_LOAD, i] if p[at.STALL, i] < np.inf else 0.0
+    state[i] = min(max(state[i], -p[at.STALL, i] - lost), p[at.STALL, i] - lost)
     edge = p[at.RELAY_CENTRE, i] + (-0.5 if relay[i] > 0 else 0.5) * p[at.RELAY_WIDTH, i]
     relay[i] = 1.0 if q > edge else -1.0
 
@@ -243,7 +252,7 @@ def read_sensors(p, q, held, filtered, state, memory, position, torque, joint):
 
 
 @njit  # not cached: a cache does not see that dynamics.py changed
-def _run(chain, gravity, select, shift, p, m, command, start, rate, settle, step):
+def _run(chain, gravity, stated, select, shift, p, m, command, start, rate, settle, step):
     """Sampled motor positions and torques (samples, joints) under a command held between its samples."""
     samples, n = command.shape
     per = round(1.0 / (rate * step))
@@ -251,12 +260,16 @@ def _run(chain, gravity, select, shift, p, m, command, start, rate, settle, step
     q = start.copy()
     v, acceleration, impulse = np.zeros(n), np.zeros(n), np.zeros(n)
     held, state, filtered, relay = command[0].copy(), np.zeros(n), np.zeros(n), np.ones(n)
-    bristle, memory, arrived = np.zeros((n, 4)), np.zeros((n, 2)), np.zeros(n, np.int64)
+    bristle, memory, arrived = np.zeros((n, 4)), np.zeros((n, 3)), np.zeros(n, np.int64)
+    weight, compensates, early = np.zeros(n), p[at.COMPENSATION].any(), round(p[at.EARLY, 0] / step)
     torque, low, high, felt = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     lead = round(settle / step)
-    for k in range(-lead, samples * per):
+    for k in range(-lead, samples * per + max(-early, 0)):
         t = k * step
         qm, vm = q + 0.5 * step * v, v + 0.5 * step * acceleration
+        if compensates:
+            mass, bias = mass_and_bias(*chain, stated, select @ qm + shift, select @ np.zeros(n))  # type: ignore[call-arg]
+            weight = reduced(mass, bias, select, p[at.REFLECTED_INERTIA])[1]
         for i in range(n):
             wait = p[at.DELAY, i]
             if p[at.JITTER, i] > 0.0:  # anew every 20 ms, in every trial otherwise
@@ -265,7 +278,9 @@ def _run(chain, gravity, select, shift, p, m, command, start, rate, settle, step
             late = int(np.floor((t - wait) * rate + 1e-6))
             arrived[i] = max(arrived[i], min(max(late, 0), samples - 1))
             target = command[arrived[i], i]
-            follow(p, i, qm[i], vm[i], target, step, held, filtered, state, relay, memory)
+            fed = p[at.COMPENSATION, i] * weight[i]
+            fed += p[at.FEEDFORWARD, i] * rate * (target - command[max(arrived[i] - 1, 0), i])
+            follow(p, i, qm[i], vm[i], target, fed, step, held, filtered, state, relay, memory)
         for i in range(n):
             torque[i], level = load_on_joint(p, m, i, t, qm, vm, step, state, relay, bristle, felt)
             low[i], high[i] = -step * level * (1.0 - p[at.ASYMMETRY, i]), step * level * (1.0 + p[at.ASYMMETRY, i])
@@ -281,8 +296,8 @@ def _run(chain, gravity, select, shift, p, m, command, start, rate, settle, step
         if not np.abs(q).max() < 100.0:
             position[:] = np.nan
             break
-        if k >= 0 and (k + 1) % per == 0:
-            row = k // per
+        row = (k + 1 + early) // per - 1
+        if 0 <= row < samples and (k + 1 + early) % per == 0:
             read_sensors(p, q, held, filtered, state, memory, position[row], torque_out[row], joint_out[row])
     return position, torque_out, joint_out
 
@@ -298,5 +313,6 @@ def simulate(
     select, shift = rig.selection()
     vectors = np.stack([getattr(plant, name) for name in at.VECTORS])
     matrices = np.stack([getattr(plant, name) for name in at.MATRICES])
-    gravity = np.array(rig.gravity)
-    return _run(rig.arrays(), gravity, select, shift, vectors, matrices, command, start, rate, settle, step)
+    stated = np.array(rig.gravity)
+    gravity = stated if rig.felt is None else np.array(rig.felt)
+    return _run(rig.arrays(), gravity, stated, select, shift, vectors, matrices, command, start, rate, settle, step)

@@ -106,13 +106,24 @@ class Plant(NamedTuple):
     push: Array
     push_start: Array
     push_seconds: Array
+    # parts of a controller and of a motor that an owner does not state, and when the log reads
+    integral: Array
+    integral_limit: Array
+    feedforward: Array
+    compensation: Array
+    stall: Array
+    no_load: Array
+    early: Array
 
 
 MATRICES = ("crosstalk", "viscous_coupling", "dry_coupling", "neighbour_friction")
-INFINITE = ("soft_limit", "knee", "rate_limit", "saturation", "stop_upper", "torque_limit", "stiffness")
+INFINITE = (
+    "soft_limit", "knee", "rate_limit", "saturation", "stop_upper", "torque_limit", "stiffness", "integral_limit",
+    "stall",
+)  # fmt: skip
 ONES = (
     "gain", "stribeck_velocity", "transmission_order", "cogging_order", "detent_width", "drift_time", "angle_unit",
-    "speed_unit", "time_unit", "smooth_torque", "knee_stiffness",
+    "speed_unit", "time_unit", "smooth_torque", "knee_stiffness", "no_load",
 )  # fmt: skip
 
 
@@ -129,7 +140,8 @@ VECTORS = tuple(name for name in Plant._fields if name not in MATRICES)
     ANGLE_UNIT, SPEED_UNIT, TIME_UNIT, SMOOTH_BACKLASH, SMOOTH_TORQUE, DAMPED_BACKLASH, GAP_DAMPING, BRISTLES,
     MICRO_DAMPING, BOUC_WEN_SHAPE, STRIBECK_EXPONENT, JITTER, COGGING_2, COGGING_PHASE_2, COGGING_3,
     COGGING_PHASE_3, SOFT_LIMIT, TORQUE_BEND, VISCOUS_DIFFERENCE, BACKDRIVEN_FRICTION, VELOCITY_LAG_2, STOP_GROWTH,
-    KNEE, KNEE_STIFFNESS, DRIFT_RATE, CUBIC_DRAG, PUSH, PUSH_START, PUSH_SECONDS,
+    KNEE, KNEE_STIFFNESS, DRIFT_RATE, CUBIC_DRAG, PUSH, PUSH_START, PUSH_SECONDS, INTEGRAL, INTEGRAL_LIMIT,
+    FEEDFORWARD, COMPENSATION, STALL, NO_LOAD, EARLY,
 ) = range(len(VECTORS))  # fmt: skip
 CROSSTALK, VISCOUS_COUPLING, DRY_COUPLING, NEIGHBOUR_FRICTION = range(len(MATRICES))
 

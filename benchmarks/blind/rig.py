@@ -38,6 +38,8 @@ class Rig:
     coupling_ratio: float = 1.0
     coupling_offset: float = 0.0
     tip_mass: float = 0.0
+    felt: tuple[float, float, float] | None = None
+    """Gravity as it is; None: as its owner states it."""
     actuated: list[str] = field(init=False)
 
     def __post_init__(self) -> None:

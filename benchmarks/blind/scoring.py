@@ -6,6 +6,7 @@
 | one named effect | `missing_effect`, that name and joint | `ambiguous`, truth in the set; see below | the rest |
 | two named effects | `missing_effect` with exactly both | `ambiguous`, both in the sets; see below | the rest |
 | another form | `missing_effect`, its family alone, that joint | one in the set | the rest |
+| one that has a twin there | `ambiguous`, truth and twin in the set | truth alone; one in the set | the rest |
 | outside the catalogue | `unknown_effect` | `ambiguous`, `partly_explained` | the rest |
 
 `partly_explained` counts as `ambiguous` does: it names what it found, and says that this is not all.
@@ -85,7 +86,7 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
     only = all(any(_matches(t, e["name"], e["joints"], beside=True) for t in truths) for e in answer)
     if verdict == "missing_effect":
         if only and len(found) == len(truths):
-            return "right", "named"
+            return ("acceptable", "its twin unsaid") if any(t.get("twins") for t in truths) else ("right", "named")
         missed = [t for t in truths if t not in found]
         if only and found and at_floor:
             return "acceptable", "absorbed" if all(t["absorbed"] for t in missed) else "invisible"
@@ -93,8 +94,11 @@ def _named(truths: list[dict[str, Any]], diagnosis: dict[str, Any], at_floor: bo
             return "wrong", "another effect"
         return "wrong", "only one of two" if len(found) < len(truths) else "an effect too many"
     if verdict in ("ambiguous", "partly_explained"):
-        held = [t for t in truths if _in_set(t, diagnosis)]
-        return ("acceptable", "in the set") if len(held) == len(truths) else ("wrong", "not in the set")
+        if not all(_in_set(t, diagnosis) for t in truths):
+            return "wrong", "not in the set"
+        twins = [{**t, "name": t["twins"][0], "names": t["twins"]} for t in truths if t.get("twins")]
+        together = verdict == "ambiguous" and twins and all(_in_set(t, diagnosis) for t in twins)
+        return ("right", "named with its twin") if together else ("acceptable", "in the set")
     if verdict == "adequate":
         offsets = {one["joint"] for one in diagnosis.get("common_offsets", [])}
         if all(t["name"] == "position_offset" and set(t["joints"]) <= offsets for t in truths):

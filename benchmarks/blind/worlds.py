@@ -57,6 +57,12 @@ class Bench:
     settle: float
     dropped: float
     start_error: float
+    skew: float = 0.0
+    """Part of a row that positions are read before its end."""
+    late: int = 0
+    """Rows that a command is logged late."""
+    outliers: float = 0.0
+    """Share of readings that are nonsense."""
 
 
 @dataclass

@@ -1,6 +1,6 @@
 """Faults of all kinds at random moments of `+experiment=smoke`: is anything lost, does anything hang or stay behind?
 
-    python -m benchmarks.faults.campaign --faults 100 --seed 0 --out docs/results/reliability
+    python -m benchmarks.faults.campaign --faults 100 --seed 0 --out outputs/reliability
 
 The run is as short as it can be with three barriers, two workers and learning from a replay; words at the end
 change it.

@@ -1,6 +1,6 @@
 """Damaged files of every kind: is each read or refused in one line, soon, and nothing left half written?
 
-    python -m benchmarks.faults.fuzz --inputs 10000 --seed 0 --out docs/results/reliability
+    python -m benchmarks.faults.fuzz --inputs 10000 --seed 0 --out outputs/reliability
 
 Readers are called as the commands call them, in one process.
 """

@@ -1,8 +1,8 @@
 """Do memory, open files or logs of a training, or of many diagnoses in one process, grow?
 
-    python -m benchmarks.faults.growth --minutes 20 --out docs/results/reliability
+    python -m benchmarks.faults.growth --minutes 20 --out outputs/reliability
     python -m benchmarks.faults.growth --minutes 20 --pid PID --folder RUN      # one that runs already
-    python -m benchmarks.faults.growth --diagnoses 200 --out docs/results/reliability
+    python -m benchmarks.faults.growth --diagnoses 200 --out outputs/reliability
 
 Writes growth.csv (one row each ten seconds, all processes of the run together) and growth.png; of diagnoses
 diagnoses.csv (one row after each) and diagnoses.png.

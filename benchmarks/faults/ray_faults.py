@@ -2,7 +2,7 @@
 
 And is a batch done to the last one when a node is lost?
 
-    python -m benchmarks.faults.ray_faults --out docs/results/reliability
+    python -m benchmarks.faults.ray_faults --out outputs/reliability
 
 The run is a fifth of smoke's. Each fault strikes once it is an iteration past its second barrier. After it the same
 command is given until it ends by itself. Needs pip install '.[ray]'.

@@ -29,11 +29,11 @@ from tactile_cube.evaluation.environment import environment
 from tactile_cube.evaluation.policies import HoldPolicy
 from tactile_cube.evaluation.policy_source import PolicySource
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2
+from tactile_cube.hand.model import finger_urdf
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.hand.urdf import finger_urdf
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.rig import read_rig
-from tactile_cube.measurement.recordings.writing import write_whole
+from tactile_cube.measurement.recordings.writing import write_recordings
 from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tactile_cube.measurement.sources.ros_bag import RosBag
 from tactile_cube.training.checkpoint import FILE, HEAD, Checkpoints, require_same_settings
@@ -92,7 +92,9 @@ def _csv(folder: Path) -> None:
 
 def _import_csv(folder: Path) -> None:
     logs = [str(folder / "log1.csv"), str(folder / "log2.csv")]
-    write_whole(folder / "out", CsvFiles(files=logs, urdf=str(folder / "rig.urdf"), controller=GAINS).recordings(0))
+    write_recordings(
+        folder / "out", CsvFiles(files=logs, urdf=str(folder / "rig.urdf"), controller=GAINS).recordings(0)
+    )
 
 
 def _bag(folder: Path) -> None:
@@ -102,7 +104,7 @@ def _bag(folder: Path) -> None:
 
 def _import_bag(folder: Path) -> None:
     bag = RosBag([str(folder / "bag.mcap")], str(folder / "rig.urdf"), ["a", "b"], GAINS)
-    write_whole(folder / "out", bag.recordings(0))
+    write_recordings(folder / "out", bag.recordings(0))
 
 
 def _read_urdf(folder: Path) -> None:

@@ -1,6 +1,6 @@
 """A sweep whose main process is killed in its second run: does the same command end it, with the same bits?
 
-    python -m benchmarks.faults.sweep --out docs/results/reliability
+    python -m benchmarks.faults.sweep --out outputs/reliability
 
 Runs of `+experiment=smoke` as short as the campaign's, four seeds one after the other. Writes sweep.md.
 """

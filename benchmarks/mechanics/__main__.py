@@ -2,7 +2,7 @@
 
     python -m benchmarks.mechanics [--engines bullet mujoco] [--accuracy fast faithful] [--cases creep ...] [--page F]
 
-Writes docs/results/mechanics.md. `fast` is 2 ms and 30 solver iterations, `faithful` 0.5 ms and 150.
+Writes outputs/mechanics.md. `fast` is 2 ms and 30 solver iterations, `faithful` 0.5 ms and 150.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def asked() -> argparse.Namespace:
     parser.add_argument("--cases", nargs="+", choices=list(CASES), default=list(CASES))
     spinning = "spinning friction [m] at which steps and iterations are refined tenfold; no number: not at all"
     parser.add_argument("--spinning", nargs="*", type=float, default=SPINNING, help=spinning)
-    parser.add_argument("--page", type=Path, default=Path("docs/results/mechanics.md"), help="file to write")
+    parser.add_argument("--page", type=Path, default=Path("outputs/mechanics.md"), help="file to write")
     return parser.parse_args()
 
 

@@ -84,11 +84,17 @@ def paper_rows(results: Sequence[Results], free_finger: Mapping[str, Any] | None
             lines.append(f"| {row.what} | {row.paper} | not run | | | `{row.command}` | |")
             continue
         cost = "" if row.made_by else f"{found['cpu_hours']:.2f}"
-        made = f"{found['policy']['label']}, {found['seed']} | {cost} | `{row.made_by or found['command']}`"
+        made = f"{found['policy']['label']}, {found['seed']} | {cost} | `{row.made_by or typed(found['command'])}`"
         commit = found["policy"].get("commit") if row.made_by else found.get("commit")
         lines.append(f"| {row.what} | {row.paper} | {row.ours(found)} | {made} | {commit or 'not recorded'} |")
     lines.append(_free_finger_row(free_finger))
     return "\n".join(lines)
+
+
+def typed(command: str) -> str:
+    """A command without what changes none of its numbers: film and run folder."""
+    kept = (word for word in command.split() if word.partition("=")[0] not in ("film", "hydra.run.dir"))
+    return " ".join(kept)
 
 
 def _free_finger_row(comparison: Mapping[str, Any] | None) -> str:
@@ -181,8 +187,7 @@ def _along(axis: str) -> Callable[[Results], str]:
     def ours(results: Results) -> str:
         along = [one for one in results["variants"] if one["variant"].get("axis") == axis]
         points = [(f"{one['variant']['value']:g}", one["summary"]) for one in along]
-        shown = [f"{at}: {of['kept']}/{of['episodes']} kept, {of['mean_angle']:.1f} rad" for at, of in points]
-        return f"{axis} {'; '.join(shown)}; nominal {summary_of(results)['mean_angle']:.1f} rad"
+        return f"{axis} " + "; ".join(f"{at}: {of['kept']}/{of['episodes']} kept" for at, of in points)
 
     return ours
 

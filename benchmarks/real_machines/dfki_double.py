@@ -10,7 +10,7 @@ import numpy as np
 
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.foreign_log import cut
+from tactile_cube.measurement.sources.foreign_log import cut_trial
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.untrusted_file import read_npz
 
@@ -77,4 +77,4 @@ class DfkiDouble:
             for key in ("tau_meas", "pos_meas")
         )
         entry = TrialEntry(file=f"trials/{path.stem}.parquet", kind=path.stem)
-        return list(cut(TrialTable(entry, time, torque, position), self.length))
+        return list(cut_trial(TrialTable(entry, time, torque, position), self.length))

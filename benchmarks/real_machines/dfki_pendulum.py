@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.foreign_log import cut
+from tactile_cube.measurement.sources.foreign_log import cut_trial
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.untrusted_file import read_npz
 
@@ -64,7 +64,7 @@ class DfkiPendulum:
         time = np.arange(0.0, data[-1, 0] - data[0, 0], 1 / RATE)
         signals = [np.interp(time, data[:, 0] - data[0, 0], data[:, column])[:, None] for column in (3, 1)]
         entry = TrialEntry(file=f"trials/{run}.parquet", kind=run)
-        pieces = cut(TrialTable(entry, time, *signals), self.length)
+        pieces = cut_trial(TrialTable(entry, time, *signals), self.length)
         pushed = PUSHED_FROM.get(run, np.inf)
         return [self._marked(piece, number * self.length + self.length > pushed) for number, piece in enumerate(pieces)]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.foreign_log import cut
+from tactile_cube.measurement.sources.foreign_log import cut_trial
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.untrusted_file import read_npz
 
@@ -46,7 +46,7 @@ class Emps:
             sensors={"read": "before"}, source="EMPS, nonlinear benchmark of Janot, Gautier and Brunot",
         )  # fmt: skip
         return {
-            "": RecordingTables(description, URDF, cut(self._trial("sweep"), self.length)),
+            "": RecordingTables(description, URDF, cut_trial(self._trial("sweep"), self.length)),
             "validation": RecordingTables(description, URDF, [self._trial("pulses")]),
         }
 

@@ -13,7 +13,7 @@ from scipy import signal
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.foreign_log import cut
+from tactile_cube.measurement.sources.foreign_log import cut_trial
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.untrusted_file import read_npz
 
@@ -47,7 +47,7 @@ class Tx40:
         torque = smoothed(archive["motor_current_signal"]) @ REDUCTION
         entry = TrialEntry(file="trials/motion.parquet", kind="motion")
         time = np.arange(len(position)) * DECIMATION / LOGGED
-        pieces = list(cut(TrialTable(entry, time, torque, position), self.length))
+        pieces = list(cut_trial(TrialTable(entry, time, torque, position), self.length))
         first = round(SHARE * len(pieces))
         description = described(
             gravity=[0.0, 0.0, -9.81], rate_hz=LOGGED / DECIMATION, joints=JOINTS, controller={"mode": "torque"},

@@ -3,25 +3,18 @@
 `python -m tests.contract.test_experiments` pins what they compose to now; read the difference before committing it.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 
 from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import composed
 
 PINNED = Path(__file__).with_name("experiments.yaml")
 EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def hydra_configuration() -> Iterator[None]:
-    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
-        yield
 
 
 def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
@@ -32,20 +25,19 @@ def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
     return {name: leaf for key, value in pairs for name, leaf in flat(value, key).items()}
 
 
-def composed(*overrides: str) -> dict[str, Any]:
-    return flat(OmegaConf.to_container(compose("train", overrides=list(overrides))))
+def settings(*overrides: str) -> dict[str, Any]:
+    return flat(OmegaConf.to_container(composed("train", overrides)))
 
 
 def departures(experiment: str) -> dict[str, Any]:
     """What an experiment changes in the published settings; `absent` where it has no such key."""
-    plain, changed = composed(), composed(f"+experiment={experiment}")
+    plain, changed = settings(), settings(f"+experiment={experiment}")
     keys = sorted(plain.keys() | changed.keys())
     return {key: changed.get(key, "absent") for key in keys if changed.get(key, "absent") != plain.get(key, "absent")}
 
 
 def pin() -> None:
-    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
-        pinned = {experiment: departures(experiment) for experiment in EXPERIMENTS}
+    pinned = {experiment: departures(experiment) for experiment in EXPERIMENTS}
     head = (
         "# What each experiment of conf/experiment changes in train.yaml as it stands; written by test_experiments.py."
     )
@@ -62,7 +54,7 @@ def test_every_experiment_is_pinned_and_nothing_else() -> None:
 
 
 def test_alone_is_taught_by_nobody_and_pays_for_a_turn_as_published() -> None:
-    alone, published = composed("+experiment=alone"), composed()
+    alone, published = settings("+experiment=alone"), settings()
     assert (alone["exploration.demonstrations"], alone["agent.demonstration_weight"]) == (0.0, 0)
     assert not any("teacher" in key or "gait" in key for key in alone)
     fingers = 4

@@ -1,13 +1,12 @@
 """Every choice of train's configuration composes and instantiates."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
+from tactile_cube import composition
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.command_help import CONFIG
 from tactile_cube.env import Conditions
@@ -19,14 +18,8 @@ CHOICES = [f"{group}={file.stem}" for group in GROUPS for file in sorted((CONFIG
 CHOICES += [f"+experiment={file.stem}" for file in sorted((CONFIG / "experiment").glob("*.yaml"))]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def hydra_configuration() -> Iterator[None]:
-    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
-        yield
-
-
 def composed(*overrides: str) -> DictConfig:
-    return compose("train", overrides=list(overrides))
+    return composition.composed("train", overrides)
 
 
 @pytest.mark.parametrize("choice", CHOICES)

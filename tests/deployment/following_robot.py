@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
-from tactile_cube.deployment.limits import Limits, StopRules
+from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.robot import Reading
 
 TICK = 1e-3  # [s]
@@ -84,7 +84,7 @@ class FollowingRobot:
         self.closed = True
 
 
-def assert_every_command_is_safe(robot: FollowingRobot, limits: Limits, rules: StopRules) -> None:
+def assert_every_command_is_safe(robot: FollowingRobot, limits: JointLimits, rules: StopRules) -> None:
     """Every command is finite, within range, rate and torque, and measured against the last accepted state."""
     if not robot.sent:
         return
@@ -92,7 +92,7 @@ def assert_every_command_is_safe(robot: FollowingRobot, limits: Limits, rules: S
         _assert_safe(robot, limits, rules)
 
 
-def _assert_safe(robot: FollowingRobot, limits: Limits, rules: StopRules) -> None:
+def _assert_safe(robot: FollowingRobot, limits: JointLimits, rules: StopRules) -> None:
     q_d, accepted = (np.array(rows) for rows in zip(*((one.q_d, one.accepted.q_m) for one in robot.sent), strict=True))
     sent, stamped = np.array([(one.time, one.accepted.time) for one in robot.sent]).T
     assert np.isfinite(q_d).all()

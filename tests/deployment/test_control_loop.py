@@ -13,7 +13,7 @@ import pytest
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.limits import Limits, StopRules, Watchdog
+from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog
 from tactile_cube.deployment.played_targets import PlayedTargets
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.run_loop import HOLD_TICKS, LoopRun, run_loop
@@ -31,7 +31,7 @@ from tests.deployment.following_robot import (
 
 HOME = np.asarray(DLR_HAND2.start_angles)
 OPEN = HOME - 0.1
-LIMITS = Limits(DLR_HAND2.lower, DLR_HAND2.upper, 6.28, 1.0, np.full(12, 3.69), np.full(12, 0.25))
+LIMITS = JointLimits(DLR_HAND2.lower, DLR_HAND2.upper, 6.28, 1.0, np.full(12, 3.69), np.full(12, 0.25))
 RULES = StopRules()
 QUICK = Homing(speed=1.0, settle=0.05)
 FIRST = 2  # the tick of the first measurement
@@ -60,7 +60,7 @@ def run(
     targets: np.ndarray = HOME[None] + 0.2,
     seconds: float = 0.5,
     opened: np.ndarray | None = None,
-    limits: Limits = LIMITS,
+    limits: JointLimits = LIMITS,
     say: Callable[[str], None] = lambda line: None,
 ) -> LoopRun:
     """Run a loop on a robot; whatever comes of it, every command is safe and the hold is sent last."""
@@ -288,7 +288,7 @@ def test_only_torque_that_lasts_without_a_break_stops() -> None:
 
 def test_a_finger_that_is_pushed_faster_than_its_command_may_follow_is_not_believed() -> None:
     """The command is at the torque limit, so no other one keeps rate and torque."""
-    slow = Limits(LIMITS.lower, LIMITS.upper, 1.0, 0.2, LIMITS.kp, LIMITS.kd)
+    slow = JointLimits(LIMITS.lower, LIMITS.upper, 1.0, 0.2, LIMITS.kp, LIMITS.kd)
     push = change(q_m=lambda q: q - 0.01 * AT)
     robot = FollowingRobot(HOME, {tick: [push] for tick in range(400, 5000)}, follow=0.0)
     reason = run(robot, HOME[None] + 0.4, seconds=5.0, limits=slow).reason
@@ -390,8 +390,8 @@ def test_a_hold_that_is_lost_is_sent_again_and_a_link_that_stays_broken_is_said(
 
 @pytest.mark.parametrize("value", [-1.0, 0.0, np.nan, np.inf])
 def test_bounds_without_a_meaning_are_refused(value: float) -> None:
-    def limits(**changed: object) -> Limits:
-        return Limits(**(vars(LIMITS) | changed))  # type: ignore[arg-type]
+    def limits(**changed: object) -> JointLimits:
+        return JointLimits(**(vars(LIMITS) | changed))  # type: ignore[arg-type]
 
     makers: dict[str, Callable[[], object]] = {
         "rate_limit": lambda: limits(rate=value),

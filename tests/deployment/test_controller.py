@@ -11,7 +11,7 @@ import torch
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
-from tactile_cube.deployment.controller import Controller, TargetFilter
+from tactile_cube.deployment.controller import PolicyController, TargetFilter
 from tactile_cube.deployment.network import Network, read_network
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
@@ -41,14 +41,14 @@ def test_the_controller_asks_for_what_the_policy_does_in_simulation(tmp_path: Pa
 
     record = run_episode(env, Listening(actor), 0)
     env.close()
-    controller = Controller(network)
+    controller = PolicyController(network)
     controller.reset()
     targets = [controller.step(q_m, q_f) for q_m, q_f in readings]
     np.testing.assert_allclose(targets, record.target, atol=1e-5)
 
 
 def test_reset_forgets_the_past(tmp_path: Path) -> None:
-    controller = Controller(make_network(tmp_path)[1])
+    controller = PolicyController(make_network(tmp_path)[1])
     first = controller.step(np.full(12, 0.1), np.full(12, 0.2))
     assert not np.array_equal(controller.step(np.zeros(12), np.zeros(12)), first)
     controller.reset()
@@ -66,7 +66,7 @@ def test_the_filter_reaches_63_percent_after_its_time_constant() -> None:
 def test_a_policy_of_another_shape_is_refused() -> None:
     weight, bias = np.zeros((24, 100), dtype=np.float32), np.zeros(24, dtype=np.float32)
     with pytest.raises(InputError, match="maps 100 numbers to 12"):
-        Controller(Network((weight,), (bias,), {}))
+        PolicyController(Network((weight,), (bias,), {}))
 
 
 def test_the_robots_computer_needs_no_torch() -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from tactile_cube.deployment.control_loop import ControlLoop
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.limits import Limits, StopRules
+from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.run_loop import run_loop
 from tests.deployment.following_robot import (
     FollowingRobot,
@@ -85,7 +85,7 @@ answers = st.one_of(
 )
 positive = st.floats(1e-3, 100.0)
 limits = st.builds(
-    lambda rate, torque, kp: Limits(LOWER, UPPER, rate, torque, np.array(kp), np.full(2, 0.2)),
+    lambda rate, torque, kp: JointLimits(LOWER, UPPER, rate, torque, np.array(kp), np.full(2, 0.2)),
     st.floats(-2, 2).map(lambda power: 10.0**power),
     st.floats(-2, 1).map(lambda power: 10.0**power),
     st.tuples(st.floats(1e-3, 50.0), st.just(0.0) | st.floats(1e-3, 50.0)),
@@ -133,7 +133,7 @@ class TooLongError(Exception):
 def test_every_command_is_safe_whatever_is_read_answered_raised_and_set(
     events: list[tuple[int, tuple[str, Spoil], int]],
     answers: list[Any],
-    limits: Limits,
+    limits: JointLimits,
     rules: StopRules,
     start: np.ndarray,
     follow: float,

@@ -7,11 +7,11 @@ import pytest
 
 from tactile_cube.deployment import export
 from tactile_cube.deployment.control_loop import ControlLoop
-from tactile_cube.deployment.controller import Controller
+from tactile_cube.deployment.controller import PolicyController
 from tactile_cube.deployment.export import export_policy
 from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.interface_contract import interface_contract
-from tactile_cube.deployment.limits import Limits, StopRules
+from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.errors import InputError
@@ -133,8 +133,8 @@ def test_a_loop_written_from_the_contract_alone_sends_what_ours_sends(network: N
         return np.tanh(arrays["weight2"] @ hidden + arrays["bias2"])
 
     gains = (np.full(12, kp), np.full(12, kd))
-    limits = Limits(DLR_HAND2.lower, DLR_HAND2.upper, rate, torque, *gains)
-    loop = ControlLoop(Controller(network), 0.5, limits, StopRules(), Homing(settle=1e-3), seconds=1.0)
+    limits = JointLimits(DLR_HAND2.lower, DLR_HAND2.upper, rate, torque, *gains)
+    loop = ControlLoop(PolicyController(network), 0.5, limits, StopRules(), Homing(settle=1e-3), seconds=1.0)
     for tick in range(-4, 1):  # five that agree before the first command
         loop.tick(1e-3 * tick, Reading(1e-3 * tick, home))
     stack, q_f, q_d, q_m = None, home, home, home

@@ -11,7 +11,7 @@ import pytest
 
 from tactile_cube.deployment.control_loop import ControlLoop
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.limits import Limits, StopRules
+from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.played_targets import PlayedTargets
 from tactile_cube.deployment.ros2_hand import Ros2Hand
 from tactile_cube.deployment.run_loop import LoopRun, run_loop
@@ -110,7 +110,7 @@ class Loopback:
 
 
 def run(robot: Loopback, opened: bool = False) -> LoopRun:
-    limits = Limits(DLR_HAND2.lower, DLR_HAND2.upper, 6.28, 1.0, np.full(12, 3.69), np.full(12, 0.25))
+    limits = JointLimits(DLR_HAND2.lower, DLR_HAND2.upper, 6.28, 1.0, np.full(12, 3.69), np.full(12, 0.25))
     homing, waits = Homing(speed=1.0, settle=0.05), HOME - 0.1 if opened else None
     loop = ControlLoop(PlayedTargets(HOME[None] + 0.1), 0.2, limits, StopRules(), homing, 0.5, opened=waits)
     return run_loop(loop, robot, lambda line: None)

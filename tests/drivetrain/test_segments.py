@@ -7,6 +7,7 @@ from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.effects.backlash import Backlash
 from tactile_cube.drivetrain.effects.position_offset import PositionOffset
+from tactile_cube.drivetrain.effects.torque_bias import TorqueBias
 from tactile_cube.drivetrain.signals import MOTOR_POSITION
 from tests.drivetrain.rigs import wheel
 
@@ -16,7 +17,7 @@ ROWS, SEGMENT, DT = 60, 20, 2e-3
 
 def readings(effect: Effect, command: np.ndarray, starts: np.ndarray, speeds: np.ndarray) -> np.ndarray:
     """Readings (60,) [rad] of a wheel's sensor in three segments."""
-    plant = Plant([wheel()], dt=DT, effects=(PositionOffset, Backlash))
+    plant = Plant([wheel()], dt=DT, effects=(PositionOffset, Backlash, TorqueBias))
     memory = plant.memory(SOFT, effects=[effect])[None]
     plant.reset(memory, starts[0], speeds[0])
     out = np.zeros((1, ROWS, 1, 1))
@@ -37,6 +38,12 @@ def sensor(error: float) -> np.ndarray:
 @pytest.mark.parametrize("error", [0.1, -0.3])
 def test_a_wrong_zero_of_the_sensor_moves_no_start(error: float) -> None:
     assert sensor(error) == pytest.approx(sensor(0.0), abs=5e-5)
+
+
+def test_a_joint_stands_where_an_added_torque_and_its_controller_balance_from_the_first_step_on() -> None:
+    rest = 0.2 / SOFT.kp
+    seen = readings(TorqueBias("q", bias=0.2), np.zeros(ROWS), np.full(3, rest), np.zeros(3))
+    assert seen == pytest.approx(np.full(ROWS, rest), abs=1e-5)
 
 
 def test_a_joint_that_its_sensor_does_not_show_goes_on_through_the_start_of_a_segment() -> None:

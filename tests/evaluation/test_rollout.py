@@ -17,7 +17,7 @@ from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.touch import support
 from tactile_cube.evaluation.variant import Pull, Variant
-from tactile_cube.evaluation.verdict import Verdict
+from tactile_cube.evaluation.verdict import EpisodeVerdict
 from tactile_cube.hand import DLR_HAND2, tip_positions
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.simulation import SimulationOptions
@@ -142,7 +142,7 @@ def test_an_evaluation_judges_and_repeats_its_episodes() -> None:
     evaluation = Evaluation(CONFIG, HoldPolicy(), Protocol("x", episodes=2, seconds=1.0, replay=True), seed=1)
     seen: list[str] = []
     nominal, replay = evaluation.run(lambda name, result: seen.append(name))
-    assert [result.verdict for result in nominal.results] == [Verdict.HOLDING] * 2
+    assert [result.verdict for result in nominal.results] == [EpisodeVerdict.HOLDING] * 2
     assert [result.seed for result in nominal.results] == [10_000, 10_001]
     assert len(seen) == len(nominal.results) + len(replay.results) == 4
     first, second = (result.final_angle for result in replay.results)

@@ -4,33 +4,33 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.evaluation.verdict import Verdict, judge, verdict
+from tactile_cube.evaluation.verdict import EpisodeVerdict, judge, verdict
 from tests.evaluation.synthetic import episode
 
 
 @pytest.mark.parametrize(
     ("angle", "late", "changes", "lost", "expected"),
     [
-        (5.0, 2.0, 8, False, Verdict.REGRASPING),
-        (2.5, 1.0, 1, False, Verdict.STUCK_TWISTED),
-        (1.5, 1.0, 4, False, Verdict.STUCK_TWISTED),
-        (2.2, 0.0, 4, False, Verdict.STUCK_TWISTED),
-        (0.3, 0.1, 4, False, Verdict.HOLDING),
-        (-2.0, -1.0, 0, False, Verdict.HOLDING),
-        (1.8, 0.5, 0, True, Verdict.SPUN_AND_DROPPED),
-        (6.0, 2.0, 9, True, Verdict.DROPPED),
-        (0.1, 0.0, 0, True, Verdict.DROPPED),
+        (5.0, 2.0, 8, False, EpisodeVerdict.REGRASPING),
+        (2.5, 1.0, 1, False, EpisodeVerdict.STUCK_TWISTED),
+        (1.5, 1.0, 4, False, EpisodeVerdict.STUCK_TWISTED),
+        (2.2, 0.0, 4, False, EpisodeVerdict.STUCK_TWISTED),
+        (0.3, 0.1, 4, False, EpisodeVerdict.HOLDING),
+        (-2.0, -1.0, 0, False, EpisodeVerdict.HOLDING),
+        (1.8, 0.5, 0, True, EpisodeVerdict.SPUN_AND_DROPPED),
+        (6.0, 2.0, 9, True, EpisodeVerdict.DROPPED),
+        (0.1, 0.0, 0, True, EpisodeVerdict.DROPPED),
     ],
 )
 def test_verdicts_follow_their_definitions(
-    angle: float, late: float, changes: int, lost: bool, expected: Verdict
+    angle: float, late: float, changes: int, lost: bool, expected: EpisodeVerdict
 ) -> None:
     assert verdict(angle, late, changes, lost=lost) == expected
 
 
 def test_judging_a_regrasping_episode() -> None:
     result = judge(episode(angle=5.0), episode=3, seed=17)
-    assert (result.episode, result.seed, result.verdict) == (3, 17, Verdict.REGRASPING)
+    assert (result.episode, result.seed, result.verdict) == (3, 17, EpisodeVerdict.REGRASPING)
     assert result.final_angle == pytest.approx(5.0)
     assert result.late_angle == pytest.approx(2.0)
     assert result.duration == pytest.approx(10.0)
@@ -45,17 +45,17 @@ def test_angle_and_time_count_from_the_start_and_the_largest_tilt_is_told() -> N
     result = judge(episode(cube_quaternion=Rotation.from_rotvec(rock).as_quat(), **begun))
     assert (result.final_angle, result.late_angle, result.duration) == pytest.approx((0.2, 0.08, 10.0))
     assert result.max_tilt == pytest.approx(0.6)
-    assert (result.verdict, result.exploits) == (Verdict.HOLDING, ())
+    assert (result.verdict, result.exploits) == (EpisodeVerdict.HOLDING, ())
 
 
 def test_judging_fingers_that_twist_with_the_cube() -> None:
-    assert judge(episode(angle=1.6, carried=True)).verdict == Verdict.STUCK_TWISTED
+    assert judge(episode(angle=1.6, carried=True)).verdict == EpisodeVerdict.STUCK_TWISTED
 
 
 @pytest.mark.parametrize("ending", ["dropped", "left_range", "tilted", "lifted", "faulty"])
 def test_every_early_ending_loses_the_cube(ending: str) -> None:
     result = judge(episode(angle=1.6, carried=True, ending=ending))
-    assert result.verdict == Verdict.SPUN_AND_DROPPED
+    assert result.verdict == EpisodeVerdict.SPUN_AND_DROPPED
     assert not result.kept
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand import DLR_HAND2, finger_angles, grasp_angles, tip_positions
+from tactile_cube.hand import DLR_HAND2, grasp_angles, tip_positions
 
 
 def test_a_straight_finger_reaches_its_length() -> None:
@@ -18,13 +18,13 @@ def test_inverse_kinematics_recovers_flexed_angles() -> None:
         q = rng.uniform([-0.5, -0.3, 0.05] * 4, [0.5, 0.9, 1.0] * 4)
         tips = tip_positions(DLR_HAND2, q)
         for k in range(4):
-            np.testing.assert_allclose(finger_angles(DLR_HAND2, k, tips[k])[0], q[3 * k : 3 * k + 3], atol=1e-8)
+            np.testing.assert_allclose(DLR_HAND2.finger_angles(k, tips[k])[0], q[3 * k : 3 * k + 3], atol=1e-8)
 
 
 def test_a_point_out_of_reach_is_pointed_at_by_a_straight_finger() -> None:
     origin, rotation = DLR_HAND2.base_in_world(1)
     target = origin + rotation @ np.array([0.4, 0.0, 0.3])
-    q1, q2, q3 = finger_angles(DLR_HAND2, 1, target)[0]
+    q1, q2, q3 = DLR_HAND2.finger_angles(1, target)[0]
     assert q1 == pytest.approx(0.0)
     assert q2 == pytest.approx(np.arctan2(0.3, 0.4))
     assert q3 == 0.0

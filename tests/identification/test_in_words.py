@@ -17,7 +17,7 @@ def test_sets_of_effects_are_told_as_sets() -> None:
 
 
 def test_what_is_left_stands_in_the_headline() -> None:
-    assert left_over(result("missing_effect")) == " (4.3 mrad are left, 14 noise floors)"
+    assert left_over(result("missing_effect")) == " (4.3 mrad remain, 14 noise floors)"
     assert left_over(result("missing_effect", 3.3e-4)) == ""
     assert left_over(result("partly_explained")) == left_over(result("missing_effect"))
     assert left_over(result("unknown_effect")) == ""
@@ -32,7 +32,7 @@ def test_what_follows_no_model_is_told_with_the_line_that_leaves_it_out() -> Non
     one = {"trial": "holds_0", "start": 0.8, "end": 2.8, "joint": "q1", "error": 111.2, "usual": 1.62, "repeats": 2}
     (left_out,) = disturbed({"left_out": [one]})
     assert left_out.startswith(
-        "Left out: holds_0 from 0.80 to 2.80 s follows no model, though 2 other runs of its command do: q1"
+        "Left out: holds_0 from 0.80 to 2.80 s follows no model, though 2 other runs of its command do. q1's error"
     )
     assert "`exclude: [[0.80, 2.80]]`" in left_out
     (suspected,) = disturbed({"suspected": [one | {"repeats": 0}]})

@@ -114,9 +114,9 @@ def test_the_terminal_states_limits_margin_and_largest_values_and_when_to_stop(a
     for value in (reached.low, reached.high, reached.speed, reached.torque):
         assert f"{value[0]:.3g}" in text
     assert "stop beyond -0.0325 to 0.282 m (URDF), 1.35 m/s (URDF), 36 N (URDF)" in text
-    assert "10 % before a limit that is stated" in text
+    assert "10 % inside stated limits" in text
     assert "Begin at rest at a 0.02 m." in text
-    assert "open loop for 12 s: unstable by nature" in text
+    assert "open loop for 12 s, and unstable by nature" in text
 
 
 def test_where_no_command_is_safe_none_is_proposed_and_what_would_help_is_said(axis: Rivals, tmp_path: Path) -> None:

@@ -54,6 +54,6 @@ def test_what_was_seen_all_the_same_is_not_listed() -> None:
 def test_an_effect_is_told_once_with_all_its_joints() -> None:
     entries = [Unseen("joint_stop", joint, f"moved {joint}")._asdict() for joint in ("q1", "q2")]
     assert unseen_effects({"unseen": entries}) == [
-        "Not to be seen in these trials, there or not: joint_stop at q1 (moved q1), q2 (moved q2)."
+        "These trials cannot reveal joint_stop at q1 (moved q1), q2 (moved q2)."
     ]
     assert unseen_effects({}) == []

@@ -4,16 +4,14 @@ P: Sievers, Pitz, Bäuml, "Learning Purely Tactile In-Hand Manipulation with a T
 W: the authors' website for it (dlr-alr.github.io/dlr-tactile-manipulation, ICRA22 page); W23: its page on ICRA23.
 """
 
-from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
-from tactile_cube.command_help import CONFIG
+from tactile_cube import composition
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.randomization import Constant, LogUniform, Uniform
 
@@ -144,17 +142,11 @@ OWN: dict[str, list[Row]] = {
 }
 
 
-@pytest.fixture(scope="module", autouse=True)
-def hydra_configuration() -> Iterator[None]:
-    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
-        yield
-
-
 @cache
 def composed(command: str) -> Any:
     """The configuration of a command line, its environment as the object it describes."""
     name, *overrides = command.split()
-    config = compose(name, overrides=overrides, return_hydra_config=True)
+    config = composition.composed(name, overrides, with_hydra=True)
     return config, instantiate(config.env) if "env" in config else None
 
 

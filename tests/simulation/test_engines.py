@@ -11,7 +11,7 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
-from tactile_cube.hand.model import FingerBase
+from tactile_cube.hand.hand import FingerBase
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, mujoco_model
 

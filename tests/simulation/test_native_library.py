@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -31,3 +33,10 @@ def test_a_compiler_that_fails_is_quoted(empty_cache: Path, monkeypatch: pytest.
     monkeypatch.setattr(module, "find_compiler", lambda: "/bin/false")
     with pytest.raises(InputError, match=r"/bin/false .* failed"):
         module.native_library.__wrapped__()
+
+
+def test_importing_the_simulation_prints_nothing() -> None:
+    code = "import tactile_cube.simulation, sys; print('end', file=sys.stderr)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    assert run.stderr == "end\n"
+    assert run.stdout == ""

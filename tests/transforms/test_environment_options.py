@@ -1,16 +1,15 @@
 """Every option of the configuration groups that define the environment makes an environment that runs."""
 
 import pickle
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import torch
-from hydra import compose, initialize_config_dir
 from hydra.errors import InstantiationException
 from hydra.utils import instantiate
 
 from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import composed
 from tactile_cube.curriculum import LinearCurriculum
 from tactile_cube.env import Reward, Task
 from tactile_cube.errors import InputError
@@ -29,17 +28,10 @@ GROUPS = {
 OPTIONS = [(group, file.stem) for group in GROUPS for file in sorted((CONFIG / group).glob("*.yaml"))]
 
 
-@pytest.fixture(autouse=True)
-def _configuration() -> Iterator[None]:
-    with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):
-        yield
-
-
 def configured(*settings: str, **options: str) -> EnvConfig:
     groups = GROUPS | options
-    config = compose(
-        overrides=["+env=rotation", "+model=null", *(f"+{group}={name}" for group, name in groups.items()), *settings]
-    )
+    words = ["+env=rotation", "+model=null", *(f"+{group}={name}" for group, name in groups.items()), *settings]
+    config = composed(None, words)
     return instantiate(config.env)
 
 

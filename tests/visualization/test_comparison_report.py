@@ -16,6 +16,7 @@ from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.units import of_joint
+from tactile_cube.visualization.charts import MEASURED
 from tactile_cube.visualization.comparison_episode import COLORS, trial_starts, write_comparison
 from tactile_cube.visualization.comparison_figures import band, overlay
 from tactile_cube.visualization.comparison_report import comparison_report
@@ -23,7 +24,6 @@ from tactile_cube.visualization.comparison_summary import markdown, summary
 from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
 from tactile_cube.visualization.diagnosis_sections import staircase_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report
-from tactile_cube.visualization.svg import MEASURED
 from tests.identification.easy_safety import half_used
 from tests.measurement.small_rig import URDF, write
 
@@ -85,9 +85,7 @@ def test_what_was_interpolated_over_dropped_samples_is_not_drawn_as_measured(com
 
 def _curve(svg: str, color: str) -> str:
     """What is drawn in a colour."""
-    found = re.search(rf'<path d="([^"]+)" fill="none" stroke="{color}"', svg)
-    assert found is not None
-    return found[1]
+    return max(re.findall(rf' d="([^"]+)"[^>]*stroke: {color}', svg), key=len)
 
 
 def test_the_comparison_page_says_what_how_well_where_and_what_next(comparison: Comparison, tmp_path: Path) -> None:
@@ -208,7 +206,7 @@ def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison
     text = page(report, tmp_path / "d.html")
     assert "What to record next" in text
     assert "next_experiment.csv" in text
-    assert "Each should say 4 times as much" in text
+    assert "Each should give 4 times the evidence" in text
     assert "multisine at 64 % of full size, 1 s" in text
     assert "stop beyond: position" in text
     assert "-0.9 to 0.9 rad (URDF)" in text
@@ -217,7 +215,7 @@ def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison
     alike = (("command_delay@a", "actuator_lag@a"),)
     experiment = Experiment("multisine", ("a", "b"), time, wave, 0.1, "a", predictions, half_used(2), alike)
     text = page(diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
-    assert "No command tried would tell command_delay@a from actuator_lag@a" in text
+    assert "No command tried separates command_delay@a from actuator_lag@a" in text
     assert "To decide" not in text
     unsafe = replace(half_used(2), margin=0.6)
     experiment = Experiment("multisine", ("a", "b"), time, wave, 0.0, "a", {}, unsafe)
@@ -235,9 +233,9 @@ def test_an_unknown_effect_shows_the_shape_of_the_residual(comparison: Compariso
     shape = Shape("b", "position of b [rad]", x, 0.01 * x, np.full(12, 0.002), 0.83)
     text = page(diagnosis_report(unknown, comparison, None, "cmd", shapes=[shape]), tmp_path / "d.html")
     assert "explains 83 % of what the model lacks" in text
-    assert "not explained: b; a black box" in text
+    assert "not explained: b; a black-box model" in text
     assert "93 %" in text
-    assert "helps, but is not the whole of it: command_delay at a" in text
+    assert "reduces the error, but more is missing: command_delay at a" in text
     assert "sensor noise, a guess: no repeats" in text
     assert "my_rig.MyEffect@b" in text
 
@@ -250,9 +248,9 @@ def test_what_the_trials_do_not_prove_is_named_and_more_is_asked_for(comparison:
     experiment = Experiment("slow triangles", ("a", "b"), time, np.ones((3, 2)), 4.0, "a", predictions, half_used(2))
     asked = unsure | {"next_experiment": "next_experiment.csv"}
     text = page(diagnosis_report(asked, comparison, None, "cmd", experiment=experiment), tmp_path / "d.html")
-    assert "these trials do not suffice to prove what" in text
-    assert "backlash@a would take 72 % of the held-out squared error away (p 0.023)" in text
-    assert "8 held-out segments do not tell that from chance" in text
+    assert "these trials are too few to prove what" in text
+    assert "backlash@a would reduce the held-out squared error by 72 % (p 0.023)" in text
+    assert "8 held-out windows are too few to rule out chance" in text
     assert "none of them" in text, "what the rig would do if none of them is missing"
     assert "next_experiment.csv" in text
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.object_mesh import read_mesh
-from tactile_cube.visualization.episode_recording import write_recording
+from tactile_cube.visualization.episode_recording import write_episode
 from tests.evaluation.synthetic import episode
 from tests.meshes import CUBE, write_obj
 
@@ -28,7 +28,7 @@ def moving() -> EpisodeRecord:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rerun") / "episode.rrd"
-    write_recording(moving(), path, summary="# holding")
+    write_episode(moving(), path, summary="# holding")
     return path
 
 
@@ -106,14 +106,14 @@ def test_the_blueprint_is_inside(recording: Path) -> None:
 
 
 def test_an_episode_without_a_trace_can_be_recorded(tmp_path: Path) -> None:
-    write_recording(episode(steps=5, trace={}), tmp_path / "short.rrd")
+    write_episode(episode(steps=5, trace={}), tmp_path / "short.rrd")
     assert len(rows(tmp_path / "short.rrd", "/cube", "Transform3D:translation")) == 6
 
 
 def test_a_mesh_is_shown_as_its_faces(tmp_path: Path) -> None:
     mesh, size = read_mesh(write_obj(tmp_path, 0.08 * CUBE))
     record = replace(episode(steps=3), object_shape=mesh, cube_size=size, trace={})
-    write_recording(record, tmp_path / "mesh.rrd", summary="")
+    write_episode(record, tmp_path / "mesh.rrd", summary="")
     corners = np.vstack(listed(tmp_path / "mesh.rrd", "/cube/body", "Mesh3D:vertex_positions")[0])
     assert len(corners) == 3 * 12
     np.testing.assert_allclose(np.abs(corners), 0.04, atol=1e-6)

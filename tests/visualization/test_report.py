@@ -1,16 +1,14 @@
 import re
 from pathlib import Path
 
-import numpy as np
-
+from tactile_cube.visualization.charts import svg, time_chart
 from tactile_cube.visualization.report import Figure, Report, Section, Table, write_report
-from tactile_cube.visualization.svg import Axes, Line, line_chart
 
 LEGIBLE = 11.0  # [px] of a phone's screen, whose page is as wide as it says; smaller text is not read but guessed
 
 
 def test_on_a_phone_figures_stay_legible_and_what_is_wider_scrolls_alone(tmp_path: Path) -> None:
-    drawing = line_chart(Axes("time [s]", "angle [rad]"), [Line("measured", np.arange(2.0), np.arange(2.0))])
+    drawing = svg(time_chart("angle [rad]"))
     table = Table(("joint", "error"), [("q1", "1.0")])
     write_report(
         Report("r", "a", "good", sections=[Section("s", blocks=[Figure(drawing, "c"), table])]), tmp_path / "r"
@@ -19,7 +17,7 @@ def test_on_a_phone_figures_stay_legible_and_what_is_wider_scrolls_alone(tmp_pat
     assert '<meta name="viewport" content="width=device-width' in text
     narrow = text[text.index("@media (max-width") :]
     shown = float(re.findall(r"svg \{ width: (\d+)px; max-width: none", narrow)[0])
-    width, size = (float(re.findall(pattern, drawing)[0]) for pattern in (r'viewBox="0 0 (\d+)', r'font-size="(\d+)"'))
+    width, size = (float(re.findall(pattern, drawing)[0]) for pattern in (r'viewBox="0 0 (\d+)', r"font-size: (\d+)px"))
     assert size * shown / width > LEGIBLE
     assert ".wide { overflow-x: auto;" in text
     for element in ("<svg", "<table"):

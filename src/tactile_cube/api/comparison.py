@@ -50,11 +50,11 @@ class ComparisonResult:
     @property
     def data(self) -> dict[str, Any]:
         """The content of comparison.json: plain numbers, errors in rad."""
-        from tactile_cube.measurement.comparing.comparison import as_json
+        from tactile_cube.measurement.comparing.comparison import comparison_json
 
         config = self.job.config
         origin = {"model": config.model, "engine": config.engine, "command": self.job.command}
-        return as_json(self.comparison) | origin | {"seconds": self.seconds}
+        return comparison_json(self.comparison) | origin | {"seconds": self.seconds}
 
     def write(self, folder: PathLike, rerun: bool = True) -> None:
         """Write comparison.json, report.html and, with `rerun`, comparison.rrd."""

@@ -11,7 +11,7 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.deployment.control_loop import ControlLoop
-    from tactile_cube.deployment.limits import Limits
+    from tactile_cube.deployment.limits import JointLimits
     from tactile_cube.deployment.network import Network
     from tactile_cube.deployment.played_targets import PlayedTargets
     from tactile_cube.deployment.robot import Robot
@@ -34,7 +34,7 @@ class DeploymentResult:
 
     runs: list[LoopRun]
     turned: list[float]
-    limits: Limits
+    limits: JointLimits
     job: Job
     hand: Hand
 
@@ -109,12 +109,12 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
     return DeploymentResult(runs, turned, limits, job, setting.hand)
 
 
-def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: Limits) -> ControlLoop:
+def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: JointLimits) -> ControlLoop:
     """A new loop as a job describes it."""
     from hydra.utils import instantiate
 
     from tactile_cube.deployment.control_loop import ControlLoop
-    from tactile_cube.deployment.controller import Controller
+    from tactile_cube.deployment.controller import PolicyController
     from tactile_cube.deployment.homing import open_angles
     from tactile_cube.deployment.played_targets import excited_targets
     from tactile_cube.errors import InputError
@@ -125,15 +125,15 @@ def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: L
     if time_constant is None:
         raise InputError("the policy file does not say its filter time T_s; give filter_time=SECONDS")
     rules, homing, seconds = instantiate(config.stop), instantiate(config.homing), config.seconds
-    decides: Controller | PlayedTargets
+    decides: PolicyController | PlayedTargets
     if config.motion == "policy":
-        decides, opened = Controller(network, hand), open_angles(setting, homing.clearance)
+        decides, opened = PolicyController(network, hand), open_angles(setting, homing.clearance)
     else:  # every run the same commands: repeats show the noise floor
         decides, opened = excited_targets(config.motion, float(config.reach), seconds, config.seed, hand), None
     return ControlLoop(decides, time_constant, limits, rules, homing, seconds, hand, opened)
 
 
-def limits_of(setting: TrainingSetting, rate: float) -> Limits:
+def limits_of(setting: TrainingSetting, rate: float) -> JointLimits:
     """The limits of the interface contract: the hand's range, the gains and the torque of the training.
 
     A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.
@@ -144,9 +144,9 @@ def limits_of(setting: TrainingSetting, rate: float) -> Limits:
     """
     import numpy as np
 
-    from tactile_cube.deployment.limits import Limits
+    from tactile_cube.deployment.limits import JointLimits
     from tactile_cube.simulation import constants_of
 
     hand, constants = setting.hand, setting.constants
     gains = (np.maximum(constants.kp, constants_of(hand).kp), np.asarray(constants.kd))
-    return Limits(hand.lower, hand.upper, rate, constants.torque_limit, *gains)
+    return JointLimits(hand.lower, hand.upper, rate, constants.torque_limit, *gains)

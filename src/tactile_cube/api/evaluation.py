@@ -12,7 +12,7 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 if TYPE_CHECKING:
     from tactile_cube.evaluation.episode_record import EpisodeRecord
     from tactile_cube.evaluation.evaluation import Evaluation, VariantResult
-    from tactile_cube.evaluation.results_file import Run
+    from tactile_cube.evaluation.results_file import EvaluationRun
     from tactile_cube.evaluation.summary import Summary
 
 
@@ -26,7 +26,7 @@ class EvaluationResult:
         evaluation: runs an episode again.
     """
 
-    run: Run
+    run: EvaluationRun
     variants: list[VariantResult]
     evaluation: Evaluation
 
@@ -59,7 +59,7 @@ class EvaluationResult:
             write_robustness_map(self.variants, self.evaluation.nominal_values, folder / "robustness.png")
             print(f"robustness map: {folder / 'robustness.png'}")
         if film:
-            from tactile_cube.visualization.showcase import showcase
+            from tactile_cube.visualization.film import showcase
 
             showcase(self.evaluation, self.variants, folder)
 
@@ -97,7 +97,7 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
     from tactile_cube.evaluation.environment import environment, worlds
     from tactile_cube.evaluation.evaluation import Evaluation
     from tactile_cube.evaluation.policy_source import find_policy
-    from tactile_cube.evaluation.results_file import Run
+    from tactile_cube.evaluation.results_file import EvaluationRun
     from tactile_cube.evaluation.summary import HEADER, row
 
     torch.set_num_threads(1)
@@ -116,5 +116,5 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
     began = time.process_time()
     variants = evaluation.run(lambda name, result: say(row(result, name)))
     hours = (time.process_time() - began) / 3600
-    run = Run(protocol, source, task, engine, config.seed, job.command, hours, drawn)
+    run = EvaluationRun(protocol, source, task, engine, config.seed, job.command, hours, drawn)
     return EvaluationResult(run, variants, evaluation)

@@ -38,7 +38,7 @@ def run_recording(job: Job) -> dict[str, Recording]:
     from omegaconf import OmegaConf
 
     from tactile_cube.measurement.recordings.reading import read_recording
-    from tactile_cube.measurement.recordings.writing import require_free, write_whole
+    from tactile_cube.measurement.recordings.writing import require_free, write_recordings
     from tactile_cube.measurement.sources.source import require_settings
 
     out = Path(job.config.out)
@@ -46,5 +46,5 @@ def run_recording(job: Job) -> dict[str, Recording]:
     require_settings(job.config.source, str(job.choices["source"]))
     source = instantiate(OmegaConf.to_container(job.config.source, resolve=True))
     tables = source.recordings(job.config.seed)
-    write_whole(out, tables)
+    write_recordings(out, tables)
     return {name: read_recording(out / name) for name in tables}

@@ -8,7 +8,7 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.limits import Limits, StopRules
+from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.robot import Reading
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class CommandGuard:
         command: last command `(joints,)` [rad].
     """
 
-    def __init__(self, limits: Limits, rules: StopRules, names: tuple[str, ...]) -> None:
+    def __init__(self, limits: JointLimits, rules: StopRules, names: tuple[str, ...]) -> None:
         self._limits, self._rules, self._names = limits, rules, names
         self._reach = limits.reach
         self.state: Reading | None = None

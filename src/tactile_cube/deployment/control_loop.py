@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.command_guard import CommandGuard
-from tactile_cube.deployment.controller import POLICY_RATE, Controller, TargetFilter
+from tactile_cube.deployment.controller import POLICY_RATE, PolicyController, TargetFilter
 from tactile_cube.deployment.homing import Homing, Move
-from tactile_cube.deployment.limits import Limits, StopRules, Watchdog, require_positive
+from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
@@ -56,7 +56,7 @@ class ControlLoop:
     What it sends passes `CommandGuard` last.
 
     Args:
-        decides: gives q_n at 10 Hz, the policy's `Controller` or anything else.
+        decides: gives q_n at 10 Hz, the policy's `PolicyController` or anything else.
         time_constant: T_s of the target filter [s].
         limits: of every command.
         rules: when to stop.
@@ -82,7 +82,7 @@ class ControlLoop:
         self,
         decides: Decides,
         time_constant: float,
-        limits: Limits,
+        limits: JointLimits,
         rules: StopRules,
         homing: Homing,
         seconds: float,
@@ -111,7 +111,7 @@ class ControlLoop:
             Mode.HOMING: start if self._opened is None else "the fingers open",
             Mode.WAIT_FOR_OBJECT: "put it between the open fingers",
             Mode.CLOSING: start,
-            Mode.RUNNING: policy if isinstance(self._decides, Controller) else "an excitation, no policy",
+            Mode.RUNNING: policy if isinstance(self._decides, PolicyController) else "an excitation, no policy",
         }.get(self.mode, self.reason)
 
     @property

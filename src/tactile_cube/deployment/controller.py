@@ -24,7 +24,7 @@ def reading_size(hand: Hand) -> int:
     return 2 * hand.joints
 
 
-class Controller:
+class PolicyController:
     """Asks the network at 10 Hz.
 
     Once a policy step: read q_m from the hand and q_f from the filter that runs in the fast loop, call `step`, and give
@@ -35,7 +35,7 @@ class Controller:
         hand: whose action range the outputs are scaled to; None: the one that it was trained on.
 
     Example:
-        >>> controller = Controller(read_network(Path("policy.safetensors")))
+        >>> controller = PolicyController(read_network(Path("policy.safetensors")))
         >>> controller.reset()
         >>> q_n = controller.step(q_m, q_f)
     """

@@ -31,7 +31,7 @@ def require_positive(numbers: Mapping[str, float]) -> None:
 
 
 @dataclass(frozen=True)
-class Limits:
+class JointLimits:
     """Range, rate and torque of the desired angles.
 
     Attributes:

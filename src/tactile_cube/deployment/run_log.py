@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.limits import Limits
+from tactile_cube.deployment.limits import JointLimits
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.dlr_hand2 import REFLECTED_INERTIA, STATIC_FRICTION, STIFFNESS
@@ -45,7 +45,7 @@ class RunLog:
 
 
 def write_runs(
-    runs: Sequence[RunLog], folder: Path, limits: Limits, rate: float, resolution: float, hand: Hand = DLR_HAND2
+    runs: Sequence[RunLog], folder: Path, limits: JointLimits, rate: float, resolution: float, hand: Hand = DLR_HAND2
 ) -> Path:
     """Write runs of the loop as one recording: of the hand alone, for no object is described.
 

@@ -142,6 +142,7 @@ def _scratch(dofs: int, joints: int) -> dict[str, Shape]:
         "work": (dofs + 1, WORK_COLUMNS),
         "mass_matrix": (dofs, dofs),
         "bias": (dofs,),
+        "weight": (dofs,),
         "q_all": (dofs,),
         "v_all": (dofs,),
         "joint_mass_matrix": (joints, joints),

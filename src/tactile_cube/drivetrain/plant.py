@@ -13,7 +13,7 @@ from tactile_cube.drivetrain.effects.catalogue import matching_joints
 from tactile_cube.drivetrain.effects.effect import Effect, Place, Stage
 from tactile_cube.drivetrain.kernel import Kernel
 from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology, plan_memory
-from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, POSITION, VELOCITY
+from tactile_cube.drivetrain.signals import COMMAND, FRICTION, MOTOR_POSITION, POSITION, VELOCITY
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
 
@@ -31,7 +31,7 @@ _TREE_KEYS = (
     "inertia",
 )
 _CONSTANT_KEYS = ("kp", "kd", "compliance", "static_friction", "reflected_inertia", "torque_limit", "rate_limit")
-_STARTING_ROWS = {POSITION: "q", VELOCITY: "v", MOTOR_POSITION: "q", COMMAND: "q"}
+_STARTING_ROWS = {POSITION: "q", VELOCITY: "v", MOTOR_POSITION: "q", COMMAND: "q", FRICTION: "static_friction"}
 CONTACT_TORQUE_LIMIT = 5.0
 """Largest contact torque that is believed [N m]: 30 N at the outstretched tip of a finger."""
 

@@ -41,4 +41,6 @@ LEAD = 17
 """q_d - q_m - K_D / K_P dq [rad] of a motor that carries no torque: zero where the controller lets it stand."""
 GAP = 18
 """Where the motor stands in its transmission: 0 there is no gap, 1 on a flank, 2 free, so that it does not show q."""
-ROWS = 19
+WEIGHT = 19
+"""Torque that holds the links against gravity [N m]: a part of LOAD."""
+ROWS = 20

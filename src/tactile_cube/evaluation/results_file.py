@@ -23,7 +23,7 @@ KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours",
 
 
 @dataclass(frozen=True)
-class Run:
+class EvaluationRun:
     """What was run.
 
     Attributes:
@@ -47,7 +47,7 @@ class Run:
     worlds: Mapping[str, str]
 
 
-def write_results(path: Path, run: Run, variants: list[VariantResult]) -> None:
+def write_results(path: Path, run: EvaluationRun, variants: list[VariantResult]) -> None:
     """Write the results file."""
     data = {
         "format": FORMAT,

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tactile_cube.evaluation.verdict import REGRASP_ANGLE, EpisodeResult, Verdict
+from tactile_cube.evaluation.verdict import REGRASP_ANGLE, EpisodeResult, EpisodeVerdict
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> 
         reward_terms={
             name: float(np.mean([result.reward_terms[name] for result in results])) for name in results[0].reward_terms
         },
-        verdicts={verdict.value: sum(result.verdict == verdict for result in results) for verdict in Verdict},
+        verdicts={verdict.value: sum(result.verdict == verdict for result in results) for verdict in EpisodeVerdict},
         exploits=dict(Counter(name for result in results for name in result.exploits)),
     )
 
@@ -93,7 +93,7 @@ def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> 
 def succeeded(results: Sequence[EpisodeResult], success_share: float | None) -> list[bool]:
     """Return which episodes succeeded, as `success_means` says."""
     if success_share is None:
-        return [result.verdict == Verdict.REGRASPING for result in results]
+        return [result.verdict == EpisodeVerdict.REGRASPING for result in results]
     best = max(result.final_angle for result in results)
     return [result.kept and best > 0 and result.final_angle >= success_share * best for result in results]
 

@@ -27,7 +27,7 @@ LATE_ANGLE = 0.25
 """Angle that must be gained in this part [rad]; less means that the hand has come to rest."""
 
 
-class Verdict(StrEnum):
+class EpisodeVerdict(StrEnum):
     """What an episode was.
 
     - `regrasping`: kept the cube, turned it beyond `REGRASP_ANGLE` and was still turning it at the end (`LATE_ANGLE`),
@@ -77,7 +77,7 @@ class EpisodeResult:
     late_angle: float
     duration: float
     ending: str
-    verdict: Verdict
+    verdict: EpisodeVerdict
     finger_lifts: tuple[int, ...]
     face_changes: tuple[int, ...]
     faces_visited: tuple[int, ...]
@@ -129,14 +129,16 @@ def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResu
     )
 
 
-def verdict(final_angle: float, late_angle: float, face_changes: int, *, lost: bool) -> Verdict:
-    """Apply the definitions of `Verdict`."""
+def verdict(final_angle: float, late_angle: float, face_changes: int, *, lost: bool) -> EpisodeVerdict:
+    """Apply the definitions of `EpisodeVerdict`."""
     regrasped = face_changes >= REGRASP_FACE_CHANGES
     if lost:
-        return Verdict.SPUN_AND_DROPPED if final_angle > STILL_ANGLE and not regrasped else Verdict.DROPPED
+        return (
+            EpisodeVerdict.SPUN_AND_DROPPED if final_angle > STILL_ANGLE and not regrasped else EpisodeVerdict.DROPPED
+        )
     if final_angle > REGRASP_ANGLE and late_angle > LATE_ANGLE and regrasped:
-        return Verdict.REGRASPING
-    return Verdict.HOLDING if final_angle < STILL_ANGLE else Verdict.STUCK_TWISTED
+        return EpisodeVerdict.REGRASPING
+    return EpisodeVerdict.HOLDING if final_angle < STILL_ANGLE else EpisodeVerdict.STUCK_TWISTED
 
 
 MAX_ANGLE_MISMATCH = 0.3

@@ -3,9 +3,8 @@
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2, published_hand
 from tactile_cube.hand.gait import Gait
 from tactile_cube.hand.hand import Hand
-from tactile_cube.hand.kinematics import finger_angles, grasp_angles, tip_positions
-from tactile_cube.hand.model import HandModel
-from tactile_cube.hand.urdf import finger_urdf, hand_urdf
+from tactile_cube.hand.kinematics import grasp_angles, tip_positions
+from tactile_cube.hand.model import HandModel, finger_urdf, hand_urdf
 from tactile_cube.hand.urdf_hand import UrdfHand, hand_from_urdf
 
 __all__ = [
@@ -14,7 +13,6 @@ __all__ = [
     "Hand",
     "HandModel",
     "UrdfHand",
-    "finger_angles",
     "finger_urdf",
     "grasp_angles",
     "hand_from_urdf",

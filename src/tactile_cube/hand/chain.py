@@ -1,4 +1,8 @@
-"""Fingertips from joint angles and back, for any chain of revolute joints."""
+"""Fingertips from joint angles and back: for any chain of revolute joints, and in closed form for the DLR-Hand II.
+
+A finger of the DLR-Hand II is planar behind q1: with e = exp(i q3) the tip's centre lies at exp(i q2) (a + b e + c e^2)
+in the plane that q1 turns about the base's z axis, where `reach` (a, b, c) are the distances q2-q3, q3-q4 and q4-tip.
+"""
 
 from __future__ import annotations
 
@@ -90,3 +94,33 @@ def _about_z(angle: Array) -> Array:
     turn[:, 0, 1] = -turn[:, 1, 0]
     turn[:, 2, 2] = 1.0
     return turn
+
+
+def planar_tips(reach: tuple[float, float, float], q: Array) -> Array:
+    """Tip centres of a planar finger in the frame of its base (n, 3) [m] for its joint angles (n, 3) [rad]."""
+    a, b, c = reach
+    planar = np.exp(1j * q[:, 1]) * (a + b * np.exp(1j * q[:, 2]) + c * np.exp(2j * q[:, 2]))
+    return np.stack([planar.real * np.cos(q[:, 0]), planar.real * np.sin(q[:, 0]), planar.imag], axis=1)
+
+
+def planar_angles(reach: tuple[float, float, float], targets: Array) -> Array:
+    """Joint angles (n, 3) [rad] that bring a planar finger's tip to points in the frame of its base (n, 3) [m].
+
+    Of the two solutions the flexed one (q3 >= 0) is given. A point out of reach gives the straight or the fully folded
+    finger that points at it. Joint limits are not applied.
+    """
+    q1 = np.arctan2(targets[:, 1], targets[:, 0])
+    planar = np.hypot(targets[:, 0], targets[:, 1]) + 1j * targets[:, 2]
+    q3 = _flexion(reach, np.abs(planar) ** 2)
+    a, b, c = reach
+    q2 = np.angle(planar) - np.angle(a + b * np.exp(1j * q3) + c * np.exp(2j * q3))
+    return np.stack([q1, q2, q3], axis=1)
+
+
+def _flexion(reach: tuple[float, float, float], squared_distance: Array) -> Array:
+    """q3 >= 0 [rad] from |a + b e + c e^2|^2, a quadratic equation in cos q3."""
+    a, b, c = reach
+    linear = 2.0 * b * (a + c)
+    constant = a * a + b * b + c * c - 2.0 * a * c - squared_distance
+    root = np.sqrt(np.maximum(linear**2 - 16.0 * a * c * constant, 0.0))
+    return np.arccos(np.clip((root - linear) / (8.0 * a * c), -1.0, 1.0))

@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand.model import Array, Capsule, FingerBase, HandModel, Link
+from tactile_cube.hand.hand import Array, FingerBase
+from tactile_cube.hand.link import Capsule, Link
+from tactile_cube.hand.model import HandModel
 
 KP = 3.69
 """Stiffness of the impedance law [N m/rad]. Source: W, table."""

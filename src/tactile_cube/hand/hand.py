@@ -6,13 +6,32 @@ import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.hand.shape import Shape
-
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CollisionShape:
+    """A convex shape in a link's frame, in plain numbers that every engine can build.
+
+    Attributes:
+        kind: what it is.
+        size: of a box its edges (3,), of a cylinder or capsule radius and length of the straight part (2,), of a sphere
+            its radius (1,), of a mesh its scale (3,).
+        position: of its middle (3,) [m].
+        rotation: of its axes (3, 3); cylinders and capsules lie along z.
+        file: of a mesh.
+    """
+
+    kind: Literal["box", "cylinder", "capsule", "sphere", "mesh"]
+    size: tuple[float, ...]
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,7 +116,7 @@ class Hand(ABC):
         """Names of a finger's links, from the palm to the tip."""
 
     @abstractmethod
-    def shapes(self, finger: int) -> tuple[tuple[Shape, ...], ...]:
+    def shapes(self, finger: int) -> tuple[tuple[CollisionShape, ...], ...]:
         """What can be touched of each link of a finger, in the link's frame."""
 
     @abstractmethod

@@ -22,14 +22,6 @@ def tip_positions(hand: Hand, angles: Array) -> Array:
     return np.concatenate([hand.finger_tips(k, q[k]) for k in range(len(hand.fingers))])
 
 
-def finger_angles(hand: Hand, finger: int, targets: Array) -> Array:
-    """Joint angles (n, joints_per_finger) [rad] that bring one fingertip's centre to world points (n, 3) [m].
-
-    Of the solutions a flexed one is given. For a point out of reach the angles come near it.
-    """
-    return hand.finger_angles(finger, targets)
-
-
 def grasp_angles(
     hand: Hand,
     cube_size: Array | Sequence[float],

@@ -1,4 +1,8 @@
-"""Hands like the DLR-Hand II: identical fingers of three actuated joints, the last of which moves two links."""
+"""Hands like the DLR-Hand II: identical fingers of three actuated joints, the last of which moves two links.
+
+In their URDF a finger's root link is the frame of q1, which turns about its z axis. Every further link's z axis points
+along the link and its joint turns about y.
+"""
 
 from __future__ import annotations
 
@@ -6,60 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactile_cube.hand import closed_form, urdf
-from tactile_cube.hand.hand import Array, FingerBase, Hand
-from tactile_cube.hand.shape import Shape
-
-__all__ = ["Array", "Capsule", "FingerBase", "HandModel", "Link"]
+from tactile_cube.hand.chain import planar_angles, planar_tips
+from tactile_cube.hand.hand import Array, CollisionShape, Hand
+from tactile_cube.hand.link import COLOURS, Capsule, Link, link_urdf
+from tactile_cube.hand.urdf import ROBOT_ROOT, number_list, origin_element, robot_element
 
 JOINTS_PER_FINGER = 3
 LINKS_PER_FINGER = 4
+_AXIS_Y, _AXIS_Z = '<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>'
+_ACROSS = f'<origin xyz="0 0 0" rpy="{np.pi} {-np.pi / 2.0} 0"/>'
+"""From q1's frame to q2's: z along the finger, which is x of the base, y against y of the base."""
 LINK_NAMES = ("knuckle", "proximal", "middle", "distal")
-
-
-@dataclass(frozen=True)
-class Capsule:
-    """Collision shape of a link: a capsule along the link's z axis.
-
-    Attributes:
-        radius: [m].
-        start: Centre of the first half sphere along z [m].
-        end: Centre of the second half sphere along z [m].
-    """
-
-    radius: float
-    start: float
-    end: float
-
-    def shape(self) -> Shape:
-        """The same for an engine."""
-        middle = np.array([0.0, 0.0, 0.5 * (self.start + self.end)])
-        return Shape("capsule", (self.radius, self.end - self.start), middle)
-
-
-@dataclass(frozen=True)
-class Link:
-    """One link of a finger; z points along the link, y is the axis of the joint that moves it.
-
-    Attributes:
-        name: One of `LINK_NAMES`.
-        length: Distance to the next joint axis [m].
-        mass: [kg].
-        centre_of_mass: Along z [m].
-        capsule: Collision shape, or None where nothing can be touched.
-    """
-
-    name: str
-    length: float
-    mass: float
-    centre_of_mass: float
-    capsule: Capsule | None
-
-    def inertia(self) -> tuple[float, float, float]:
-        """Moments about the centre of mass, of a solid cylinder in the capsule's place (x, y, z) [kg m^2]."""
-        radius, length = (0.012, 0.02) if self.capsule is None else (self.capsule.radius, self.length)
-        across = self.mass * (3.0 * radius**2 + length**2) / 12.0
-        return across, across, 0.5 * self.mass * radius**2
 
 
 @dataclass(frozen=True)
@@ -102,7 +63,7 @@ class HandModel(Hand):
         """See `Hand`."""
         return LINK_NAMES
 
-    def shapes(self, finger: int) -> tuple[tuple[Shape, ...], ...]:
+    def shapes(self, finger: int) -> tuple[tuple[CollisionShape, ...], ...]:
         """See `Hand`."""
         return tuple(() if link.capsule is None else (link.capsule.shape(),) for link in self.links)
 
@@ -118,11 +79,11 @@ class HandModel(Hand):
 
     def finger_urdf(self, finger: int) -> str:
         """See `Hand`; all fingers are identical."""
-        return urdf.finger_urdf(self)
+        return finger_urdf(self)
 
     def urdf(self) -> str:
         """See `Hand`."""
-        return urdf.hand_urdf(self)
+        return hand_urdf(self)
 
     def chain_joints(self, finger: int) -> tuple[str, ...]:
         """See `Hand`."""
@@ -134,15 +95,18 @@ class HandModel(Hand):
 
     def finger_tips(self, finger: int, q: Array) -> Array:
         """See `Hand`."""
-        return closed_form.finger_tips(self, finger, q)
+        origin, rotation = self.base_in_world(finger)
+        return np.asarray(origin + planar_tips(self.tip_reach, q) @ rotation.T)
 
     def finger_angles(self, finger: int, targets: Array) -> Array:
         """See `Hand`; joint limits are not applied."""
-        return closed_form.finger_angles(self, finger, targets)
+        origin, rotation = self.base_in_world(finger)
+        points = np.asarray(targets, dtype=np.float64).reshape(-1, 3)
+        return planar_angles(self.tip_reach, (points - origin) @ rotation)
 
     def angles_at(self, tips: Array) -> Array:
         """See `Hand`."""
-        rows = [[closed_form.finger_angles(self, k, tip[None])[0] for k, tip in enumerate(row)] for row in tips]
+        rows = [[self.finger_angles(k, tip)[0] for k, tip in enumerate(row)] for row in tips]
         return np.array(rows).reshape(len(tips), -1)
 
     @property
@@ -160,3 +124,57 @@ class HandModel(Hand):
         capsule = self.links[-1].capsule
         assert capsule is not None, "the distal link is what touches"
         return capsule
+
+
+def finger_urdf(hand: HandModel, prefix: str = "") -> str:
+    """One finger as a robot of its own, rooted in the frame of q1: joints q1, q2, q3 and q4 which mimics q3.
+
+    Args:
+        hand: The hand; all its fingers are identical, so no finger is named.
+        prefix: Put before link and joint names, e.g. `ring_`.
+    """
+    root = f"{prefix}base"
+    return robot_element(f"{prefix}finger", [ROBOT_ROOT.format(name=root), *_finger_parts(hand, prefix, root, "")])
+
+
+def hand_urdf(hand: HandModel) -> str:
+    """The whole hand: `palm` and four fingers, joints `ring_q1` .. `thumb_q4`; the same links as `finger_urdf`."""
+    parts = [_palm(hand)]
+    for finger in hand.fingers:
+        parts += _finger_parts(hand, f"{finger.name}_", "palm", origin_element(finger.position, finger.rotation))
+    return robot_element("dlr_hand2", parts)
+
+
+def _finger_parts(hand: HandModel, prefix: str, parent: str, base: str) -> list[str]:
+    """Links and joints of a finger whose q1 frame sits at `base` (an origin element) in `parent`."""
+    knuckle, proximal, middle, distal = hand.links
+    lower, upper = hand.lower[:3], hand.upper[:3]
+    mimic = f'<mimic joint="{prefix}q3" multiplier="1" offset="0"/>'
+    name = [prefix + link.name for link in hand.links]
+    along = [origin_element(np.array([0.0, 0.0, link.length])) for link in (proximal, middle)]
+    return [
+        *(link_urdf(prefix, link) for link in (knuckle, proximal, middle, distal)),
+        _joint(f"{prefix}q1", parent, name[0], base, _AXIS_Z, lower[0], upper[0]),
+        _joint(f"{prefix}q2", name[0], name[1], _ACROSS, _AXIS_Y, lower[1], upper[1]),
+        _joint(f"{prefix}q3", name[1], name[2], along[0], _AXIS_Y, lower[2], upper[2]),
+        _joint(f"{prefix}q4", name[2], name[3], along[1], _AXIS_Y, lower[2], hand.coupled_upper, mimic),
+    ]
+
+
+def _joint(
+    name: str, parent: str, child: str, origin: str, axis: str, lower: float, upper: float, extra: str = ""
+) -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    limit = f'<limit lower="{lower:.10g}" upper="{upper:.10g}" effort="10" velocity="50"/>'
+    return f'<joint name="{name}" type="revolute">{ends}{origin}{axis}{limit}{extra}</joint>'
+
+
+def _palm(hand: HandModel) -> str:
+    """The palm as a slab under the finger bases, for pictures only: nothing ever reaches it."""
+    bases = np.array([finger.position for finger in hand.fingers])
+    low, high = bases.min(axis=0), bases.max(axis=0)
+    size = np.array([high[0] - low[0], high[1] - low[1] + 0.03, 0.10])
+    centre = np.array([*(0.5 * (low + high))[:2], low[2] - 0.05])
+    geometry = f'<geometry><box size="{number_list(size)}"/></geometry>'
+    material = f'<material name="palm"><color rgba="{COLOURS["palm"]}"/></material>'
+    return f'<link name="palm"><visual>{origin_element(centre)}{geometry}{material}</visual></link>'

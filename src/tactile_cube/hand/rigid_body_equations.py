@@ -227,15 +227,10 @@ def add_spin_inertia(parent: Integers, prismatic: Integers, spin: Array, work: A
 
 
 @compiled_once
-def add_weight(
-    parent: Integers, prismatic: Integers, mass: Array, gravity: Array, other: Array, work: Array, h: Array
-) -> None:
-    """Turns the bias h under `gravity` (3,) into that under `other` (3,); `work` is of `mass_matrix_and_bias`."""
-    change = gravity[0] - other[0], gravity[1] - other[1], gravity[2] - other[2]
-    if change[0] == 0.0 and change[1] == 0.0 and change[2] == 0.0:
-        return
+def pull_of_gravity(parent: Integers, prismatic: Integers, mass: Array, gravity: Vector, work: Array, h: Array) -> None:
+    """Adds the torques (N,) on the joints by which `gravity` pulls; `work` is of `mass_matrix_and_bias`."""
     for k in range(len(parent)):
-        force, centre = _scaled(change, mass[k]), _at(work, k + 1, CENTRE)
+        force, centre = _scaled(gravity, mass[k]), _at(work, k + 1, CENTRE)
         i = k
         while i >= 0:
             axis = _at(work, i + 1, AXIS)
@@ -244,3 +239,13 @@ def add_weight(
             else:
                 h[i] += _dot(_cross(axis, _add(centre, _scaled(_at(work, i + 1, ORIGIN), -1.0))), force)
             i = parent[i]
+
+
+@compiled_once
+def add_weight(
+    parent: Integers, prismatic: Integers, mass: Array, gravity: Array, other: Array, work: Array, h: Array
+) -> None:
+    """Turns the bias h under `gravity` (3,) into that under `other` (3,); `work` is of `mass_matrix_and_bias`."""
+    change = gravity[0] - other[0], gravity[1] - other[1], gravity[2] - other[2]
+    if change[0] != 0.0 or change[1] != 0.0 or change[2] != 0.0:
+        pull_of_gravity(parent, prismatic, mass, change, work, h)

@@ -9,8 +9,8 @@ import numpy as np
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.chain import Chain
+from tactile_cube.hand.hand import Array, CollisionShape
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.hand.shape import Array, Shape
 from tactile_cube.hand.urdf import number_list, origin_element
 from tactile_cube.hand.urdf_elements import Placement, placement_of
 from tactile_cube.hand.urdf_shapes import collision_element, moved, read_shapes, visual_elements
@@ -46,7 +46,7 @@ class UrdfFinger:
     mass: Array
     com: Array
     inertia: Array
-    shapes: tuple[tuple[Shape, ...], ...]
+    shapes: tuple[tuple[CollisionShape, ...], ...]
     tip: Array
 
     def chain(self, position: Array, rotation: Array) -> Chain:
@@ -96,7 +96,8 @@ def read_finger(text: str, joints: tuple[str, ...], tip: str, where: str) -> Urd
     """
     tree = RigidBodyTree.from_urdf(text, joints)
     _require_chain(tree, joints, where)
-    carried = _carried_links(text, tree.dof_names)
+    robot = ElementTree.fromstring(text)
+    carried = _carried_links(robot, tree.dof_names)
     if carried.get(tip, ("", None))[0] != tree.dof_names[-1]:
         raise InputError(f"{where}.tip is '{tip}', no link that joint '{tree.dof_names[-1]}' carries; name one")
     turns = [_principal(tree.axis[k], tree.inertia[k]) for k in range(tree.dofs)]
@@ -105,11 +106,10 @@ def read_finger(text: str, joints: tuple[str, ...], tip: str, where: str) -> Urd
         Placement(before[k].T @ tree.placement_rotation[k] @ turns[k], before[k].T @ tree.placement_translation[k])
         for k in range(tree.dofs)
     ]
-    shapes = _shapes(text, carried, tree.dof_names, turns)
-    place = carried[tip][1]
+    children = {joint.get("name"): child for joint in robot.findall("joint") for child in joint.findall("child")}
     return UrdfFinger(
         joints=tree.dof_names,
-        links=tuple(_child(text, name) for name in tree.dof_names),
+        links=tuple(str(children[name].get("link")) for name in tree.dof_names),
         columns=tuple(int(column) for column in tree.follow),
         limits=np.stack([tree.lower, tree.upper], axis=1),
         base=places[0],
@@ -117,8 +117,8 @@ def read_finger(text: str, joints: tuple[str, ...], tip: str, where: str) -> Urd
         mass=tree.mass,
         com=np.stack([turn.T @ com for turn, com in zip(turns, tree.com, strict=True)]),
         inertia=np.stack([np.diag(turn.T @ own @ turn) for turn, own in zip(turns, tree.inertia, strict=True)]),
-        shapes=shapes,
-        tip=turns[-1].T @ place.translation,
+        shapes=_shapes(robot, carried, tree.dof_names, turns),
+        tip=turns[-1].T @ carried[tip][1].translation,
     )
 
 
@@ -151,10 +151,10 @@ def _principal(axis: Array, inertia: Array) -> Array:
     return np.asarray(frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
 
 
-def _carried_links(text: str, moving: tuple[str, ...]) -> dict[str, tuple[str, Placement]]:
+def _carried_links(robot: ElementTree.Element, moving: tuple[str, ...]) -> dict[str, tuple[str, Placement]]:
     """The moving joint that carries each link ("" for the root's), and where the link's frame is in that joint's."""
     joints = {}
-    for element in ElementTree.fromstring(text).findall("joint"):
+    for element in robot.findall("joint"):
         name = str(element.get("name"))
         ends = [found.get("link") for end in ("parent", "child") if (found := element.find(end)) is not None]
         joints[ends[1]] = name, ends[0], placement_of(element, f"joint '{name}'")
@@ -168,16 +168,16 @@ def _carried_links(text: str, moving: tuple[str, ...]) -> dict[str, tuple[str, P
         carrier, above = find(parent)
         return carrier, above.then(place)
 
-    links = [str(link.get("name")) for link in ElementTree.fromstring(text).findall("link")]
+    links = [str(link.get("name")) for link in robot.findall("link")]
     return {link: find(link) for link in links}
 
 
 def _shapes(
-    text: str, carried: dict[str, tuple[str, Placement]], joints: tuple[str, ...], turns: list[Array]
-) -> tuple[tuple[Shape, ...], ...]:
+    robot: ElementTree.Element, carried: dict[str, tuple[str, Placement]], joints: tuple[str, ...], turns: list[Array]
+) -> tuple[tuple[CollisionShape, ...], ...]:
     """Collision shapes of what each joint carries, in the turned frames."""
-    found: list[list[Shape]] = [[] for _ in joints]
-    for link in ElementTree.fromstring(text).findall("link"):
+    found: list[list[CollisionShape]] = [[] for _ in joints]
+    for link in robot.findall("link"):
         joint, place = carried[str(link.get("name"))]
         if joint in joints:
             k = joints.index(joint)
@@ -185,14 +185,9 @@ def _shapes(
     return tuple(map(tuple, found))
 
 
-def palm_shapes(text: str, moving: tuple[str, ...]) -> list[Shape]:
+def palm_shapes(text: str, moving: tuple[str, ...]) -> list[CollisionShape]:
     """Collision shapes of what no joint moves, in the root link's frame: for pictures only."""
-    carried = _carried_links(text, moving)
-    links = ElementTree.fromstring(text).findall("link")
-    placed = [(link, *carried[str(link.get("name"))]) for link in links]
+    robot = ElementTree.fromstring(text)
+    carried = _carried_links(robot, moving)
+    placed = [(link, *carried[str(link.get("name"))]) for link in robot.findall("link")]
     return [shape for link, joint, place in placed if not joint for shape in read_shapes(link, place)]
-
-
-def _child(text: str, joint: str) -> str:
-    child = ElementTree.fromstring(text).find(f"joint[@name='{joint}']/child")
-    return str(child.get("link")) if child is not None else ""

@@ -12,9 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.hand import Array, FingerBase, Hand
+from tactile_cube.hand.hand import Array, CollisionShape, FingerBase, Hand
 from tactile_cube.hand.kinematics import grasp_angles
-from tactile_cube.hand.shape import Shape
 from tactile_cube.hand.urdf import ROBOT_ROOT, origin_element, robot_element
 from tactile_cube.hand.urdf_files import package_of, with_own_files
 from tactile_cube.hand.urdf_finger import UrdfFinger, palm_shapes, read_finger
@@ -42,7 +41,7 @@ class UrdfHand(Hand):
 
     label: str
     chains: tuple[UrdfFinger, ...]
-    palm: tuple[Shape, ...]
+    palm: tuple[CollisionShape, ...]
     radius: float
     file: str
     sha256: str
@@ -82,7 +81,7 @@ class UrdfHand(Hand):
         """See `Hand`; as in the URDF."""
         return self.chains[finger].links
 
-    def shapes(self, finger: int) -> tuple[tuple[Shape, ...], ...]:
+    def shapes(self, finger: int) -> tuple[tuple[CollisionShape, ...], ...]:
         """See `Hand`."""
         return self.chains[finger].shapes
 
@@ -182,18 +181,11 @@ def hand_from_urdf(
     Raises:
         InputError: what does not fit, by its key.
     """
-    file = urdf_file(urdf)
-    text, left_out = with_own_files(read_text(file), file, package_of(file), ("collision",))
-    if left_out:
-        raise InputError(left_out[0])
-    digest = hashlib.sha256(file.read_bytes()).hexdigest()
-    if sha256 not in (None, digest):
-        raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
+    file, text, digest = _read(urdf, sha256)
     chains, bases = _fingers(fingers, text)
     own = sorted({chains[0].columns.index(column) for column in chains[0].columns})
     limits = np.concatenate([chain.limits[own] for chain in chains])
     lower, upper = _action_limits(action, limits, len(chains))
-    moving = tuple(joint for chain in chains for joint in chain.joints)
     hand = UrdfHand(
         fingers=bases,
         lower=limits[:, 0],
@@ -206,12 +198,24 @@ def hand_from_urdf(
         drive={key: np.asarray(value) if np.ndim(value) else float(value) for key, value in (drive or {}).items()},  # type: ignore[arg-type]
         label=name,
         chains=chains,
-        palm=tuple(palm_shapes(text, moving)),
+        palm=tuple(palm_shapes(text, tuple(joint for chain in chains for joint in chain.joints))),
         radius=float(tip_radius),
         file=file.name,
         sha256=digest,
     )
     return replace(hand, start_angles=_start(hand, start))
+
+
+def _read(urdf: str, sha256: str | None) -> tuple[Path, str, str]:
+    """A hand's URDF: its file, its text with the absolute names of its own meshes, and its SHA-256."""
+    file = urdf_file(urdf)
+    text, left_out = with_own_files(read_text(file), file, package_of(file), ("collision",))
+    if left_out:
+        raise InputError(left_out[0])
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    if sha256 not in (None, digest):
+        raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
+    return file, text, digest
 
 
 def urdf_file(urdf: str) -> Path:

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.shape import Array, Shape
+from tactile_cube.hand.hand import Array, CollisionShape
 from tactile_cube.hand.urdf import origin_element
 from tactile_cube.hand.urdf_elements import Placement, number, placement_of, triple
 from tactile_cube.hand.urdf_files import require_mesh
 
 
-def read_shapes(link: ElementTree.Element, place: Placement) -> list[Shape]:
+def read_shapes(link: ElementTree.Element, place: Placement) -> list[CollisionShape]:
     """Collision shapes of a link whose frame sits at `place`, in the frame that `place` is given in.
 
     Args:
@@ -35,42 +35,42 @@ def read_shapes(link: ElementTree.Element, place: Placement) -> list[Shape]:
     return found
 
 
-def _shape(element: ElementTree.Element, at: Placement, where: str) -> Shape:
+def _shape(element: ElementTree.Element, at: Placement, where: str) -> CollisionShape:
     kind = element.tag
     if kind == "box":
-        return Shape("box", tuple(triple(element, "size", where).tolist()), at.translation, at.rotation)
+        return CollisionShape("box", tuple(triple(element, "size", where).tolist()), at.translation, at.rotation)
     if kind == "sphere":
-        return Shape("sphere", (number(element, "radius", where, 0.0),), at.translation, at.rotation)
+        return CollisionShape("sphere", (number(element, "radius", where, 0.0),), at.translation, at.rotation)
     if kind == "cylinder" or kind == "capsule":
         size = (number(element, "radius", where, 0.0), number(element, "length", where, 0.0))
-        return Shape("cylinder" if kind == "cylinder" else "capsule", size, at.translation, at.rotation)
+        return CollisionShape("cylinder" if kind == "cylinder" else "capsule", size, at.translation, at.rotation)
     if kind == "mesh":
         scale = tuple(triple(element, "scale", where).tolist()) if element.get("scale") else (1.0, 1.0, 1.0)
         file = Path(element.get("filename", ""))
         require_mesh(file, where)
-        return Shape("mesh", scale, at.translation, at.rotation, str(file))
+        return CollisionShape("mesh", scale, at.translation, at.rotation, str(file))
     raise InputError(f"URDF: {where} has the shape <{kind}>; use box, sphere, cylinder, capsule or mesh")
 
 
-def collision_element(shape: Shape) -> str:
+def collision_element(shape: CollisionShape) -> str:
     """A shape as URDF's <collision>."""
     return f"<collision>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}</collision>"
 
 
-def visual_elements(shape: Shape, material: str) -> str:
+def visual_elements(shape: CollisionShape, material: str) -> str:
     """A shape as <visual> elements that every reader can draw: a capsule as a cylinder and two spheres."""
     if shape.kind != "capsule":
         return f"<visual>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}{material}</visual>"
     radius, length = shape.size
     along = 0.5 * length * shape.rotation[:, 2]
     parts = [
-        Shape("cylinder", (radius, length), shape.position, shape.rotation),
-        *(Shape("sphere", (radius,), shape.position + end, np.eye(3)) for end in (along, -along)),
+        CollisionShape("cylinder", (radius, length), shape.position, shape.rotation),
+        *(CollisionShape("sphere", (radius,), shape.position + end, np.eye(3)) for end in (along, -along)),
     ]
     return "".join(visual_elements(part, material) for part in parts)
 
 
-def _geometry(shape: Shape) -> str:
+def _geometry(shape: CollisionShape) -> str:
     size = [f"{value:.10g}" for value in shape.size]
     inside = {
         "box": f'<box size="{" ".join(size)}"/>',
@@ -82,6 +82,6 @@ def _geometry(shape: Shape) -> str:
     return f"<geometry>{inside[shape.kind]}</geometry>"
 
 
-def moved(shape: Shape, rotation: Array) -> Shape:
+def moved(shape: CollisionShape, rotation: Array) -> CollisionShape:
     """A shape seen from axes that are turned by `rotation` (3, 3) in those it is given in."""
-    return Shape(shape.kind, shape.size, rotation.T @ shape.position, rotation.T @ shape.rotation, shape.file)
+    return CollisionShape(shape.kind, shape.size, rotation.T @ shape.position, rotation.T @ shape.rotation, shape.file)

@@ -9,7 +9,7 @@ from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.safe_commands import SCALES, Safety
 from tactile_cube.measurement.units import TURNS, of_joint, short
 
-MODELS = "each explanation, and with its numbers at either end of their intervals"
+MODELS = "each explanation, also with parameters at either end of their intervals"
 
 
 def next_steps(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
@@ -32,7 +32,7 @@ def proposal(experiment: Experiment) -> list[str]:
     if not experiment.safety.safe:
         return [_nothing_safe(experiment)]
     lines = [
-        f"No command tried would tell {one} from {other}: within its limits the machine moves alike either way."
+        f"No command tried separates {one} from {other}: within its limits the machine moves alike either way."
         for one, other in experiment.inseparable
     ]
     return [*lines, _play(experiment), _simulated(experiment)] if experiment.decides else lines
@@ -67,8 +67,8 @@ def watch_for(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
 def _play(experiment: Experiment) -> str:
     return (
         f"To decide, play {FILE} twice, add both trials and diagnose again: {_named(experiment)}, "
-        f"{_seconds(experiment)}. Each should say {short(experiment.told, 2)} times as much against the wrong "
-        "one, however it is refitted, as it takes to drop it."
+        f"{_seconds(experiment)}. Each should give {short(experiment.told, 2)} times the evidence needed to reject the "
+        "wrong one, however it is refitted."
     )
 
 
@@ -76,8 +76,8 @@ def _simulated(experiment: Experiment) -> str:
     safety = experiment.safety
     starts = f" from {len(safety.starts)} starts" if len(safety.starts) > 1 else ""
     return (
-        f"Simulated for the whole {_seconds(experiment)} in {safety.models} models ({MODELS}){starts}. The furthest in "
-        f"any of them, and where to stop: {_percent(safety.margin)} before a limit that is stated, else where the "
+        f"Simulated for the whole {_seconds(experiment)} in {safety.models} models ({MODELS}){starts}. The largest "
+        f"values in any of them, and where to stop: {_percent(safety.margin)} inside stated limits, else where the "
         "trials ended:"
     )
 
@@ -88,22 +88,22 @@ def _watch(experiment: Experiment, units: Mapping[str, str]) -> str:
         for joint, value in zip(experiment.joints, experiment.safety.starts[-1], strict=True)
     )
     return (
-        f"Begin at rest at {begin}. Watch all of it, a hand on the emergency stop. Stop when a joint goes beyond "
-        "these limits, moves against its command or shakes: then none of these models is right."
+        f"Begin at rest at {begin}. Keep a hand on the emergency stop. Stop when a joint goes beyond these limits, "
+        "moves against its command or shakes: then none of these models is right."
     )
 
 
 def _open_loop(experiment: Experiment) -> str:
     return (
-        f"These commands are torques or forces, open loop for {_seconds(experiment)}: unstable by nature, for nothing "
-        "brings a joint back and small errors add up. If you can, control the position instead and log the torque."
+        f"These commands are torques or forces, open loop for {_seconds(experiment)}, and unstable by nature: small "
+        "errors add up. If you can, control the position instead and log the torque."
     )
 
 
 def _nothing_safe(experiment: Experiment) -> str:
     return (
-        f"No safe command was found: each kind, down to {_percent(SCALES[-1])} of its size, leaves the limits in one "
-        f"of {experiment.safety.models} models that may be true ({MODELS}). The nearest is {_named(experiment)}, "
+        f"No safe command was found: each kind, down to {_percent(SCALES[-1])} of its size, leaves the limits in at "
+        f"least one of {experiment.safety.models} models ({MODELS}). The nearest is {_named(experiment)}, "
         f"{_seconds(experiment)}:"
     )
 
@@ -112,8 +112,8 @@ def _help(safety: Safety) -> str:
     unstated = [key for key in QUANTITIES if TRIALS in safety.limits.sources[key]]
     ways = [
         *(["control the position instead of playing torques open loop"] if safety.open_loop else []),
-        "record shorter runs that begin nearer the middle of the range",
-        *([f"state limits of {' and '.join(unstated)} (URDF, controller): the trials' stand in"] if unstated else []),
+        "record shorter runs that start nearer the middle of the range",
+        *([f"state limits of {' and '.join(unstated)} (URDF, controller)"] if unstated else []),
     ]
     return f"What would help: {'; '.join(ways)}."
 

@@ -14,13 +14,13 @@ OPENING = {
     "adequate": "Nothing is missing at this noise: with its constants refitted the model explains the recording.",
     "missing_effect": "An effect is missing, and it is this one:",
     "ambiguous": "An effect is missing, but this recording cannot tell these apart:",
-    "partly_explained": "Most of what is missing was found, and more is missing besides. Found:",
+    "partly_explained": "Most of what is missing was found, but not all of it. Found:",
     "unknown_effect": "Something is missing that no effect of the catalogue explains.",
 }
-UNRELATED = "The error is above the noise, but what is left goes with none of the logged signals."
+UNRELATED = "The error is above the noise, but it follows none of the logged signals."
 NO_LAW, LEFT = 0.05, 2.0  # share that a black box explains of what follows no law; noise floors worth a word
-PARTIAL = "Effects were found that help, and they are not the whole of what is missing."
-UNPROVEN = "Something is missing, and these trials do not suffice to prove what."
+PARTIAL = "Some effects reduce the error, but more is missing."
+UNPROVEN = "Something is missing, but these trials are too few to prove what."
 GAIN_OF = {"error": "the held-out error", "offsets": "the joint offsets that the grips need"}
 HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
 
@@ -43,7 +43,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     if known := result.get("known_effects"):
         lines.append(f"  beside what was known: {', '.join(known)}")
     if partial := result.get("partial_effects"):
-        lines.append("  The recommended model holds them:")
+        lines.append("  The recommended model contains them:")
         lines += [_effect(entry, units) for entry in partial]
     lines += [f"  {line}" for line in unproven_effects(unproven)] if unproven else []
     lines += [_unexplained(entry) for entry in result["unexplained"]]
@@ -64,7 +64,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
 def error_of(result: Mapping[str, Any]) -> str:
     """Of which trials the errors are that a result states."""
     tested = result.get("tested")
-    return f"Error on {len(tested)} trials that nothing was fitted to or chosen by" if tested else "Held-out error"
+    return f"Error on {len(tested)} test trials, used neither to fit nor to select" if tested else "Held-out error"
 
 
 def headline(result: Mapping[str, Any]) -> str:
@@ -84,7 +84,7 @@ def left_over(result: Mapping[str, Any]) -> str:
         return ""
     floors = error["with_effects"] / error["noise_floor"]
     left = milli(error["with_effects"], common_unit(result.get("units", {}).values()))
-    return f" ({left} are left, {short(floors, 2)} noise floors)" if floors > LEFT else ""
+    return f" ({left} remain, {short(floors, 2)} noise floors)" if floors > LEFT else ""
 
 
 def sets_in_words(sets: Sequence[Sequence[str]]) -> str:
@@ -104,31 +104,30 @@ def _effect(entry: dict[str, Any], units: Mapping[str, str]) -> str:
 def _unexplained(entry: dict[str, Any]) -> str:
     if entry.get("explained", 0.0) > NO_LAW:
         return (
-            f"  {entry['joint']}: the effects explain {100 * entry['explained']:.0f} % of the torque that the refitted "
-            f"model lacks, {100 * entry['of_explainable']:.0f} % of what they and a black box explain together"
+            f"  {entry['joint']}: the effects explain {100 * entry['explained']:.0f} % of the torque missing in the "
+            f"refitted model, {100 * entry['of_explainable']:.0f} % of what they and a black-box model explain together"
         )
     if entry["black_box"] < NO_LAW:
         return (
-            f"  {entry['joint']}: a black box of positions, speeds, torque and time explains nothing of what is left; "
-            "look for what is not logged: pushes, temperature, supply, timing"
+            f"  {entry['joint']}: a black-box model of positions, speeds, torque and time explains none of the rest. "
+            "Look for what is not logged: pushes, temperature, supply, timing"
         )
     return (
-        f"  {entry['joint']}: the torque that {entry['beside']} lacks goes most with "
-        f"{entry['depends_most_on']}; beside the recommended model a black box could explain "
-        f"{100 * entry['black_box']:.0f} % of it"
+        f"  {entry['joint']}: the torque missing in {entry['beside']} follows {entry['depends_most_on']} most; "
+        f"a black-box model could explain {100 * entry['black_box']:.0f} % of what the recommended model leaves"
     )
 
 
 def unproven_effects(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """Effects of which one may be the missing one, and what to do about it."""
     lines = [
-        f"{' & '.join(one['effects'])} would take {100 * one['heldout_gain']:.0f} % of the held-out squared error away "
+        f"{' & '.join(one['effects'])} would reduce the held-out squared error by {100 * one['heldout_gain']:.0f} % "
         f"(p {one['p_value']:.2g})"
         for one in entries
     ]
     return [
         *lines,
-        f"{entries[0]['segments']} held-out segments do not tell that from chance: play the next experiment.",
+        f"{entries[0]['segments']} held-out windows are too few to rule out chance: play the next experiment.",
     ]
 
 
@@ -137,7 +136,7 @@ def common_offset(entry: Mapping[str, Any], units: Mapping[str, str]) -> str:
     offset = milli(entry["offset"], units.get(entry["joint"], TURNS))
     return (
         f"{entry['joint']} reads about {offset} too much in each of {entry['initialisations']} "
-        "initialisations: by chance, or its encoder's zero is wrong (position_offset); more initialisations will tell."
+        "initialisations: by chance, or its encoder's zero is wrong (position_offset). Record more initialisations."
     )
 
 
@@ -151,9 +150,9 @@ def disturbed(result: Mapping[str, Any]) -> list[str]:
             beside = f"though {runs}" if other else "and nothing repeats it"
             lines.append(
                 f"{opening}: {one['trial']} from {one['start']:.2f} to {one['end']:.2f} s follows no model, "
-                f"{beside}: {one['joint']} is {short(one['error'], 2)} x its sensor noise off there, elsewhere "
-                f"{short(one['usual'], 2)}. If somebody pushed, or something was in the way, write `exclude: "
-                f"[[{one['start']:.2f}, {one['end']:.2f}]]` below it in recording.yaml, for every other verb too."
+                f"{beside}. {one['joint']}'s error there is {short(one['error'], 2)} x its sensor noise, elsewhere "
+                f"{short(one['usual'], 2)}. If somebody pushed, write `exclude: "
+                f"[[{one['start']:.2f}, {one['end']:.2f}]]` below it in recording.yaml, for the other commands too."
             )
     return lines
 
@@ -163,7 +162,7 @@ def unseen_effects(result: Mapping[str, Any]) -> list[str]:
     joints: dict[str, list[str]] = {}
     for one in result.get("unseen", []):
         joints.setdefault(one["effect"], []).append(f"{one['joint']} ({one['why']})")
-    return [f"Not to be seen in these trials, there or not: {name} at {', '.join(at)}." for name, at in joints.items()]
+    return [f"These trials cannot reveal {name} at {', '.join(at)}." for name, at in joints.items()]
 
 
 def staircase(stages: Mapping[str, float], model: ModelFile, units: Mapping[str, str]) -> str:

@@ -55,6 +55,7 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
             slides=bool(slides[j]),
             neighbours=len(spans) - 1,
             leads=joint in leaders,
+            first=j == 0,
             torque_limit=float(limits[j]),
             lower=float(tree.lower[own[j]]),
             upper=float(tree.upper[own[j]]),

@@ -69,7 +69,7 @@ def _extremes(q: Array, v: Array, cube: Array, coupled: NDArray[np.int64]) -> tu
 
 RESOLVED = 0.05
 """Spinning friction [m] up to which PyBullet's answers at 2 ms and 30 iterations stand: a twist by 0.5 rad changes by
-3 % at most when both are refined tenfold, at 0.1 m by 10 % (docs/results/mechanics.md)."""
+3 % at most when both are refined tenfold, at 0.1 m by 10 % (docs/results/contact.md)."""
 REFERENCE_STEP, REFERENCE_ITERATIONS = 2e-4, 300
 """What those refined answers were computed with: step [s] and iterations."""
 

@@ -48,15 +48,13 @@ class PhysicsLoop(Protocol):
 
 def make_loop(kind: Loop, client: int, plant: Plant) -> PhysicsLoop:
     """The loop of that kind; `auto` takes the compiled one where it can be built."""
-    if kind == "python":
-        return PythonLoop(client, plant)
-    if kind == "c":
-        return NativeLoop(client, plant)
-    if find_compiler() is None:
+    if kind == "python" or (kind == "auto" and find_compiler() is None):
         return PythonLoop(client, plant)
     try:
         return NativeLoop(client, plant)
     except (InputError, OSError):
+        if kind == "c":
+            raise
         return PythonLoop(client, plant)
 
 

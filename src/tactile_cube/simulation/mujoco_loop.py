@@ -47,16 +47,16 @@ class MujocoLoop(Protocol):
 def make_mujoco_loop(kind: Loop, mujoco: ModuleType, drive: HandDrive) -> MujocoLoop:
     """The loop of that kind; `auto` takes the compiled one where it can be built."""
     if kind == "python" or (kind == "auto" and find_compiler() is None):
-        return PythonLoop(mujoco, drive)
+        return PythonMujocoLoop(mujoco, drive)
     try:
-        return NativeLoop(mujoco, drive)
+        return NativeMujocoLoop(mujoco, drive)
     except (InputError, OSError):
         if kind == "c":
             raise
-        return PythonLoop(mujoco, drive)
+        return PythonMujocoLoop(mujoco, drive)
 
 
-class NativeLoop:
+class NativeMujocoLoop:
     """All steps in one C call."""
 
     kind: Literal["c", "python"] = "c"
@@ -80,7 +80,7 @@ class NativeLoop:
         self._library.run_mujoco_steps(*self._what, steps, *self._on, record)
 
 
-class PythonLoop:
+class PythonMujocoLoop:
     """The same steps through MuJoCo's Python functions."""
 
     kind: Literal["c", "python"] = "python"

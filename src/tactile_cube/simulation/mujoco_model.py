@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
+from tactile_cube.hand.hand import CollisionShape
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import NamedShape, straight_half, unit_inertia
-from tactile_cube.hand.shape import Shape
 from tactile_cube.simulation.constants import EpisodeConstants
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Surface, surfaces
 from tactile_cube.simulation.drive import HandDrive
@@ -119,7 +119,7 @@ class HandSpec:
             self._add_tendon(finger.name, follower, leader, rigid)
         return parts
 
-    def _add_shape(self, body: Any, name: str, shape: Shape) -> None:
+    def _add_shape(self, body: Any, name: str, shape: CollisionShape) -> None:
         """A link's collision shape; capsules and cylinders have half their length in MuJoCo."""
         kinds, size = self._mujoco.mjtGeom, shape.size
         kind, numbers = {

@@ -14,7 +14,6 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
-from tactile_cube.simulation.disturbance import Disturbance
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import OBJECT_STATE, Engine
 from tactile_cube.simulation.health import find_fault
@@ -83,7 +82,6 @@ class World:
         self.constants = constants
         self.steps, self.fault, self.trace = 0, "", {}
         self._push[:] = 0.0
-        self._disturbance = Disturbance(constants)
         self._drive.reset(constants, start)
         self._engine.place(constants, start, self.hand.all_angles(start.angles), self.hand.all_angles(start.velocities))
         self.set_weight(constants.gravity_scale if constants.gravity_onset == 0 else 0.0)
@@ -223,7 +221,7 @@ class World:
 
     def _wrench(self) -> Array | None:
         """Everything that pushes the cube in this policy step, or None."""
-        random = self._disturbance.wrench(self.time)
+        random = random_wrench(self.constants, self.time)
         if random is None:
             return self._push if self._push.any() else None
         return random + self._push
@@ -251,3 +249,23 @@ def make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Eng
     from tactile_cube.simulation.bullet_engine import BulletEngine
 
     return BulletEngine(hand, options, drive)
+
+
+def random_wrench(constants: EpisodeConstants, time: float) -> Array | None:
+    """Random force and torque on the cube (6,) [N, N m] at a time [s] of the episode, or None without disturbances.
+
+    Sizes and directions are redrawn at intervals, a function of the episode's seed and the time alone.
+    Source: the authors' follow-up (ICRA 2023 page): N(0.04, 0.008) N, N(0.002, 0.0004) N m, every 0.5 s.
+    """
+    if not constants.disturbed:
+        return None
+    rng = np.random.default_rng((constants.force_seed, int(time / constants.force_interval + 1e-9)))
+    force = rng.normal(constants.force_mean, constants.force_std) * _direction(rng)
+    torque = rng.normal(constants.torque_mean, constants.torque_std) * _direction(rng)
+    return np.concatenate([force, torque])
+
+
+def _direction(rng: np.random.Generator) -> Array:
+    """A unit vector, uniform on the sphere (3,)."""
+    vector = rng.normal(size=3)
+    return np.asarray(vector / np.linalg.norm(vector))

@@ -145,7 +145,7 @@ def build_collection(
 def protected(training: TrainingSettings) -> TrainingSettings:
     """The schedule, in which an actor without its critics waits until fresh ones know what it is worth.
 
-    A policy file holds the actor alone; gradients of ignorant critics would lead it astray (docs/circle.md).
+    A policy file holds the actor alone; gradients of ignorant critics would lead it astray (docs/match.md).
     """
     alone = training.init_from is not None and Path(training.init_from).suffix == POLICY_SUFFIX
     if not alone or training.actor_frozen is not None:

@@ -13,7 +13,7 @@ SIMULATING = 1 / 457
 LEARNING = {torch.bfloat16: 8.6e-3, torch.float32: 28.3e-3}
 """Seconds of an update of `LARGE` weights and samples, by the precision of its products."""
 LARGE = 512 * 512 * 256
-"""Weights of the middle layer times samples of a batch, in the published agent. Source: docs/results/benchmark.md."""
+"""Weights of the middle layer times samples of a batch, in the published agent. Source: docs/results/speed.md."""
 
 
 def expected_seconds(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import rerun.blueprint as rrb
 
-from tactile_cube.visualization.branch import TIMELINE
+from tactile_cube.visualization.rerun_recording import TIMELINE
 
 LEGEND = rrb.PlotLegend(corner="LeftTop")
 EYE = rrb.EyeControls3D(position=(0.23, -0.26, -0.01), look_target=(0.0, 0.0, 0.06), eye_up=(0, 0, 1))

@@ -1,6 +1,5 @@
 """A comparison as a Rerun recording: the robot in motion, measured and simulated signals, failing intervals marked."""
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,17 +7,14 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
-from rerun.urdf import UrdfTree
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
 from tactile_cube.visualization.comparison_figures import marked
-from tactile_cube.visualization.recording_file import recording_file
-from tactile_cube.visualization.solid_links import fill_shapes
+from tactile_cube.visualization.rerun_recording import TIMELINE, Branch, log_robot, recording_file
 
 Array = NDArray[np.float64]
-TIMELINE = "time"
 POSE_RATE = 50.0  # [Hz] of the robot's poses
 SIGNAL_RATE = 250.0  # [Hz] of the signals at most
 PAUSE = 1.0  # [s] between two trials on the time line
@@ -44,11 +40,12 @@ def write_comparison(comparison: Comparison, path: Path, summary: str) -> None:
     """
     starts = trial_starts(comparison)
     with recording_file(path, blueprint(comparison), "tactile_cube_compare") as stream:
-        _log_robot(stream, comparison, starts)
+        branch = Branch(stream)
+        _log_robot(branch, comparison, starts)
         for index, joint in enumerate(comparison.recording.joints):
-            _log_joint(stream, comparison, index, joint, starts)
-        _log_events(stream, comparison, starts)
-        stream.log("summary", rr.TextDocument(summary, media_type="text/markdown"), static=True)
+            _log_joint(branch, comparison, index, joint, starts)
+        _log_events(branch, comparison, starts)
+        branch.always("summary", rr.TextDocument(summary, media_type="text/markdown"))
 
 
 def trial_starts(comparison: Comparison) -> list[float]:
@@ -87,20 +84,13 @@ def blueprint(comparison: Comparison) -> rrb.Blueprint:
     )
 
 
-def _log_robot(stream: rr.RecordingStream, comparison: Comparison, starts: list[float]) -> None:
+def _log_robot(branch: Branch, comparison: Comparison, starts: list[float]) -> None:
     recording = comparison.recording
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "rig.urdf"
-        file.write_text(recording.urdf, encoding="utf-8")
-        try:
-            tree = UrdfTree.from_file_path(
-                file, entity_path_prefix="robot", static_transform_entity_path="robot/static"
-            )
-        except Exception as error:  # of a shape that Rerun does not know
-            reason = str(error).strip().partition("\n")[0]
-            raise InputError(f"{recording.rig.path}: cannot be drawn ({reason}); mend it, or say rerun=false") from None
-        tree.log_urdf_to_recording(stream)
-    fill_shapes(stream, tree, recording.urdf)
+    try:
+        tree = log_robot(branch.stream, recording.urdf, "robot")
+    except Exception as error:  # of a shape that Rerun does not know
+        reason = str(error).strip().partition("\n")[0]
+        raise InputError(f"{recording.rig.path}: cannot be drawn ({reason}); mend it, or say rerun=false") from None
     stride = max(1, round(recording.rate / POSE_RATE))
     time = np.concatenate([start + t.time[::stride] for start, t in zip(starts, recording.trials, strict=True)])
     angles = np.concatenate([trial.position[::stride] for trial in recording.trials])
@@ -108,7 +98,7 @@ def _log_robot(stream: rr.RecordingStream, comparison: Comparison, starts: list[
         values = _joint_angle(comparison, joint.name, angles)
         if values is not None:
             transform = joint.compute_transform_columns(values.tolist(), clamp=False)
-            stream.send_columns(f"robot/joint_transforms/{joint.name}", _at(time), transform)
+            branch.columns(f"robot/joint_transforms/{joint.name}", time, transform)
 
 
 def _joint_angle(comparison: Comparison, name: str, angles: Array) -> Array | None:
@@ -121,7 +111,7 @@ def _joint_angle(comparison: Comparison, name: str, angles: Array) -> Array | No
     return None
 
 
-def _log_joint(stream: rr.RecordingStream, comparison: Comparison, index: int, joint: str, starts: list[float]) -> None:
+def _log_joint(branch: Branch, comparison: Comparison, index: int, joint: str, starts: list[float]) -> None:
     recording, trials = comparison.recording, comparison.recording.trials
     stride = max(1, round(recording.rate / SIGNAL_RATE))
 
@@ -139,32 +129,25 @@ def _log_joint(stream: rr.RecordingStream, comparison: Comparison, index: int, j
     residual = 1e3 * joined([error[:, index] for error in comparison.residuals])
     angle, error = f"joints/{joint}/angle", f"joints/{joint}/error"
     if not recording.torque_controlled:
-        _send(stream, f"{angle}/command", time, joined([trial.command[:, index] for trial in trials]), "command")
+        _send(branch, f"{angle}/command", time, joined([trial.command[:, index] for trial in trials]), "command")
     simulated = joined([one.position[:, index] for one in comparison.simulated])
-    _send(stream, f"{angle}/simulated", time, simulated, "simulated")
+    _send(branch, f"{angle}/simulated", time, simulated, "simulated")
     for entity, name, values in ((angle, "measured", measured), (error, "measured - simulated", residual)):
-        _send(stream, f"{entity}/good", time, np.where(failing, np.nan, values), name)
-        _send(stream, f"{entity}/failing", time, np.where(failing, values, np.nan), f"{name}, failing")
+        _send(branch, f"{entity}/good", time, np.where(failing, np.nan, values), name)
+        _send(branch, f"{entity}/failing", time, np.where(failing, values, np.nan), f"{name}, failing")
 
 
-def _log_events(stream: rr.RecordingStream, comparison: Comparison, starts: list[float]) -> None:
+def _log_events(branch: Branch, comparison: Comparison, starts: list[float]) -> None:
     begin = dict(zip((trial.name for trial in comparison.recording.trials), starts, strict=True))
     for trial, start in begin.items():
-        stream.set_time(TIMELINE, duration=start)
-        stream.log("failing", rr.TextLog(f"trial {trial}", level=rr.TextLogLevel.INFO))
+        branch.log("failing", rr.TextLog(f"trial {trial}", level=rr.TextLogLevel.INFO), start)
     units = comparison.recording.units
     for one in comparison.failing_intervals:
-        stream.set_time(TIMELINE, duration=begin[one.trial] + one.start)
         line = f"{one.joint} in {one.trial}: {one.start:.2f} .. {one.end:.2f} s, {milli(one.error, units[one.joint])}"
-        stream.log("failing", rr.TextLog(line, level=rr.TextLogLevel.WARN))
-    stream.reset_time()
+        branch.log("failing", rr.TextLog(line, level=rr.TextLogLevel.WARN), begin[one.trial] + one.start)
 
 
-def _send(stream: rr.RecordingStream, entity: str, time: Array, values: Array, name: str) -> None:
-    style = rr.SeriesLines(names=[name], colors=[COLORS[name]], widths=[2.0 if "failing" in name else 1.2])
-    stream.log(entity, style, static=True)
-    stream.send_columns(entity, _at(time), rr.Scalars.columns(scalars=values))
-
-
-def _at(time: Array) -> list[rr.TimeColumn]:
-    return [rr.TimeColumn(TIMELINE, duration=time)]
+def _send(branch: Branch, entity: str, time: Array, values: Array, name: str) -> None:
+    width = 2.0 if "failing" in name else 1.2
+    branch.always(entity, rr.SeriesLines(names=[name], colors=[COLORS[name]], widths=[width]))
+    branch.columns(entity, time, rr.Scalars.columns(scalars=values))

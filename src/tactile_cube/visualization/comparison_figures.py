@@ -1,16 +1,32 @@
 """Pictures of a comparison: measured over simulated, the band, the error by joint and regime."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS
-from tactile_cube.visualization.svg import ERROR, FLOOR, MEASURED, PALETTE, SIMULATED, Axes, Band, Line, line_chart
-from tactile_cube.visualization.svg_tables import heat_map
+from tactile_cube.visualization.charts import (
+    BEFORE,
+    ERROR,
+    FAILING,
+    FLOOR,
+    MEASURED,
+    SIMULATED,
+    heat_map,
+    svg,
+    time_chart,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 MOST_KINDS = 6
-BEFORE = PALETTE[1]
+MOST_POINTS = 450  # of an area, whose outline Matplotlib does not simplify as it does curves
 
 
 def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
@@ -18,61 +34,60 @@ def overlay(comparison: Comparison, trial: int, joint: int, before: Comparison |
 
     With `before`, the comparison of the model as it was, its simulation is drawn too.
     """
-    one = comparison.recording.trials[trial]
-    offset = _offset(comparison, trial, joint)
-    lines = [Line("measured", one.time, _measured(comparison, trial, joint), MEASURED, 1.8)]
-    if before is not None:
-        was = before.simulated[trial].position[:, joint] + _offset(before, trial, joint)
-        lines.append(Line("simulated before", one.time, was, BEFORE, 1.2, "6 3"))
-    after = "simulated" if before is None else "simulated after"
-    lines.append(Line(after, one.time, comparison.simulated[trial].position[:, joint] + offset, SIMULATED, 1.4))
+    one, name = comparison.recording.trials[trial], comparison.recording.joints[joint]
+    axes = time_chart(f"{name} [{comparison.recording.units[name]}]")
+    _shade(axes, comparison, trial, joint)
     if not comparison.recording.torque_controlled:
-        lines.insert(0, Line("command", one.time, one.command[:, joint], FLOOR, 1.0, "4 3"))
-    name = comparison.recording.joints[joint]
-    return line_chart(
-        Axes("time [s]", f"{name} [{comparison.recording.units[name]}]", marked=marked(comparison, trial, joint)), lines
-    )
+        axes.plot(one.time, one.command[:, joint], "--", color=FLOOR, linewidth=1.0, label="command")
+    axes.plot(one.time, _measured(comparison, trial, joint), color=MEASURED, linewidth=1.8, label="measured")
+    if before is not None:
+        axes.plot(one.time, _simulated(before, trial, joint), "--", color=BEFORE, label="simulated before")
+    after = "simulated" if before is None else "simulated after"
+    axes.plot(one.time, _simulated(comparison, trial, joint), color=SIMULATED, linewidth=1.4, label=after)
+    return svg(axes)
 
 
-def before_and_after(before: Comparison, after: Comparison, trial: int, joint: int) -> str:
-    """What the model as it was, and with what was found, do not follow of one joint in one trial."""
-    time = before.recording.trials[trial].time
-    name = before.recording.joints[joint]
-    lines = [
-        Line("error before", time, 1e3 * before.residuals[trial][:, joint], BEFORE, 1.2),
-        Line("error after", time, 1e3 * after.residuals[trial][:, joint], SIMULATED, 1.4),
-    ]
-    floor = 1e3 * 1.96 * after.floor.joints[name] * np.ones_like(time)
-    band = [Band("noise floor (95 %)", time, -floor, floor, FLOOR)]
-    return line_chart(Axes("time [s]", f"{name} [{small(before, joint)}]", height=200), lines, band)
-
-
-def residual(comparison: Comparison, trial: int, joint: int) -> str:
-    """Measured minus simulated of one joint in one trial, beside the noise floor."""
+def residual(comparison: Comparison, trial: int, joint: int, before: Comparison | None = None) -> str:
+    """Measured minus simulated of one joint in one trial beside the noise floor; with `before`, also of that model."""
     time = comparison.recording.trials[trial].time
-    name = comparison.recording.joints[joint]
-    floor = 1e3 * 1.96 * comparison.floor.joints[name] * np.ones_like(time)
-    line = Line("measured - simulated", time, 1e3 * comparison.residuals[trial][:, joint], ERROR, 1.2)
-    band = [Band("noise floor (95 %)", time, -floor, floor, FLOOR)]
-    axes = Axes("time [s]", f"{name} [{small(comparison, joint)}]", height=170, marked=marked(comparison, trial, joint))
-    return line_chart(axes, [line], band)
+    axes = _difference_chart(comparison, joint, 170 if before is None else 200)
+    floor = 1e3 * 1.96 * comparison.floor.joints[comparison.recording.joints[joint]]
+    axes.axhspan(-floor, floor, color=FLOOR, alpha=0.18, linewidth=0, label="noise floor (95 %)")
+    errors = 1e3 * comparison.residuals[trial][:, joint]
+    if before is None:
+        _shade(axes, comparison, trial, joint)
+        axes.plot(time, errors, color=ERROR, linewidth=1.2, label="measured - simulated")
+    else:
+        axes.plot(time, 1e3 * before.residuals[trial][:, joint], color=BEFORE, linewidth=1.2, label="error before")
+        axes.plot(time, errors, color=SIMULATED, linewidth=1.4, label="error after")
+    return svg(axes)
 
 
 def band(comparison: Comparison, trial: int, joint: int) -> str:
     """The measured angle of one joint among the randomised simulations, all as differences from the nominal one."""
-    one, randomised = comparison.recording.trials[trial], comparison.band
+    time, randomised = comparison.recording.trials[trial].time, comparison.band
     if randomised is None:
         return ""
     nominal = comparison.simulated[trial].position[:, joint]
     low, high = (1e3 * (edge[trial][:, joint] - nominal) for edge in (randomised.low, randomised.high))
-    line = Line("measured", one.time, 1e3 * (_measured(comparison, trial, joint) - nominal), MEASURED, 1.2)
-    axes = Axes("time [s]", f"{comparison.recording.joints[joint]} [{small(comparison, joint)}]", height=200)
-    return line_chart(axes, [line], [Band("95 % of the simulations", one.time, low, high)])
+    axes = _difference_chart(comparison, joint, 200)
+    few = slice(None, None, max(1, len(time) // MOST_POINTS))
+    axes.fill_between(
+        time[few], low[few], high[few], color=SIMULATED, alpha=0.25, linewidth=0, label="95 % of the simulations"
+    )
+    measured = 1e3 * (_measured(comparison, trial, joint) - nominal)
+    axes.plot(time, measured, color=MEASURED, linewidth=1.2, label="measured")
+    return svg(axes)
 
 
-def small(comparison: Comparison, joint: int) -> str:
-    """The unit of a joint's errors, mrad or mm."""
-    return THOUSANDTHS[comparison.recording.units[comparison.recording.joints[joint]]]
+def _difference_chart(comparison: Comparison, joint: int, height: int) -> Axes:
+    name = comparison.recording.joints[joint]
+    return time_chart(f"{name} [{THOUSANDTHS[comparison.recording.units[name]]}]", height)
+
+
+def _shade(axes: Axes, comparison: Comparison, trial: int, joint: int) -> None:
+    for start, end in marked(comparison, trial, joint):
+        axes.axvspan(start, end, color=FAILING, linewidth=0, zorder=0)
 
 
 def regime_map(comparison: Comparison) -> str:
@@ -108,8 +123,8 @@ def _measured(comparison: Comparison, trial: int, joint: int) -> Array:
     return np.where(one.valid, one.position[:, joint], np.nan)
 
 
-def _offset(comparison: Comparison, trial: int, joint: int) -> float:
-    """The constant that was removed from the residual [rad]."""
-    one = comparison.recording.trials[trial]
-    difference = one.position - comparison.simulated[trial].position - comparison.residuals[trial]
-    return float(np.nanmean(difference[:, joint]))
+def _simulated(comparison: Comparison, trial: int, joint: int) -> Array:
+    """The angles of a joint (n,) with the constant that was removed from the residual [rad]."""
+    simulated = comparison.simulated[trial].position
+    difference = comparison.recording.trials[trial].position - simulated - comparison.residuals[trial]
+    return simulated[:, joint] + float(np.nanmean(difference[:, joint]))

@@ -5,13 +5,13 @@ from tactile_cube.measurement.units import common_unit, milli, short
 from tactile_cube.visualization.comparison_sections import (
     band_section,
     error_section,
-    floor_source,
     method_section,
     overlay_section,
     recording_section,
     test_section,
     where_section,
 )
+from tactile_cube.visualization.comparison_summary import floor_source, outcome
 from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
 
 
@@ -26,7 +26,7 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
     good = comparison.at_the_floor
     return Report(
         title=f"Model and measurement: {comparison.recording.name}",
-        answer=answer(comparison),
+        answer=outcome(comparison),
         tone="good" if good else "warn",
         tiles=_tiles(comparison),
         sections=[
@@ -36,24 +36,11 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
             overlay_section(comparison),
             *band_section(comparison),
             test_section(comparison),
-            next_section(comparison, model_path),
+            _next_section(comparison, model_path),
             method_section(),
         ],
         footer=f"Made by tactile_cube: {command}",
     )
-
-
-def answer(comparison: Comparison) -> str:
-    """The result in one or two sentences."""
-    error, floor, ratio = comparison.errors.overall, comparison.floor.overall, comparison.ratio
-    unit = common_unit(comparison.recording.units.values())
-    head = (
-        f"The simulated joints are {milli(error, unit)} (RMS) away from the measured ones; {milli(floor, unit)} would "
-        "be noise alone."
-    )
-    if comparison.at_the_floor:
-        return f"{head} The model is as good as this recording can tell."
-    return f"{head} That is {short(ratio)} times the noise: {comparison.sentences[0]}."
 
 
 def _tiles(comparison: Comparison) -> list[Tile]:
@@ -74,7 +61,7 @@ def _tiles(comparison: Comparison) -> list[Tile]:
     return tiles
 
 
-def next_section(comparison: Comparison, model_path: str | None) -> Section:
+def _next_section(comparison: Comparison, model_path: str | None) -> Section:
     """What to type next."""
     folder = comparison.recording.folder
     model = f" model={model_path}" if model_path else ""

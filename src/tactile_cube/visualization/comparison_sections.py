@@ -2,24 +2,21 @@
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import common_unit, milli, short
 from tactile_cube.visualization import comparison_figures as figures
-from tactile_cube.visualization.numbers import p_value
 from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Section, Table
 
 MOST_OVERLAYS = 6
 MOST_CORRELATIONS = 8
 MOST_WARNINGS = 4
 FLOORS = {
-    "repeats": "The noise floor is the scatter of repeats: how far trials of one command are from one another. It "
-    "holds the sensor's noise, and what the machine itself does not repeat.",
-    "guess": "Nothing was repeated, so the noise floor is a guess: the noise of the position sensor, from the fast "
-    "part of the signals and the sensor's resolution. What the machine does not repeat is not in it.",
-    "contact": "The noise floor is what the world leaves of a grasp when all contact effects are true: drives are "
-    "known to some 10 % only, and the contact solver stops early. Each trial has the joint offsets and the place of "
-    "the object that suit it.",
+    "repeats": "The noise floor is the scatter of repeats: how much trials of one command differ. It contains sensor "
+    "noise and what the machine does not repeat.",
+    "guess": "Nothing was repeated, so the noise floor is a guess: the position sensor's noise, from the fast part of "
+    "the signals and the sensor's resolution. It does not contain what the machine does not repeat.",
+    "contact": "The noise floor is the error of a grasp with all true contact effects: drives are known to some 10 % "
+    "only, and the contact solver stops early. Joint offsets and the object's place are fitted to each trial.",
 }
 
 
@@ -28,7 +25,7 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
     seconds = sum(trial.duration for trial in recording.trials)
     kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
     starts = len({trial.initialisation for trial in recording.trials})
-    said = "the values that the rig's owner believes (recording.yaml)"
+    said = "the values stated in recording.yaml"
     if model is not None:
         effects = ", ".join(one.effect for one in model.effects) or "no added effect"
         said = f"a model file: values for {', '.join(model.values) or 'no constant'}; {effects}"
@@ -47,8 +44,8 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
     odd = Callout(f"{len(recording.warnings)} things were odd about this recording:", "warn")
     warnings: list[Block] = [odd, Listing(shown)] if shown else []
     text = [
-        "The same commands that the rig received were given to the simulation. It started where the rig started and "
-        "then ran freely to the end of each trial: nothing pulls it back to the measurement."
+        "The simulation received the rig's commands. It started where the rig started and ran freely to the end of "
+        "each trial: nothing pulls it back to the measurement."
     ]
     return Section("What was compared", text, [Table(("", ""), rows), *warnings])
 
@@ -72,9 +69,9 @@ def error_section(comparison: Comparison) -> Section:
     overall = (milli(comparison.errors.overall, unit), milli(floor.overall, unit))
     rows.append(("all", *overall, f"{comparison.ratio:.2f}", "", ""))
     text = [
-        f"{FLOORS[floor.source]} A perfect model would score 1 in the column 'error / floor'; a model that scores 3 "
-        "leaves something out that is three times as large as the noise. The last two columns stand for themselves: "
-        "the position sensor's own noise, and what the simulator's time step adds to any model's error."
+        f"{FLOORS[floor.source]} A perfect model scores 1 in the column 'error / floor'. A model that scores 3 lacks "
+        "something three times as large as the noise. The last two columns are the position sensor's own noise, and "
+        "what the simulator's time step adds to any model's error."
     ]
     header = ("joint", "error (RMS)", "noise floor", "error / floor", "sensor noise", "time step")
     guess = [Callout("The noise floor is a guess: repeat each kind of trial to measure it.", "warn")]
@@ -84,9 +81,9 @@ def error_section(comparison: Comparison) -> Section:
 def where_section(comparison: Comparison, title: str = "Where it fails") -> Section:
     """In words, and as a map of joints and regimes."""
     caption = (
-        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. A cell that "
-        "stands out in its row is a hint at what is missing: friction shows just after reversals and at low speed, "
-        "delay and inertia at high speed, gravity and springs by posture."
+        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. An outlier in a "
+        "row hints at what is missing. Friction shows just after reversals and at low speed, delay and inertia at high "
+        "speed, gravity and springs by joint position."
     )
     blocks: list[Block] = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
     return Section(title, (), blocks)
@@ -108,10 +105,10 @@ def overlay_section(
         caption = f"{name}, its worst trial {one.name} ({one.kind}): {fell}."
         blocks.append(Figure(figures.overlay(comparison, trial, joint, before), caption))
         if before is None:
-            left, said = figures.residual(comparison, trial, joint), "Shaded red: more than three noise floors."
+            said = "Shaded: more than three noise floors."
         else:
-            left = figures.before_and_after(before, comparison, trial, joint)
             said = "Before and after, beside what noise alone leaves."
+        left = figures.residual(comparison, trial, joint, before)
         blocks.append(Figure(left, f"What the simulation did not follow. {said}"))
     return Section(title, (), blocks)
 
@@ -121,8 +118,8 @@ def band_section(comparison: Comparison) -> list[Section]:
     if comparison.band is None:
         return []
     text = [
-        f"{comparison.band.simulations} simulations with constants drawn from their ranges. A policy that is trained "
-        "on these ranges has met the real rig if the measured line lies in the band: 95 % of the samples should, and "
+        f"{comparison.band.simulations} simulations with constants drawn from their ranges. Training on these ranges "
+        "covers the real rig if the measured line lies in the band. 95 % of the samples should; "
         f"{100 * comparison.band.inside:.0f} % do."
     ]
     rows = [(joint, f"{100 * share:.0f} %") for joint, share in comparison.band.joints.items()]
@@ -146,29 +143,29 @@ def test_section(comparison: Comparison) -> Section:
     ratios = {joint: error / floor[joint] for joint, error in comparison.errors.joints.items()}
     memory = {one.joint: f"{1e3 * one.correlation_time:.0f} ms" for one in comparison.whiteness}
     rows = [(joint, f"{ratio:.2f}", memory[joint], _what_is_left(ratio)) for joint, ratio in ratios.items()]
-    table = Table(("joint", "left, in noise floors", "memory of what is left", "in words"), rows)
+    table = Table(("joint", "left, in noise floors", "correlation time of the error", "in words"), rows)
     above = [joint for joint, ratio in ratios.items() if ratio > AT_THE_FLOOR]
     if not above:
         return Section(
             "Is it noise?",
             [
-                "Yes, as far as this recording can tell: what is left is no larger than the noise floor at any joint. "
-                "A free-running simulation integrates every small error, so that it remembers itself is normal, and no "
-                "test of whiteness says more than that here."
+                "Yes, as far as this recording can tell: no joint's error is above the noise floor. A free-running "
+                "simulation integrates every small error, so its error is correlated in time; a test of whiteness "
+                "says no more here."
             ],
             [table],
         )
     text = [
-        f"Not at {', '.join(above)}: what is left is larger than the noise floor. Noise goes with no other signal; the "
-        "signals below go with what is left, and hint at its cause. 'By chance' is the probability of such a "
-        "correlation between unrelated signals that remember themselves as these do."
+        f"Not at {', '.join(above)}: the error is above the noise floor. Noise follows no other signal; the error "
+        "follows the signals below, which hint at its cause. 'By chance' is the probability of such a correlation "
+        "between unrelated signals with the same autocorrelation."
     ]
     strongest = [
-        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", p_value(c.p_value))
+        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", probability(c.p_value))
         for c in comparison.cross_correlations
         if c.joint in above
     ][:MOST_CORRELATIONS]
-    header = ("", "goes with", "correlation", "after", "by chance (p)")
+    header = ("", "follows", "correlation", "after", "by chance (p)")
     return Section("Is it noise?", text, [table, *([Table(header, strongest)] if strongest else [])])
 
 
@@ -192,26 +189,11 @@ def method_section() -> Section:
         "high speed: below 0.02, 0.3, 1.5 rad/s and above (m/s where a joint slides). Low and "
         "high load: below and above half of the largest torque.",
         "Whiteness: Ljung-Box test over 20 lags. Cross-correlation: the strongest within 0.1 s; its p-value allows "
-        "for the memory of both signals.",
+        "for the autocorrelation of both signals.",
     ]
     return Section("How this was computed", (), [Listing(lines)], folded=True)
 
 
-def floor_source(floor: NoiseFloor) -> str:
-    """Where the noise floor comes from, in words."""
-    if floor.source == "contact":
-        return "what a world with the true effects leaves of a grasp"
-    return f"scatter of {floor.repeats} repeats" if floor.source == "repeats" else "sensor noise, a guess: no repeats"
-
-
-def floor_in_words(floor: NoiseFloor, unit: str, step: float) -> list[str]:
-    """The noise floor and what stands beside it, each by its name; `step` is the simulator's [s]."""
-    lines = [f"noise floor: {floor_source(floor)}"]
-    for name, by_joint in (
-        ("sensor noise", floor.sensor),
-        (f"the simulator's own time step, {1e3 * step:g} ms,", floor.step_size),
-    ):
-        if by_joint:
-            size = (sum(value**2 for value in by_joint.values()) / len(by_joint)) ** 0.5
-            lines.append(f"beside it: {name} {milli(size, unit)}")
-    return lines
+def probability(value: float) -> str:
+    """A probability; very small ones are only said to be small."""
+    return "< 0.001" if value < 1e-3 else f"{value:.3f}"

@@ -15,6 +15,7 @@ from tactile_cube.visualization.diagnosis_sections import (
     held_section,
     ranking_section,
     staircase_section,
+    train_section,
 )
 from tactile_cube.visualization.report import Listing, Report, Section, Table
 
@@ -89,14 +90,10 @@ def _next_section(result: Mapping[str, Any], recording: str, model_path: str) ->
 def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:
     """The page of an identification of contact effects alone."""
     before, after = found.stages["nominal"].overall, found.stages["with_effects"].overall
-    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
-    follow = Section(
-        "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
-    )
     return Report(
         title=f"Identified: {name}",
         answer=f"The error on trials that the fit never saw fell from {milli(before)} to {milli(after)}.",
         tone="plain" if found.fit.silent() else "good",
-        sections=[*contact_sections(found), follow],
+        sections=[*contact_sections(found), train_section(model_path)],
         footer=f"Made by tactile_cube: {command}",
     )

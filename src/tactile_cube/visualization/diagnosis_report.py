@@ -33,6 +33,7 @@ from tactile_cube.visualization.diagnosis_sections import (
     ranking_section,
     shape_section,
     staircase_section,
+    train_section,
     value_section,
 )
 from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
@@ -41,7 +42,7 @@ VERDICTS: dict[str, tuple[Tone, str]] = {
     "adequate": ("good", "Nothing is missing: the model is as good as this recording can tell."),
     "missing_effect": ("good", "The missing effect was found"),
     "ambiguous": ("warn", "Several effects explain this recording equally well"),
-    "partly_explained": ("warn", "Most of what is missing was found, and more is missing besides"),
+    "partly_explained": ("warn", "Most of what is missing was found, but not all of it"),
     "unknown_effect": ("warn", "Something is missing that no effect of the catalogue explains."),
 }
 
@@ -122,7 +123,6 @@ def identification_report(
     found = [{"name": e.name, "joints": [e.joint or "object"], "parameters": e.parameters} for e in effects]
     units = after.recording.units
     unit = common_unit(units.values())
-    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
     return Report(
         title=f"Identified: {after.recording.name}",
         answer=f"The error on trials that the fit never saw fell from {milli(steps[0], unit)} to "
@@ -138,9 +138,7 @@ def identification_report(
             overlay_section(after),
             *band_section(after),
             test_section(after),
-            Section(
-                "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
-            ),
+            train_section(model_path),
         ],
         footer=f"Made by tactile_cube: {command}",
     )
@@ -151,7 +149,7 @@ def _verdict_section(diagnosis: Mapping[str, Any], units: Mapping[str, str]) -> 
     if known := diagnosis.get("known_effects"):
         lines.append(f"beside what was known: {', '.join(known)}")
     partial = diagnosis.get("partial_effects", [])
-    lines += [f"helps, but is not the whole of it: {_in_a_line(one, units)}" for one in partial]
+    lines += [f"reduces the error, but more is missing: {_in_a_line(one, units)}" for one in partial]
     if unproven := diagnosis.get("unproven_effects"):
         lines += unproven_effects(unproven)
     lines += [common_offset(entry, units) for entry in diagnosis.get("common_offsets", [])]
@@ -173,8 +171,8 @@ def _ceiling(diagnosis: Mapping[str, Any], joint: str) -> str:
     if not shares:
         return ""
     return (
-        f"; a black box of position, velocity, torque, neighbours and time could still explain {100 * shares[0]:.0f} % "
-        "of the missing torque"
+        "; a black-box model of position, velocity, torque, neighbours and time could still explain "
+        f"{100 * shares[0]:.0f} % of the missing torque"
     )
 
 

@@ -9,10 +9,17 @@ from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, TURNS, common_unit, milli, of_joint, short
-from tactile_cube.visualization.numbers import p_value
+from tactile_cube.visualization.charts import (
+    PALETTE,
+    SIMULATED,
+    Interval,
+    bar_chart,
+    interval_chart,
+    svg,
+    time_chart,
+)
+from tactile_cube.visualization.comparison_sections import probability
 from tactile_cube.visualization.report import Callout, Figure, Listing, Section, Table
-from tactile_cube.visualization.svg import PALETTE, SIMULATED, Axes, Band, Line, line_chart
-from tactile_cube.visualization.svg_tables import Interval, bar_chart, interval_chart
 
 WIDE = 6  # joints from which on a table has them in its rows
 STAGES = {
@@ -26,7 +33,7 @@ COLUMNS = {
     "gain": "share of the squared error it takes off",
     "p_value": "p (no better than without)",
 }
-INTERVALS = "Values and 95 % intervals, each on a scale of its own; effects that the model lacks are not allowed for."
+INTERVALS = "Values and 95 % intervals, each on a scale of its own; they do not allow for effects that the model lacks."
 REACHED = ("joint", "position in any model", "speed", "torque")
 HELD = "How the error with an object falls"
 
@@ -80,7 +87,7 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
         if "heldout_gain" in effect:
             lines.append(
                 f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off "
-                f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {p_value(effect['p_value'])})"
+                f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {probability(effect['p_value'])})"
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
     blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
@@ -104,12 +111,13 @@ def shape_section(shapes: Sequence[Shape], units: Mapping[str, str] | None = Non
     blocks = []
     for one in sorted(shapes, key=lambda shape: -shape.explained):
         unit = (units or {}).get(one.joint, TURNS)
-        axes = Axes(of_joint(one.against, unit), f"{one.joint} [m{of_joint('N m', unit)}]", height=200)
+        axes = time_chart(f"{one.joint} [m{of_joint('N m', unit)}]", 200, of_joint(one.against, unit))
         low, high = 1e3 * (one.mean - one.spread), 1e3 * (one.mean + one.spread)
-        band = Band("+- one standard deviation", one.centres, low, high)
-        chart = line_chart(axes, [Line("missing torque", one.centres, 1e3 * one.mean, SIMULATED, 2.0)], [band])
+        label = "+- one standard deviation"
+        axes.fill_between(one.centres, low, high, color=SIMULATED, alpha=0.25, linewidth=0, label=label)
+        axes.plot(one.centres, 1e3 * one.mean, color=SIMULATED, linewidth=2.0, label="missing torque")
         share = f"explains {100 * one.explained:.0f} % of what {one.beside or 'the model'} lacks."
-        blocks.append(Figure(chart, f"{one.joint} against {one.against}: {share}"))
+        blocks.append(Figure(svg(axes), f"{one.joint} against {one.against}: {share}"))
     return [Section("The shape of what is unexplained", text, blocks)]
 
 
@@ -136,6 +144,14 @@ def value_section(comparison: Comparison) -> Section:
                 unit = of_joint(one.unit, comparison.recording.units.get(joint, TURNS))
                 rows.append((f"{key} {joint}", short(one.value), interval, stated, unit))
     return Section("The constants", (), [Table(("", "value", "95 % interval", "owner's value", "unit"), rows)])
+
+
+def train_section(model_path: str) -> Section:
+    """What to type after an identification."""
+    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
+    return Section(
+        "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
+    )
 
 
 def next_section(
@@ -177,13 +193,11 @@ def experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Sect
         joint, unit = experiment.joints.index(experiment.joint), units.get(experiment.joint, TURNS)
         predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
         mean = sum(predictions.values()) / len(predictions)
-        lines = [
-            Line(name, experiment.time, 1e3 * (values - mean), PALETTE[k % len(PALETTE)], 1.3)
-            for k, (name, values) in enumerate(predictions.items())
-        ]
-        chart = line_chart(Axes("time [s]", f"{experiment.joint} [{THOUSANDTHS[unit]}]", height=220), lines)
+        axes = time_chart(f"{experiment.joint} [{THOUSANDTHS[unit]}]", 220)
+        for k, (name, values) in enumerate(predictions.items()):
+            axes.plot(experiment.time, 1e3 * (values - mean), color=PALETTE[k % len(PALETTE)], label=name)
         caption = f"What each candidate predicts for {experiment.joint} before any refit, relative to their mean."
-        blocks.append(Figure(chart, caption))
+        blocks.append(Figure(svg(axes), caption))
     return Section("What to record next", proposal(experiment), blocks)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,11 +13,10 @@ from tactile_cube.env.touch import TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import ObjectMesh
-from tactile_cube.visualization.branch import Branch
-from tactile_cube.visualization.episode_signals import FINGER_COLOURS
+from tactile_cube.visualization.rerun_recording import Branch, log_robot
 from tactile_cube.visualization.scene import FACE_COLOURS, FACE_NORMALS, STICKER, STICKER_HEIGHT
-from tactile_cube.visualization.solid_links import fill_shapes
 
+FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215), (150, 90, 200), (90, 190, 200))
 ARROW_LENGTH = 0.03
 """Length of a contact arrow [m/N]."""
 POSE_RATE = 50.0
@@ -30,18 +27,8 @@ TRAIL = 50
 
 def log_hand(branch: Branch, hand: Hand) -> UrdfTree:
     """Write the hand's URDF; gives its tree, which `log_motion` needs."""
-    urdf, prefix = hand.urdf(), branch.root.replace("/", "_")
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "hand.urdf"
-        file.write_text(urdf, encoding="utf-8")
-        tree = UrdfTree.from_file_path(
-            file,
-            entity_path_prefix=branch.hand.root.rstrip("/"),
-            frame_prefix=prefix or None,
-            static_transform_entity_path=f"{branch.hand.root}static",
-        )
-        tree.log_urdf_to_recording(branch.stream)
-    fill_shapes(branch.stream, tree, urdf)
+    prefix = branch.root.replace("/", "_")
+    tree = log_robot(branch.stream, hand.urdf(), branch.hand.root.rstrip("/"), prefix or None)
     root = rr.Transform3D(
         translation=hand.position,
         quaternion=rr.Quaternion(xyzw=Rotation.from_matrix(hand.rotation).as_quat()),

@@ -1,4 +1,4 @@
-"""A small film of an episode, and a sheet of stills on which a person can check the regrasps."""
+"""A small film of an episode, a sheet of stills on which a person can check the regrasps, and both of the best ones."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.evaluation import Evaluation, VariantResult
 from tactile_cube.evaluation.touch import touching
 from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.visualization.episode_recording import description, write_episode
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
 MAX_BYTES = 3_000_000
@@ -21,6 +23,27 @@ STRIDE = 2
 PALETTE_FRAMES = 6
 CAPTION_HEIGHT = 22
 TOUCH, FREE = (40, 160, 70), (205, 205, 205)
+
+
+def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path) -> None:
+    """Run the best episodes of the first variant again and show them; say where and how to look.
+
+    Args:
+        evaluation: what ran the episodes.
+        variants: what came of it.
+        folder: where the files go.
+    """
+    first = variants[0]
+    best = sorted(first.results, key=lambda result: result.final_angle, reverse=True)[: evaluation.protocol.film]
+    for result in best:
+        record = evaluation.record(first.variant, result)
+        file = folder / f"episode{result.episode}"
+        record.save(file.with_suffix(".npz"))
+        hand = evaluation.hand
+        write_film(record, file.with_suffix(".gif"), hand=hand)
+        write_stills(record, file.with_suffix(".png"), every=max(5, record.steps // 30), hand=hand)
+        write_episode(record, file.with_suffix(".rrd"), hand, summary=description(result))
+        print(f"episode {result.episode}: {file}.gif, stills {file}.png; look inside: rerun {file}.rrd")
 
 
 def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand = DLR_HAND2) -> None:

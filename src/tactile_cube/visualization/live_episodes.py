@@ -30,12 +30,10 @@ from tactile_cube.evaluation.verdict import judge
 from tactile_cube.training.run import POLICY
 from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.visualization.blueprint import live_blueprint
-from tactile_cube.visualization.branch import Branch
-from tactile_cube.visualization.episode_recording import log_episode
+from tactile_cube.visualization.episode_recording import description, log_episode
 from tactile_cube.visualization.live import read_request
-from tactile_cube.visualization.recording_file import APPLICATION
+from tactile_cube.visualization.rerun_recording import APPLICATION, Branch
 from tactile_cube.visualization.run_view import log_curves
-from tactile_cube.visualization.showcase import description
 from tactile_cube.visualization.viewer import Viewer, start_viewer
 
 NICENESS = 10

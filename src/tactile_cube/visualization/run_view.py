@@ -12,10 +12,9 @@ from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.training_curve import Curve
 from tactile_cube.hand import Hand
 from tactile_cube.visualization.blueprint import pair_blueprint
-from tactile_cube.visualization.branch import Branch
 from tactile_cube.visualization.curves import write_learning_curves
 from tactile_cube.visualization.episode_recording import log_episode
-from tactile_cube.visualization.recording_file import recording_file
+from tactile_cube.visualization.rerun_recording import Branch, recording_file
 
 PICTURE = (6.0, 6.0)
 """Size of the learning curves [inch]: a column beside the episodes."""

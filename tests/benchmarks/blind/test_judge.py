@@ -165,8 +165,14 @@ def _answer(verdict: str, *effects: tuple[str, str], rivals: tuple[str, ...] = (
     return {"verdict": verdict, "effects": [{"name": n, "joints": [j], "rivals": list(rivals)} for n, j in effects]}
 
 
+def _twin() -> dict[str, Any]:
+    truth = _truth(TILT)
+    truth["effects"][0] |= {"any_joint": True, "twins": ["position_offset"]}
+    return truth
+
+
 PLAY, COGS, RUB = ("backlash", "q1"), ("cogging", "q2"), ("coulomb_friction", "q1")
-ZERO = ("position_offset", "q1")
+ZERO, TILT = ("position_offset", "q1"), ("mount_tilt", "q1")
 
 
 @pytest.mark.parametrize(
@@ -201,6 +207,11 @@ ZERO = ("position_offset", "q1")
         (_truth(ZERO), _answer("adequate") | {"common_offsets": [{"joint": "q1"}]}, 9.0, "acceptable"),
         (_truth(ZERO), _answer("adequate") | {"common_offsets": [{"joint": "q2"}]}, 9.0, "wrong"),
         (_truth(RUB), _answer("adequate") | {"common_offsets": [{"joint": "q1"}]}, 9.0, "wrong"),
+        (_twin(), _answer("ambiguous", TILT, rivals=("position_offset@q1",)), 1.0, "right"),
+        (_twin(), _answer("ambiguous", ZERO, rivals=("mount_tilt",)), 1.0, "right"),
+        (_twin(), _answer("ambiguous", TILT, rivals=("payload",)), 1.0, "acceptable"),
+        (_twin(), _answer("missing_effect", TILT), 1.0, "acceptable"),
+        (_twin(), _answer("missing_effect", ZERO), 1.0, "wrong"),
         (_truth(PLAY, catalogue=False), _answer("unknown_effect"), 3.0, "right"),
         (_truth(PLAY, catalogue=False), _answer("ambiguous", COGS), 3.0, "acceptable"),
         (_truth(PLAY, catalogue=False), _answer("missing_effect", COGS), 1.0, "wrong"),

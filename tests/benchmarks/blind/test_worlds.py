@@ -1,13 +1,15 @@
 """Worlds of the blind rounds: the usual ones stay, machines of any size are sane, forms differ and have limits."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
 import pytest
+import yaml
 
-from benchmarks.blind import forms, generator, hidden, sizes, worlds
+from benchmarks.blind import forms, generator, hidden, logs, sizes, worlds
 from benchmarks.blind import plant as at
 from benchmarks.blind.dynamics import mass_and_bias
 from benchmarks.blind.excitation import multisine, ramps
@@ -127,6 +129,13 @@ def _replay(**values: float) -> np.ndarray:
         ({"velocity_lag_2": 2.5e-4}, {}),
         ({"knee": 1e-3, "knee_stiffness": 50.0}, {}),
         ({"drift_rate": -0.05}, {"drift": -0.05e3, "drift_time": 1e3}),
+        ({"integral": 1e-3}, {}),
+        ({"integral": 20.0, "integral_limit": 1e-5}, {}),
+        ({"feedforward": 1e-4}, {}),
+        ({"compensation": 1e-4}, {}),
+        ({"stall": 1e3, "no_load": 1e3}, {}),
+        ({"stall": 0.5, "no_load": 1e6}, {"saturation": 0.5}),
+        ({"early": 2e-4}, {}),
     ],
     ids=lambda values: "-".join(values) or "neutral",
 )  # fmt: skip
@@ -134,7 +143,7 @@ def test_a_form_tends_to_the_form_that_is_known(form: dict[str, float], limit: d
     assert np.sqrt(((_replay(**form) - _replay(**limit)) ** 2).mean()) < 4e-4
 
 
-@pytest.mark.parametrize("name", forms.FAMILIES)
+@pytest.mark.parametrize("name", [*forms.FAMILIES, *logs.MAKERS])
 def test_a_form_differs_visibly_from_a_world_without(name: str) -> None:
     plain = worlds.draw_world(np.random.default_rng(5), "pendulum", 1.0)
     expected, torque, _ = generator.probe(plain, 0)
@@ -143,7 +152,7 @@ def test_a_form_differs_visibly_from_a_world_without(name: str) -> None:
     for world in (changed, again):
         rng, peak = np.random.default_rng(6), np.abs(torque).max(axis=0)
         scene = hidden.Scene(world.rig, world.plant, world.low, world.high, peak, peak, rng, 0.5)
-        truths.append(forms.FAMILIES[name][0](scene, 0))
+        truths.append((forms.FAMILIES | logs.MAKERS)[name][0](scene, 0))
     assert truths[0] == truths[1]
     moved = generator.probe(changed, 0)[0]
     assert np.isfinite(moved).all()
@@ -154,6 +163,86 @@ def test_forms_are_hidden_in_turn_and_nothing_in_every_sixth() -> None:
     drawn = [generator.names_for(seed, np.random.default_rng(0), "forms")[1] for seed in range(600, 640)]
     assert sum(not names for names in drawn) == 7
     assert {name for names in drawn for name in names} == set(forms.FAMILIES)
+
+
+def _hanging(**values: float) -> tuple[np.ndarray, np.ndarray]:
+    """What a pendulum reads that is told to stand at 0.4 rad for three seconds, and what it weighs there [N m]."""
+    rig = RIGS["pendulum"](np.random.default_rng(0))
+    rig.gravity = (0.0, 0.0, -9.81)
+    known = {"kp": 6.0, "kd": 0.3, "torque_limit": 2.5, "stiffness": np.inf, "reflected_inertia": 0.004, **values}
+    plant = neutral(1)._replace(**{name: np.array([float(value)]) for name, value in known.items()})
+    reading = simulate(rig, plant, np.full((1500, 1), 0.4), 500.0, np.array([0.4]))[0][:, 0]
+    return reading, 9.81 * rig.links[0].mass * -rig.links[0].com[2] * np.sin(reading)
+
+
+def test_the_parts_of_a_controller_do_to_a_weight_what_they_are_for() -> None:
+    sagging, weight = _hanging()
+    assert 0.4 - sagging[-1] == pytest.approx(weight[-1] / 6.0, rel=1e-6)
+    compensated, weight = _hanging(compensation=0.8)
+    assert 0.4 - compensated[-1] == pytest.approx(0.2 * weight[-1] / 6.0, rel=1e-6)
+    assert _hanging(integral=12.0)[0][-1] == pytest.approx(0.4, abs=1e-4)
+    clamped, weight = _hanging(integral=12.0, integral_limit=0.05)
+    assert 0.4 - clamped[-1] == pytest.approx((weight[-1] - 0.05) / 6.0, rel=1e-6)
+
+
+def test_a_command_of_constant_speed_is_followed_without_lag_where_its_speed_is_fed_forward() -> None:
+    rig = RIGS["pendulum"](np.random.default_rng(0))
+    rig.gravity = (0.0, -9.81, 0.0)
+    known = {"kp": 6.0, "kd": 0.3, "torque_limit": 2.5, "stiffness": np.inf, "reflected_inertia": 0.004}
+    command = 0.5 * np.arange(1000)[:, None] / 500.0
+    for gain, lag in ((0.0, 0.3 * 0.5 / 6.0), (0.3, 0.0)):
+        plant = neutral(1)._replace(**{k: np.array([v]) for k, v in {**known, "feedforward": gain}.items()})
+        reading = simulate(rig, plant, command, 500.0, np.zeros(1))[0]
+        assert command[-1, 0] + 0.5 / 500.0 - reading[-1, 0] == pytest.approx(lag, abs=1.5e-3)  # held for a row
+
+
+def test_a_motor_at_its_supply_runs_up_to_its_no_load_speed() -> None:
+    rig = RIGS["pendulum"](np.random.default_rng(0))
+    rig.gravity = (0.0, -9.81, 0.0)
+    known = {"kp": 6.0, "kd": 0.0, "torque_limit": 9.0, "stiffness": np.inf, "reflected_inertia": 0.004}
+    plant = neutral(1)._replace(**{k: np.array([v]) for k, v in {**known, "stall": 0.2, "no_load": 3.0}.items()})
+    joint = simulate(rig, plant, np.full((300, 1), 50.0), 500.0, np.zeros(1))[2][:, 0]
+    inertia = 0.004 + 1e-4 + rig.links[0].mass * rig.links[0].com[2] ** 2
+    time = np.arange(1, 301) / 500.0
+    rate = 0.2 / 3.0 / inertia
+    np.testing.assert_allclose(joint, 3.0 * (time - (1.0 - np.exp(-rate * time)) / rate), atol=2e-3)
+
+
+def test_a_log_is_as_skewed_late_and_wrong_as_its_bench_says() -> None:
+    world, bench, truth = generator.draw(1, 2.0, [], "pendulum", worlds="logs")
+    assert 0.0 < abs(bench.skew) < 0.5
+    assert truth["bench"]["skew"] == bench.skew
+    exact = replace(bench, noise=0.0, resolution=1e-9, skew=0.0)
+    logged = {"plain": exact, "early": replace(exact, skew=0.4), "late": replace(exact, late=5)}
+    logged["off"] = replace(exact, outliers=0.02)
+    tables = {
+        name: generator.perform(1, world, one)[0]["trials/multisine_0.parquet"][2].to_numpy().astype(float)
+        for name, one in logged.items()
+    }
+    plain, early, late, off = (tables[name] for name in ("plain", "early", "late", "off"))
+    speed = np.gradient(plain[:, 2])
+    assert np.abs(plain[5:-5, 2] - 0.4 * speed[5:-5] - early[5:-5, 2]).max() < 0.05 * np.abs(speed).max()
+    np.testing.assert_array_equal(late[5:, 1], plain[:-5, 1])
+    np.testing.assert_array_equal(late[:, 2], plain[:, 2])
+    wrong = np.abs(off[:, 2] - plain[:, 2]) > 0.04
+    assert 0.005 < wrong.mean() < 0.05
+
+
+def test_controllers_and_logs_are_hidden_in_turn_three_effects_at_one_joint() -> None:
+    drawn = [generator.names_for(seed, np.random.default_rng(0), "logs") for seed in range(600, 630)]
+    assert {label for label, _ in drawn} == set(logs.TURNS)
+    _, _, truth = generator.draw(9, 2.0, kind="two_link", worlds="logs")
+    assert [one["name"] for one in truth["effects"]] == list(logs.TURNS["hobby_servo"])
+    assert len({tuple(one["joints"]) for one in truth["effects"]}) == 1
+
+
+def test_the_owner_of_a_tilted_machine_states_the_gravity_that_he_believes_in(tmp_path: Path) -> None:
+    truth = generator.write(7, tmp_path, 1.0, kind="pendulum", worlds="logs")
+    assert truth["effects"][0]["twins"] == ["position_offset"]
+    stated = yaml.safe_load((tmp_path / "recording" / "recording.yaml").read_text())["gravity"]
+    felt = np.array(truth["effects"][0]["parameters"]["gravity"])
+    angle = np.arccos(felt @ stated / np.linalg.norm(felt) / np.linalg.norm(stated))
+    assert angle == pytest.approx(truth["effects"][0]["parameters"]["angle"], rel=1e-3)
 
 
 def test_the_other_engine_refuses_worlds_that_it_does_not_know(tmp_path: Path) -> None:

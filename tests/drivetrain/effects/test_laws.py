@@ -1,7 +1,7 @@
 """The law of every effect by its value: what the formula gives for plain numbers. An effect without a row fails."""
 
 from dataclasses import dataclass, field
-from math import exp, nan, tanh
+from math import cos, exp, nan, sin, tanh
 
 import numpy as np
 import pytest
@@ -15,12 +15,14 @@ from tactile_cube.drivetrain.effects import (
     FRICTION,
     JOINT_TORQUE,
     LEAD,
+    LOAD,
     MEASURED_VELOCITY,
     MOTOR_POSITION,
     POSITION,
     TIME,
     TORQUE,
     VELOCITY,
+    WEIGHT,
     Place,
     catalogue,
 )
@@ -108,6 +110,12 @@ RING = {VELOCITY: (8.0, 2.0, nan), POSITION: (0.5, 0.7, nan), JOINT_TORQUE: (nan
 UPPER, LOWER = {"upper": 0.5, "stiffness": 10.0, "depth": 0.1}, {"lower": -0.5, "stiffness": 10.0, "depth": 0.1}
 STICK = {"excess": 0.08, "velocity": 0.3}
 BRISTLES, DAMPED = {"breakaway": 1e-3}, {"breakaway": 1e-3, "micro_damping": 0.5}
+GONE = 0.05 * 0.04 / DT * (1.0 - exp(-1.0))
+SUPPLY = {"stall": 0.4, "no_load": 10.0}
+AT_REST = {TORQUE: [0.25] * 3, LOAD: 0.3, COMMAND: 0.5, MOTOR_POSITION: 0.38, DEFLECTION: 0.02}
+AT_REST |= {VELOCITY: 0.0, FRICTION: 0.0}
+MOVED = {COMMAND: [0.5, 9.0, 9.0], MOTOR_POSITION: [0.1, 0.3, 0.3]}
+JUMP = {TORQUE: 0.1, COMMAND: [0.3, 0.34, 0.34]}
 SLIDE = {FRICTION: 0.1, JOINT_TORQUE: 0.5}
 KEPT = exp(-0.2)  # of a bristle's bend, when 0.1 rad/s move it for 2 ms
 # fmt: off
@@ -152,6 +160,23 @@ ROWS_OF_LAWS = (
         (RISE, {TORQUE: RISING, ACCELERATION: 0.0}, RISES),
         (RISE, {TORQUE: [-k for k in MIDDLES], DAMPING: 2.0, ACCELERATION: 250.0}, [nan] * 99 + [0.5 * SHARE - 97.0]),
     ),
+    *rows(
+        "integral_action",
+        # begins as what the load takes beyond the controller's torque, then grows by 4 N m/(rad s) * 0.1 rad
+        ({"ki": 4.0}, AT_REST, [0.3, 0.3008, 0.3016]),
+        ({"ki": 4.0, "limit": 0.0512}, AT_REST | {LOAD: 0.3}, [0.3, 0.3008, 0.3012]),
+        ({"ki": 4.0, "limit": 0.04}, AT_REST, [0.29, 0.29, 0.29]),
+        # a joint that moves rubs, as far as its damping tells
+        ({"ki": 4.0}, AT_REST | {VELOCITY: -0.5, FRICTION: 0.1, DAMPING: 0.2}, [0.25, nan, nan]),
+        # the command counts as held over the step before, the reading as linear
+        ({"ki": 1.0}, AT_REST | MOVED, [0.3, 0.3 + 0.28 * DT, nan]),
+    ),
+    *rows("gravity_compensation", ({"share": 0.8}, {TORQUE: 0.1, WEIGHT: -0.5}, -0.3)),
+    *rows(
+        "velocity_feedforward",
+        # of a jump by 40 mrad all comes in the end, as an impulse, the rest of it with a decay of exp(-1) a step
+        ({"gain": 0.05, "smoothing": DT}, JUMP, [0.1, 0.1 + GONE, 0.1 + GONE * exp(-1.0)]),
+    ),
     *rows("torque_gain", ({"error": 0.1}, {TORQUE: -0.3}, -0.33)),
     *rows(
         "torque_curve",
@@ -188,6 +213,15 @@ ROWS_OF_LAWS = (
         ({"limit": 0.3, "softness": 1.0}, {TORQUE: -0.6}, -0.2),
         ({"limit": 0.3, "softness": 0.5}, {TORQUE: -0.4}, -0.24),
         ({"limit": 0.3, "softness": 0.02}, {TORQUE: 0.4}, 0.3),
+    ),
+    *rows(
+        "back_emf",
+        (SUPPLY, {TORQUE: 0.2, VELOCITY: 4.0}, 0.2),
+        (SUPPLY, {TORQUE: 0.5, VELOCITY: 4.0}, 0.24),
+        (SUPPLY, {TORQUE: -0.5, VELOCITY: -6.0}, -0.16),
+        (SUPPLY, {TORQUE: 0.5, VELOCITY: -2.0}, 0.48),  # the supply helps to brake
+        (SUPPLY, {TORQUE: 0.5, VELOCITY: 12.0}, -0.08),
+        ({"no_load": 5.0}, {TORQUE: 0.5, VELOCITY: 12.0}, 0.5),
     ),
     *rows(
         "stiffening_elasticity",
@@ -346,18 +380,20 @@ def test_neutral_values_change_nothing_bit_for_bit(row: Row) -> None:
 )
 def test_the_damping_goes_with_the_slope_of_the_law(row: Row) -> None:
     """The midpoint step needs to know how the torque depends on the speed."""
-    signal, ends = VELOCITY if row.row == JOINT_TORQUE else row.row, []
-    for change in (-1e-6, 1e-6):
-        steps = row.steps()
-        steps[-1][signal, row.joint] += change
-        ends.append(row.run(row.values, steps)[-1])
-    slope = (ends[1] - ends[0]) / 2e-6
-    if np.isnan(slope):  # of a speed that the law does not read
-        slope = 0.0
+
+    def slope(signal: int) -> float:
+        """Of the law against a signal; of one that it does not read, none."""
+        ends = []
+        for change in (-1e-6, 1e-6):
+            steps = row.steps()
+            steps[-1][signal, row.joint] += change
+            ends.append(row.run(row.values, steps)[-1])
+        return float(np.nan_to_num((ends[1] - ends[0]) / 2e-6))
+
     steps = row.steps()
     before = steps[-1][DAMPING, row.joint]
     row.run(row.values, steps)
-    expected = before - slope if row.row == JOINT_TORQUE else before * slope
+    expected = before * slope(row.row) - slope(VELOCITY)
     assert steps[-1][DAMPING, row.joint] == pytest.approx(expected, rel=1e-5, abs=1e-4)
 
 
@@ -383,6 +419,8 @@ MECHANISMS = (
     ),
     ("payload", {"mass": -0.02, "distance": 0.02}, "mass", LAST, 0.03),
     ("payload", {"mass": -0.2, "distance": 0.02}, "mass", LAST, 1e-6),  # never less than nothing
+    ("mount_tilt", {"first": 0.3}, "gravity", (0,), [0.0, 9.81 * sin(0.3), -9.81 * cos(0.3)]),
+    ("mount_tilt", {"second": 0.3}, "gravity", (0,), [-9.81 * sin(0.3), 0.0, -9.81 * cos(0.3)]),
 )
 
 
@@ -395,6 +433,7 @@ def constants() -> dict[str, np.ndarray]:
         "offset": np.zeros((1, 4)),
         "reflected_inertia": np.full(3, 0.003),
         "compliance": np.full(3, 0.04),
+        "gravity": np.array([[0.0, 0.0, -9.81]]),
     }
 
 
@@ -408,6 +447,15 @@ def test_a_mechanism_gets_the_constants_of_the_formula(name, values, key, where,
     changed[key][where] = constants()[key][where]
     others = ("mass", "com", "inertia") if name == "payload" else ()
     assert all(np.array_equal(changed[one], value) for one, value in constants().items() if one not in others)
+
+
+def test_a_tilt_goes_with_any_direction_of_gravity_and_with_none() -> None:
+    batch = np.array([[[0.0, 0.0, 0.0]], [[0.0, -9.81, 0.0]], [[3.0, 4.0, 0.0]]])
+    catalogue()["mount_tilt"].configure({"gravity": batch}.__getitem__, PLACE, np.array([[0.2, 0.1]] * 3))
+    sizes = np.linalg.norm(batch[:, 0], axis=1)
+    np.testing.assert_allclose(sizes, [0.0, 9.81, 5.0])
+    assert batch[1, 0, 1] == pytest.approx(-9.81 * cos(0.2) * cos(0.1))
+    assert np.allclose(batch[0], 0.0)
 
 
 def test_every_parameter_of_every_effect_has_a_row_in_which_it_acts() -> None:

@@ -89,6 +89,10 @@ START = {"drive": SERVO, "q": 0.2}
 LAGS = {"time_constant": 0.004, "second": 0.006}
 AS_FILTERED = [[0, 1, 0, 0], [-KP / INERTIA, 0, 0, -KD / INERTIA], [0, 250.0, -250.0, 0], [0, 0, 1 / 0.006, -1 / 0.006]]
 AS_LAGGED = [[0, 1, 0], [0, 0, 1 / INERTIA], [-KP / 0.01, -KD / 0.01, -1 / 0.01]]
+AS_INTEGRATED = [[0, 1, 0], [-KP / INERTIA, -KD / INERTIA, 1 / INERTIA], [-20.0, 0, 0]]
+AS_FED = [[0, 1, 0], [-KP / INERTIA, -KD / INERTIA, -KD / 0.005 / INERTIA], [0, 0, -1 / 0.005]]
+FED = RAMP + linear(AS_FED, 0.0, -0.5, 0.5 * 0.005)  # error, its speed, and what the smoothed speed lacks
+FALLING = 9.0 * (1.0 - np.exp(-0.4 * PER_INERTIA / 9.0))
 # neighbours that are held and driven with 0.3 and -0.6 N m
 SHUNT = {"from_previous": 0.5, "from_next": -0.25}
 GIVEN = (0.5 * 0.3 - 0.25 * -0.6) / KP
@@ -114,6 +118,11 @@ def zone(form: str, rest: float) -> tuple:
     """Where a joint rests that is commanded to 0.2 rad and loaded with -0.1 K_P."""
     where = {"drive": SERVO, "command": 0.2, "q": rest, "load": -0.1 * KP}
     return "command_dead_zone", {form: 0.02}, where, POSITION, rest, 1e-9
+
+
+def hanging(rest: float, weight: float) -> dict:
+    """A pendulum that its controller holds at `rest` against a part of its largest weight."""
+    return {"drive": SERVO, "command": rest + 0.2 * 9.81 * 0.1 * weight / KP, "q": rest, "gravity": 9.81}
 
 
 def asked(torque: float) -> dict:
@@ -148,6 +157,12 @@ CLOSED_FORMS = (
     ("command_dead_zone", {"hold": 50.25 * DT}, {"command": RAMP}, COMMAND, HELD, 1e-9),
     ("velocity_filter_lag", LAGS, START, POSITION, linear(AS_FILTERED, 0.2, 0.0, 0.0, 0.0), 2e-4),
     ("actuator_lag", {"time_constant": 0.01}, START, POSITION, linear(AS_LAGGED, 0.2, 0.0, -0.2 * KP), 2e-4),
+    ("integral_action", {"ki": 20.0}, START, POSITION, linear(AS_INTEGRATED, 0.2, 0.0, 0.2 * KP), 2e-4),
+    ("gravity_compensation", {"share": 0.8}, hanging(0.3, 0.2 * np.sin(0.3)), POSITION, 0.3, 1e-9),
+    ("velocity_feedforward", {"gain": KD}, {"drive": SERVO, "command": RAMP}, POSITION, FED, 1e-4),
+    ("back_emf", {"stall": 0.4, "no_load": 9.0}, asked(1.0), VELOCITY, FALLING, 1e-4),
+    ("back_emf", {"stall": 0.4, "no_load": 9.0}, asked(-1.0), VELOCITY, -FALLING, 1e-4),
+    ("mount_tilt", {"second": 0.3}, hanging(0.1, np.sin(0.1 - 0.3)), POSITION, 0.1, 1e-9),
     ("torque_curve", {"bend": -0.5, "gain": 0.2, "reference": 0.1}, asked(-0.4), VELOCITY, -0.24 * PER_INERTIA, 1e-9),
     ("torque_crosstalk", SHUNT, SIDES | {"drive": SERVO, "q": np.array([0.0, GIVEN, 0.0])}, POSITION, GIVEN, 1e-9),
     ("elasticity", {"compliance": 0.05}, CLAMPED | {"command": 1.0}, TORQUE, 3.0 / 1.3, 1e-12),

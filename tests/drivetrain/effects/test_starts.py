@@ -30,9 +30,9 @@ def test_units_read_as_somebody_with_a_sliding_joint_writes_them() -> None:
     assert unit_at("rad/(N m)", slides=False) == "rad/(N m)"
 
 
-def test_a_search_begins_with_little_mass_and_with_that_of_a_tool() -> None:
+def test_a_search_begins_with_little_mass_and_with_that_of_a_counterweight_and_a_tool() -> None:
     starts = Payload.starts_at(replace(FINGER, mass=2.0, lever=0.5))
-    assert starts[-1] == {"mass": 1.0, "distance": 0.5}
+    assert starts[-2:] == [{"mass": 1.0, "distance": -0.5}, {"mass": 1.0, "distance": 0.5}]
     assert starts[0]["mass"] == -starts[1]["mass"] > 0.0
 
 

@@ -8,7 +8,7 @@ import pytest
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.comparison import compare_contact
-from tactile_cube.measurement.comparing.comparison import as_json
+from tactile_cube.measurement.comparing.comparison import comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
@@ -32,7 +32,7 @@ def test_a_model_with_the_hidden_effect_follows_the_grasp_better(recording: Reco
     stated, true = (compare_contact(recording, one, say=said.append) for one in (None, model))
     assert true.errors.overall < 0.6 * stated.errors.overall
     assert said == ["twist_0_0 simulated, 1 of 1"] * 2
-    assert as_json(true)["noise_floor"]["source"] == "guess"
+    assert comparison_json(true)["noise_floor"]["source"] == "guess"
     assert np.isfinite(true.ratio)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tactile_cube.measurement.comparing import comparison as module
-from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, as_json, compare
+from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare, comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import Table, table, write
 
@@ -17,7 +17,7 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
 
 
 def test_comparison_json_has_what_others_script_against(comparison: Comparison) -> None:
-    result = json.loads(json.dumps(as_json(comparison)))
+    result = json.loads(json.dumps(comparison_json(comparison)))
     assert set(result["error"]) == {"overall", "joints"}
     assert set(result["error"]["joints"]) == {"a", "b"}
     assert {"overall", "joints", "source"} <= set(result["noise_floor"])

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.comparing.error import normalised_fit, raw_residuals, residuals, summarise
+from tactile_cube.measurement.comparing.error import normalised_fit, raw_residuals, residuals, summarise_errors
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import write
 
@@ -13,7 +13,7 @@ def test_the_offset_of_each_initialisation_is_removed_and_nothing_else(tmp_path:
     trials = recording.trials
     wave = 1e-3 * np.sin(np.linspace(0, 20 * np.pi, 300, endpoint=False))[:, None] * [1.0, 0.0]
     simulated = [t.position - wave + 0.02 * (t.initialisation + 1) for t in trials]
-    summary = summarise(residuals(trials, simulated), recording.joints)
+    summary = summarise_errors(residuals(trials, simulated), recording.joints)
     assert summary.joints["a"] == pytest.approx(1e-3 / np.sqrt(2), rel=1e-6)
     assert summary.joints["b"] == pytest.approx(0.0, abs=1e-12)
     assert summary.overall == pytest.approx(1e-3 / 2, rel=1e-6)
@@ -30,13 +30,13 @@ def test_bridged_samples_count_in_no_error(tmp_path: Path) -> None:
     simulated[0][100] += 1.0
     errors = residuals(recording.trials, simulated)
     assert np.isnan(errors[0][100]).all()
-    assert summarise(errors, recording.joints).overall == 0.0
+    assert summarise_errors(errors, recording.joints).overall == 0.0
 
 
 def test_of_the_raw_error_nothing_is_removed_and_the_fit_is_what_is_left_of_the_motion(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path))
     trials = recording.trials
     raw = raw_residuals(trials, [trial.position + 0.02 for trial in trials])
-    assert summarise(raw, recording.joints).joints["a"] == pytest.approx(0.02)
+    assert summarise_errors(raw, recording.joints).joints["a"] == pytest.approx(0.02)
     halves = [trial.position.mean(axis=0) + 0.5 * (trial.position - trial.position.mean(axis=0)) for trial in trials]
     assert normalised_fit(trials, raw_residuals(trials, halves), ("a", "b"))["a"] == pytest.approx(50.0)

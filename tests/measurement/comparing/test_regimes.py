@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.comparing.error import summarise
+from tactile_cube.measurement.comparing.error import summarise_errors
 from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.comparing.regimes import after_reversal, latest_direction, regimes
@@ -23,7 +23,9 @@ def rows(recording: Recording, errors: list[np.ndarray], joint: str) -> dict[str
 
 def words(recording: Recording, errors: list[np.ndarray]) -> list[str]:
     table = regimes(recording.trials, errors, recording.joints)
-    return where_it_fails(table, summarise(errors, recording.joints).joints, noise_floor(recording), recording.units)
+    return where_it_fails(
+        table, summarise_errors(errors, recording.joints).joints, noise_floor(recording), recording.units
+    )
 
 
 def test_an_error_after_reversals_stands_out_there(recording: Recording) -> None:

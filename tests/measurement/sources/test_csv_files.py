@@ -10,7 +10,7 @@ import pytest
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.writing import write_whole
+from tactile_cube.measurement.recordings.writing import write_recordings
 from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tests.measurement.small_rig import URDF, table
 
@@ -34,7 +34,7 @@ def imported(folder: Path, logs: dict[str, Frame | str], urdf: str = URDF, **cha
         else:
             polars.DataFrame(log).write_csv(folder / name)
     settings = {"files": [str(folder / name) for name in logs], "urdf": str(folder / "rig.urdf"), "controller": GAINS}
-    write_whole(folder / "out", CsvFiles(**(settings | changes)).recordings(0))  # type: ignore[arg-type]
+    write_recordings(folder / "out", CsvFiles(**(settings | changes)).recordings(0))  # type: ignore[arg-type]
     return read_recording(folder / "out")
 
 

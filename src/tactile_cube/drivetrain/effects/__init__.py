@@ -27,6 +27,7 @@ from tactile_cube.drivetrain.signals import (
     TIME,
     TORQUE,
     VELOCITY,
+    WEIGHT,
 )
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "TIME",
     "TORQUE",
     "VELOCITY",
+    "WEIGHT",
     "Effect",
     "Parameter",
     "Place",

@@ -19,6 +19,9 @@ CATALOGUE_MODULES = (
     "rate_limit",
     "command_delay",
     "velocity_filter_lag",
+    "integral_action",
+    "gravity_compensation",
+    "velocity_feedforward",
     "torque_gain",
     "torque_curve",
     "torque_bias",
@@ -26,6 +29,7 @@ CATALOGUE_MODULES = (
     "cogging",
     "actuator_lag",
     "torque_saturation",
+    "back_emf",
     "elasticity",
     "stiffening_elasticity",
     "backlash",
@@ -44,6 +48,7 @@ CATALOGUE_MODULES = (
     "presliding_friction",
     "reflected_inertia",
     "payload",
+    "mount_tilt",
     "coupling_error",
 )
 """Files of this folder, in the order in which effects of one stage act."""

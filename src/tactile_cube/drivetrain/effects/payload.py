@@ -9,12 +9,12 @@ from tactile_cube.drivetrain.effects.scales import Scales
 class Payload(Effect):
     """Point mass on the outermost link that the joint moves by itself.
 
-    The mass lies `distance` from that link's joint, on the line through the link's centre of mass. A negative mass
-    makes the link lighter than stated.
+    The mass lies `distance` from that link's joint, on the line through the link's centre of mass; below zero behind
+    the joint, as a counterweight does. A negative mass makes the link lighter than stated.
 
     In data: an error like the weight: sin q of the posture, also at rest; more inertia in fast motion.
-    Confused with: `torque_gain`; a second posture or a known weight separates them. `position_offset`;
-    `reflected_inertia`.
+    Confused with: `torque_gain`; a second posture or a known weight separates them. `gravity_compensation`: a torque
+    sensor separates them. `position_offset`; `reflected_inertia`.
     Source: parallel-axis theorem.
     """
 
@@ -22,7 +22,7 @@ class Payload(Effect):
     stage = Stage.MECHANISM
     parameters = (
         Parameter("mass", "kg", 0.0, -0.2, 5.0, 0.02, "0-20 % of the link's mass, or a tool"),
-        Parameter("distance", "m", 0.03, 0.0, 1.0, 0.03, "within the link"),
+        Parameter("distance", "m", 0.03, -1.0, 1.0, 0.03, "within the link; a counterweight behind it"),
     )
 
     @classmethod
@@ -33,12 +33,14 @@ class Payload(Effect):
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Return a little mass more and less, and that of a tool: half the mass that the joint moves, at its lever.
+        """Return a little mass more and less, and half the mass that the joint moves, as counterweight and as tool.
 
         A fit that starts at a few per cent does not reach a mass several times the link's.
         """
-        tool = {"mass": 0.5 * scales.mass} if scales.slides else {"mass": 0.5 * scales.mass, "distance": scales.lever}
-        return [*super().starts_at(scales), tool]
+        starts, tool = super().starts_at(scales), {"mass": 0.5 * scales.mass}
+        if scales.slides:
+            return [*starts, tool]
+        return [*starts, *({**tool, "distance": lever} for lever in (-scales.lever, scales.lever))]
 
     @staticmethod
     def configure(view: View, place: Place, p: Array) -> None:

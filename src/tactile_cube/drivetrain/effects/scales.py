@@ -30,6 +30,7 @@ class Scales:
         slides: whether the joint is prismatic.
         neighbours: number of other joints of the rig.
         leads: whether another joint follows this one.
+        first: whether it is the first joint of the rig.
         torque_limit: stated limit of the controller [N m]; infinite without one.
         lower: stated lower end of the joint [rad]; infinite without one.
         upper: stated upper end [rad].
@@ -49,6 +50,7 @@ class Scales:
     slides: bool = False
     neighbours: int = 0
     leads: bool = False
+    first: bool = True
     torque_limit: float = inf
     lower: float = -inf
     upper: float = inf

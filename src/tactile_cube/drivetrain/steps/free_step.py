@@ -141,6 +141,9 @@ def start_first(
         trial[:] = memory
         free_step(command, trial)
         start_segment(position, speed, free, trial, memory)
+        for a in range(C * n):  # torques that are added after the closed form bend the drive from the start
+            memory[plant.EXTRA + a] = trial[plant.EXTRA + a]
+            memory[plant.EXTRA_COMPLIANCE + a] = trial[plant.EXTRA_COMPLIANCE + a]
     move(initial_state, memory)
 
 

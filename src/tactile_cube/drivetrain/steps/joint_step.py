@@ -25,8 +25,9 @@ from tactile_cube.drivetrain.signals import (
     ROWS,
     TORQUE,
     VELOCITY,
+    WEIGHT,
 )
-from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, mass_matrix_and_bias
+from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, mass_matrix_and_bias, pull_of_gravity
 
 from . import plant
 from .plant import N, n
@@ -51,27 +52,35 @@ def signals_of(c: int, memory: Array) -> Array:
 
 @compiled
 def find_equations(c: int, q: Array, v: Array, memory: Array) -> None:
-    """Fills M, h of all dofs of chain c and their actuated-joint form."""
+    """Fills M, h of all dofs of chain c and their actuated-joint form, and the joints' part of h that is weight."""
     M, h = block(memory, plant.MASS_MATRIX, (N, N)), block(memory, plant.BIAS, (N,))
+    mass, gravity = block(memory, plant.MASS, (N,), c), block(memory, plant.GRAVITY, (3,), c)
+    work = block(memory, plant.WORK, (N + 1, WORK_COLUMNS))
     mass_matrix_and_bias(
         plant.PARENT,
         plant.PRISMATIC,
         block(memory, plant.PLACEMENT_ROTATION, (N, 3, 3), c),
         block(memory, plant.PLACEMENT_TRANSLATION, (N, 3), c),
         block(memory, plant.AXIS, (N, 3), c),
-        block(memory, plant.MASS, (N,), c),
+        mass,
         block(memory, plant.COM, (N, 3), c),
         block(memory, plant.INERTIA, (N, 3, 3), c),
         q,
         v,
-        block(memory, plant.GRAVITY, (3,), c),
-        block(memory, plant.WORK, (N + 1, WORK_COLUMNS)),
+        gravity,
+        work,
         M,
         h,
     )
     M_joint, h_joint = block(memory, plant.JOINT_MASS_MATRIX, (n, n)), block(memory, plant.JOINT_BIAS, (n,))
     ratio, rotor = block(memory, plant.RATIO, (N,), c), block(memory, plant.REFLECTED_INERTIA, (n,), c)
     reduce_equations(plant.FOLLOW, ratio, M, h, rotor, M_joint, h_joint)
+    x, weight = signals_of(c, memory), block(memory, plant.WEIGHT, (N,))
+    x[WEIGHT, :] = 0.0
+    weight[:] = 0.0
+    pull_of_gravity(plant.PARENT, plant.PRISMATIC, mass, (-gravity[0], -gravity[1], -gravity[2]), work, weight)
+    for k in range(N):
+        x[WEIGHT, plant.FOLLOW[k]] += ratio[k] * weight[k]
 
 
 @compiled

@@ -9,7 +9,7 @@ import numpy as np
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.contact.trial import SIGMA, ContactTrial
 from tactile_cube.measurement.bench import with_object
-from tactile_cube.measurement.comparing.comparison import Comparison, describe
+from tactile_cube.measurement.comparing.comparison import Comparison, describe_comparison
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import HandReplay, contact_of
@@ -43,4 +43,4 @@ def compare_contact(
     finally:
         replay.close()
     floor = NoiseFloor(SIGMA, dict.fromkeys(held.joints, SIGMA), "contact", 0, {})
-    return describe(held, model, simulated, floor, None, step)
+    return describe_comparison(held, model, simulated, floor, None, step)

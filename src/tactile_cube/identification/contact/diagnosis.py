@@ -13,7 +13,7 @@ from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelEr
 from tactile_cube.identification.contact.choice import GOOD, ContactSearch, Tried, mean_squares, some_of_each_kind
 from tactile_cube.identification.contact.fit import fit_contact
 from tactile_cube.identification.contact.grasps import open_grasps
-from tactile_cube.measurement.comparing.error import ErrorSummary, summarise
+from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_errors
 from tactile_cube.measurement.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -134,7 +134,7 @@ def diagnose_contact(
             fit = fit_contact(trials, [one.effect for one in search.found], grasps.start, say)
             estimates, end = fit.estimates, mean_squares(validation, fit.contact)
     errors = {"nominal": search.first, "with_effects": end}
-    stages = {key: summarise(list(np.sqrt(squares)), grasps.joints) for key, squares in errors.items()}
+    stages = {key: summarise_errors(list(np.sqrt(squares)), grasps.joints) for key, squares in errors.items()}
     names = [one.trial.name for one in validation]
     verdict = verdict_of(search, stages["with_effects"].overall)
     return ContactDiagnosis(

@@ -16,7 +16,7 @@ from tactile_cube.identification.contact.fit import ContactFit, fit_contact, sho
 from tactile_cube.identification.contact.grasps import open_grasps
 from tactile_cube.identification.contact.trial import ContactTrial
 from tactile_cube.measurement.bench import with_object
-from tactile_cube.measurement.comparing.error import ErrorSummary, summarise
+from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_errors
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import Contact
@@ -146,4 +146,4 @@ def contact_error(trials: Sequence[ContactTrial], contact: Contact, joints: Sequ
     residuals = []
     for one in trials:
         residuals.append(np.where(one.trial.valid[:, None], one.residual(contact), np.nan))
-    return summarise(residuals, tuple(joints))
+    return summarise_errors(residuals, tuple(joints))

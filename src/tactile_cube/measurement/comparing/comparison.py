@@ -16,7 +16,7 @@ from tactile_cube.measurement.comparing.error import (
     normalised_fit,
     raw_residuals,
     residuals,
-    summarise,
+    summarise_errors,
 )
 from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.joint_offsets import with_fitted_offsets
@@ -125,12 +125,14 @@ def compare(
     band = simulate_band(recording, model, simulations, spread or {}, used, seed) if simulations else None
     if floor is None or step is None:
         fine = free_run(recording, fitted, "fast", used / FINER)
-        left = summarise([a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints)
+        left = summarise_errors(
+            [a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints
+        )
         if step is None and engine == "fast" and _shown(recording, left):
             used, left = used / FINER, left.times(1.0 / (FINER - 1))  # errors of the step are of first order
             simulated, _ = simulated_at(used)
         floor = floor or noise_floor(recording, left)
-    return describe(recording, model, simulated, floor, band, used)
+    return describe_comparison(recording, model, simulated, floor, band, used)
 
 
 def _shown(recording: Recording, left: ErrorSummary) -> bool:
@@ -139,7 +141,7 @@ def _shown(recording: Recording, left: ErrorSummary) -> bool:
     return any(error > HIDDEN * noise[joint] for joint, error in left.joints.items())
 
 
-def describe(
+def describe_comparison(
     recording: Recording,
     model: ModelFile | None,
     simulated: list[Simulated],
@@ -151,7 +153,7 @@ def describe(
     trials, joints = recording.trials, recording.joints
     errors = residuals(trials, [one.position for one in simulated])
     raw = raw_residuals(trials, [one.position for one in simulated])
-    summary = summarise(errors, joints)
+    summary = summarise_errors(errors, joints)
     table = regimes(trials, errors, joints)
     return Comparison(
         recording=recording,
@@ -159,8 +161,8 @@ def describe(
         simulated=simulated,
         residuals=errors,
         errors=summary,
-        trials=[summarise([error], joints) for error in errors],
-        raw=[summarise(raw, joints), *(summarise([one], joints) for one in raw)],
+        trials=[summarise_errors([error], joints) for error in errors],
+        raw=[summarise_errors(raw, joints), *(summarise_errors([one], joints) for one in raw)],
         fit=normalised_fit(trials, raw, joints),
         floor=floor,
         regimes=table,
@@ -182,7 +184,7 @@ def _failing_intervals(recording: Recording, errors: list[Array], floor: NoiseFl
     ]
 
 
-def as_json(comparison: Comparison) -> dict[str, Any]:
+def comparison_json(comparison: Comparison) -> dict[str, Any]:
     """The content of comparison.json: plain numbers, errors in rad, times in s."""
     recording, floor, band = comparison.recording, comparison.floor, comparison.band
     return {

@@ -79,10 +79,10 @@ def normalised_fit(trials: Sequence[Trial], errors: Sequence[Array], joints: Seq
 
 def free_run_error(recording: Recording, simulated: Sequence[Simulated]) -> ErrorSummary:
     """RMS error [rad] of a recording's trials simulated freely."""
-    return summarise(residuals(recording.trials, [one.position for one in simulated]), recording.joints)
+    return summarise_errors(residuals(recording.trials, [one.position for one in simulated]), recording.joints)
 
 
-def summarise(errors: Sequence[Array], joints: Sequence[str]) -> ErrorSummary:
+def summarise_errors(errors: Sequence[Array], joints: Sequence[str]) -> ErrorSummary:
     """RMS of residuals (n, joints), nan left out, overall and per joint."""
     squares = np.concatenate([error**2 for error in errors])
     by_joint = np.sqrt(np.nanmean(squares, axis=0))

@@ -103,7 +103,7 @@ def require_free(out: Path) -> None:
         raise InputError(f"out={out}: is there already and not empty; choose another folder or remove it")
 
 
-def write_whole(out: Path, parts: Mapping[str, RecordingTables]) -> None:
+def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
     """Write recordings (sub-folder -> recording), read them back, say what they hold, and only then name them `out`.
 
     Raises:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.sources.column_names import (
     Signal,
-    joint_of,
+    joint_in,
     may_be_desired,
     number_of,
     signal_of,
@@ -94,7 +94,7 @@ def _signals(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> 
 
 def _owners(names: Sequence[str], joints: Sequence[str]) -> dict[str, str]:
     """Column -> joint: by the joint's name, by a number, or because there is only one joint."""
-    named = {name: joint_of(name, joints) for name in names}
+    named = {name: joint_in(name, joints) for name in names}
     if any(named.values()):
         return {name: joint or "" for name, joint in named.items()}
     numbers = {name: number_of(name) for name in names}

@@ -65,7 +65,7 @@ def without_unit(name: str) -> list[str]:
     return [word for word in words(name) if word not in known]
 
 
-def joint_of(name: str, joints: Iterable[str]) -> str | None:
+def joint_in(name: str, joints: Iterable[str]) -> str | None:
     """The joint whose name is in a column's name, the longest if there are several."""
     said = words(name)
     found = [joint for joint in joints if _contains(said, words(joint))]

@@ -18,7 +18,7 @@ from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.tables import Table, read_table
 from tactile_cube.measurement.recordings.writing import RecordingTables
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
-from tactile_cube.measurement.sources.foreign_log import SaidUnits, cut, understand
+from tactile_cube.measurement.sources.foreign_log import SaidUnits, cut_trial, understand
 from tactile_cube.measurement.sources.source import described, known, median_rate
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ class CsvFiles:
             gravity=list(self.gravity), rate_hz=rate, joints=list(columns.joints), controller=controller,
             nominal=known(self.nominal), sensors={"read": self.read, "position_resolution": self.resolution},
         )  # fmt: skip
-        pieces = [piece for trial in named for piece in cut(trial, self.length)]
+        pieces = [piece for trial in named for piece in cut_trial(trial, self.length)]
         by = "source.kind" if self.kind is not None else "file names and commands"
         understood = [*reading.rows(rate), ("kinds", _repeats(kinds), by)]
         return {"": RecordingTables(description, rig.text, pieces, [row for row in understood if row[1]])}

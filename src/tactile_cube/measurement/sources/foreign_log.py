@@ -30,7 +30,7 @@ class SaidUnits:
 
 
 @dataclass(frozen=True)
-class Reading:
+class TableReading:
     """How tables are read.
 
     Attributes:
@@ -80,7 +80,7 @@ def understand(
     joints: Mapping[str, RigJoint],
     said: SaidUnits,
     torque_mode: bool,
-) -> Reading:
+) -> TableReading:
     """The units of all columns, told by the values of all tables together.
 
     Raises:
@@ -108,7 +108,7 @@ def understand(
     time = (
         None if columns.time is None else time_unit(said.time, columns.time, _column(first[1], columns.time, first[0]))
     )
-    return Reading(columns, time, units)
+    return TableReading(columns, time, units)
 
 
 def _make_alike(units: dict[str, Unit], command: Array, position: Array) -> None:
@@ -124,7 +124,7 @@ def _column(table: Table, name: str, path: Path) -> Array:
     return table[name]
 
 
-def cut(trial: TrialTable, length: float | None) -> Sequence[TrialTable]:
+def cut_trial(trial: TrialTable, length: float | None) -> Sequence[TrialTable]:
     """Pieces of `length` [s] of a trial; a rest of less than half of that is dropped."""
     duration = float(trial.time[-1] - trial.time[0])
     if length is None or duration < 1.5 * length:

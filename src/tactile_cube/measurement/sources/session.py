@@ -24,7 +24,7 @@ OBSTACLE = 500.0  # [N m/rad] stiffness of what a link touches
 SETTLING = 1.0  # [s] at the first command before a trial is logged
 
 
-class Sensors(Protocol):
+class LogSensors(Protocol):
     """What a log's sensors get wrong."""
 
     @property
@@ -49,7 +49,7 @@ class Sensors(Protocol):
 
 
 def logged(
-    entry: TrialEntry, command: Array, result: Simulated, sensors: Sensors, rng: np.random.Generator
+    entry: TrialEntry, command: Array, result: Simulated, sensors: LogSensors, rng: np.random.Generator
 ) -> TrialTable:
     """A simulated trial, (n, joints) each, as the sensors log it."""
     position = result.position + rng.normal(0, sensors.noise, command.shape)
@@ -71,7 +71,7 @@ class FreeSession:
         rng: noise.
     """
 
-    sensors: Sensors
+    sensors: LogSensors
     simulator: Simulator
     constants: dict[str, Array]
     effects: tuple[Term, ...]

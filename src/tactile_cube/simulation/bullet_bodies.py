@@ -1,0 +1,299 @@
+"""The bodies in PyBullet: four fingers, a cube and a table, placed so that nothing of the past remains.
+
+One multibody per finger: the solver couples the rows of everything that hangs on one multibody, and four small ones are
+several times faster than one hand.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tactile_cube.errors import InputError
+from tactile_cube.hand import Hand
+from tactile_cube.hand.object_mesh import ObjectMesh
+from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half, unit_inertia
+from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, read_contact
+from tactile_cube.simulation.options import SimulationOptions
+
+Array = NDArray[np.float64]
+
+_TABLE_SIZE = np.array([0.5, 0.5, 0.04])
+TILTED = 0.05
+"""Products of inertia that Bullet may neglect, as a share of the smallest moment: moments are then right to 1 %."""
+_ALL_GROUPS = 0xFFFF
+_FIRST_FINGER_GROUP = 0x10
+"""Collision group of the first finger, one bit for each; Bullet gives bits below to bodies of its own accord."""
+_URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+_NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
+
+
+def connect(options: SimulationOptions) -> int:
+    """A physics server of its own in this process; gives the id of its client.
+
+    Its broadphase compares every two boxes at every step. Bullet's usual one, a tree, pays only with more bodies: for a
+    hand it takes 8 % longer, with the same contacts.
+    """
+    client = int(pybullet.connect(pybullet.DIRECT))
+    pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=client)
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=options.dt,
+        numSolverIterations=options.solver_iterations,
+        numSubSteps=0,
+        deterministicOverlappingPairs=1,
+        enableFileCaching=0,
+        physicsClientId=client,
+    )
+    return client
+
+
+def load_chain(client: int, urdf: str, position: Array, rotation: Array) -> int:
+    """Loads a robot with a fixed base and free joints: no motors, no damping. Gives its body id."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "chain.urdf"
+        file.write_text(urdf, encoding="utf-8")
+        quaternion = Rotation.from_matrix(rotation).as_quat().tolist()
+        body = pybullet.loadURDF(
+            str(file), list(position), quaternion, useFixedBase=True, flags=_URDF_FLAGS, physicsClientId=client
+        )
+    for joint in range(-1, pybullet.getNumJoints(body, physicsClientId=client)):
+        pybullet.changeDynamics(body, joint, **_NO_DAMPING, physicsClientId=client)
+        if joint >= 0:
+            pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
+    return int(body)
+
+
+def com_arm(constants: EpisodeConstants, quaternion: Array) -> Array:
+    """From the cube's centre to its centre of mass, in the world (3,) [m]."""
+    com = np.asarray(constants.cube_com)
+    return Rotation.from_quat(quaternion).as_matrix() @ com if com.any() else np.zeros(3)
+
+
+class BulletBodies:
+    """The hand, the cube and the table of one world.
+
+    Attributes:
+        client: PyBullet's client id.
+        fingers: Body ids of the fingers.
+        cube: Body id of the cube.
+        table: Body id of the table, -1 without one.
+    """
+
+    def __init__(self, hand: Hand, options: SimulationOptions, finger_urdfs: Sequence[str]) -> None:
+        """Builds the fingers from their descriptions; cube and table come with each episode."""
+        self.hand = hand
+        self.client = connect(options)
+        half = (0.5 * _TABLE_SIZE).tolist()
+        self._table_shape = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
+        )
+        self._cube_shape = -1
+        self._cube_size = self._cube_com = np.zeros(3)
+        self._cube_kind: ObjectShape = "box"
+        self._links = range(hand.links_per_finger)
+        self._axes = hand.spin_axes()
+        self._bare = [[link for link in self._links if not hand.shapes(k)[link]] for k in range(len(hand.fingers))]
+        self.table, self.cube = self._new_table(0.0), self._new_table(0.0)  # hold the places before the fingers'
+        bases = [hand.base_in_world(k) for k in range(len(hand.fingers))]
+        self.fingers = [load_chain(self.client, urdf, *base) for urdf, base in zip(finger_urdfs, bases, strict=True)]
+        self._inertias = [[self._inertia(body, link) for link in self._links] for body in self.fingers]
+        self._spare_links_without_a_shape()
+
+    def place(self, constants: EpisodeConstants, start: Start, angles: Array, velocities: Array) -> None:
+        """Puts everything at the start of an episode.
+
+        Args:
+            constants: Sizes, masses and friction.
+            start: Pose and velocity of the cube.
+            angles: All joints of all fingers (fingers, 4) [rad].
+            velocities: Likewise [rad/s].
+        """
+        self._remove_objects()
+        self._set_table(constants)
+        self._set_cube(constants, start)
+        for body, q, v in zip(self.fingers, angles, velocities, strict=True):
+            for joint in self._links:
+                pybullet.resetJointState(body, joint, q[joint], v[joint], physicsClientId=self.client)
+        self._set_friction(constants)
+        self._forget_contacts()
+
+    def set_gravity(self, acceleration: Array) -> None:
+        """Sets the world's gravity (3,) [m/s^2]."""
+        pybullet.setGravity(*acceleration, physicsClientId=self.client)
+
+    def set_spin_inertia(self, spin_inertia: Array) -> None:
+        """Adds inertia about the joint axis to each link, for numerical stability (fingers, links) [kg m^2]."""
+        for body, inertias, spins in zip(self.fingers, self._inertias, spin_inertia, strict=True):
+            for link, (diagonal, spin) in enumerate(zip(inertias, spins, strict=True)):
+                spinning = list(diagonal)
+                spinning[self._axes[link]] += spin
+                pybullet.changeDynamics(body, link, localInertiaDiagonal=spinning, physicsClientId=self.client)
+
+    def contacts(self) -> list[Contact]:
+        """Contacts with the cube and between fingers in the last physics step."""
+        names = {body: finger.name for body, finger in zip(self.fingers, self.hand.fingers, strict=True)}
+        names |= {self.cube: "cube", self.table: "table"}
+        links = {body: self.hand.link_names(k) for k, body in enumerate(self.fingers)}
+        return [read_contact(row, names, links) for row in pybullet.getContactPoints(physicsClientId=self.client)]
+
+    def close(self) -> None:
+        """Ends the physics server."""
+        if pybullet.isConnected(self.client):
+            pybullet.disconnect(self.client)
+
+    def _inertia(self, body: int, link: int) -> tuple[float, float, float]:
+        diagonal = pybullet.getDynamicsInfo(body, link, physicsClientId=self.client)[2]
+        return (float(diagonal[0]), float(diagonal[1]), float(diagonal[2]))
+
+    def _remove_objects(self) -> None:
+        """Takes cube and table away, the table last: a new body gets the place in the broadphase that was left last.
+
+        The solver goes through contacts in the order of these places, which must be the same in every episode.
+        """
+        for body in (self.cube, self.table):
+            if body >= 0:
+                pybullet.removeBody(body, physicsClientId=self.client)
+
+    def _new_table(self, height: float) -> int:
+        centre = [0.0, 0.0, height - 0.5 * float(_TABLE_SIZE[2])]
+        return int(
+            pybullet.createMultiBody(
+                0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, physicsClientId=self.client
+            )
+        )
+
+    def _set_table(self, constants: EpisodeConstants) -> None:
+        """A table where the episode has one; else none, for even a distant body takes 6 % of the time."""
+        self.table = -1
+        if constants.table_height is None:
+            return
+        self.table = self._new_table(constants.table_height)
+        pybullet.changeDynamics(self.table, -1, lateralFriction=constants.table_friction, physicsClientId=self.client)
+
+    def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
+        """A new body each time: Bullet keeps the inertia in the world of a used one for a step after it is moved.
+
+        It is a plain rigid body; as a multibody without links it would make the solver 8 % slower. Its origin is its
+        centre of mass. The skin of the fingertips is written on the cube, since Bullet cannot take it away again.
+        """
+        arm = com_arm(constants, np.asarray(start.cube_quaternion))
+        self.cube = int(
+            pybullet.createMultiBody(
+                constants.cube_mass,
+                self._shape_of(constants),
+                basePosition=list(np.asarray(start.cube_position) + arm),
+                baseOrientation=list(np.asarray(start.cube_quaternion)),
+                useMaximalCoordinates=True,
+                physicsClientId=self.client,
+            )
+        )
+        pybullet.changeDynamics(
+            self.cube,
+            -1,
+            lateralFriction=constants.cube_friction,
+            spinningFriction=0.0,
+            rollingFriction=0.0,
+            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            **_NO_DAMPING,
+            physicsClientId=self.client,
+        )
+        if constants.object_shape not in ("box", "cylinder"):  # Bullet takes that of a box for the others
+            # without its mass it would lose the inertia; without a margin a mesh ends where its corners are
+            inertia = constants.cube_mass * unit_inertia(constants.object_shape, np.asarray(constants.cube_size))
+            heavy = {"mass": constants.cube_mass, "localInertiaDiagonal": np.diag(inertia).tolist()}
+            heavy |= {"collisionMargin": 0.0} if isinstance(constants.object_shape, ObjectMesh) else {}
+            pybullet.changeDynamics(self.cube, -1, **heavy, physicsClientId=self.client)
+        if constants.tip_compliance > 0.0:
+            skin = {
+                "contactStiffness": 1.0 / constants.tip_compliance,
+                "contactDamping": SKIN_RELAXATION / constants.tip_compliance,
+            }
+            pybullet.changeDynamics(self.cube, -1, **skin, physicsClientId=self.client)
+        turning = np.asarray(start.cube_angular_velocity)
+        linear = np.asarray(start.cube_linear_velocity) + np.cross(turning, arm)
+        pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), physicsClientId=self.client)
+
+    def _shape_of(self, constants: EpisodeConstants) -> int:
+        """The shape of the last object if it had this kind, size and centre of mass, else a new one.
+
+        Only one off its centre of mass pays for a compound shape around it.
+        """
+        kind, size, com = constants.object_shape, np.asarray(constants.cube_size), np.asarray(constants.cube_com)
+        same = kind == self._cube_kind and np.array_equal(size, self._cube_size)
+        if not (same and np.array_equal(com, self._cube_com)):
+            if isinstance(kind, ObjectMesh):
+                _refuse_tilted_inertia(kind, size)
+                geometry = {"shapeType": pybullet.GEOM_MESH, "vertices": (kind.vertices * size - com).tolist()}
+            else:
+                place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
+                geometry = _geometry(kind, size) | place
+            shape = pybullet.createCollisionShape(**geometry, physicsClientId=self.client)
+            self._cube_shape, self._cube_kind = int(shape), kind
+            self._cube_size, self._cube_com = size.copy(), com.copy()
+        return self._cube_shape
+
+    def _set_friction(self, constants: EpisodeConstants) -> None:
+        """Friction of the links; Bullet multiplies the factors of the two bodies that touch."""
+        for body in self.fingers:
+            for link in self._links:
+                tip = link == self._links[-1]
+                pybullet.changeDynamics(
+                    body,
+                    link,
+                    lateralFriction=constants.tip_friction if tip else constants.link_friction,
+                    spinningFriction=constants.tip_spinning_friction if tip else 0.0,
+                    physicsClientId=self.client,
+                )
+
+    def _spare_links_without_a_shape(self) -> None:
+        """Bullet boxes them too, and would compare them with their neighbours at every step."""
+        for body, bare in zip(self.fingers, self._bare, strict=True):
+            for link in (-1, *bare):
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
+
+    def _forget_contacts(self) -> None:
+        """Registers every finger anew with the broadphase; cube and table are new themselves.
+
+        That drops cached contacts and their impulses, so an episode depends on nothing that happened before it.
+        A finger meets everything but itself.
+        """
+        for k, body in enumerate(self.fingers):
+            group = _FIRST_FINGER_GROUP << k
+            for link in self._links:
+                if link not in self._bare[k]:
+                    pybullet.setCollisionFilterGroupMask(
+                        body, link, group, _ALL_GROUPS & ~group, physicsClientId=self.client
+                    )
+
+
+def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
+    """Bullet knows an object's moments of inertia about its own axes alone."""
+    inertia = mesh.inertia(size)
+    tilted = float(np.abs(inertia - np.diag(np.diag(inertia))).max() / np.diag(inertia).min())
+    if tilted > TILTED:
+        raise InputError(
+            f"object.file={mesh.file}: its products of inertia are {tilted:.2f} of its smallest moment, engine=bullet "
+            f"takes up to {TILTED}; turn the mesh along its principal axes, or choose engine=mujoco"
+        )
+
+
+def _geometry(kind: NamedShape, size: Array) -> dict[str, Any]:
+    """Bullet's words for an object of a kind with a bounding box (3,) [m]."""
+    half = 0.5 * size
+    if kind == "box":
+        return {"shapeType": pybullet.GEOM_BOX, "halfExtents": half.tolist()}
+    radius = float(half[0])
+    if kind == "cylinder":
+        return {"shapeType": pybullet.GEOM_CYLINDER, "radius": radius, "height": float(size[2])}
+    length = 2.0 * straight_half(half)
+    if length == 0.0:
+        return {"shapeType": pybullet.GEOM_SPHERE, "radius": radius}
+    return {"shapeType": pybullet.GEOM_CAPSULE, "radius": radius, "height": length}

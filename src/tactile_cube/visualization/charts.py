@@ -1,0 +1,129 @@
+"""Charts of the reports: Matplotlib draws them as SVG text, which stands in a page that needs nothing else."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import StringIO
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Colours of Okabe and Ito, which the colour-blind tell apart, and lines of different lightness.
+MEASURED, SIMULATED, BEFORE, ERROR = "#000000", "#0072b2", "#d55e00", "#d55e00"
+FLOOR, FAILING, GRID = "#57606a", "#fdede6", "#eaeef2"
+PALETTE = (SIMULATED, BEFORE, "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", FLOOR)
+WIDTH, ROW = 900, 26  # [px]
+STYLE: Any = {
+    "font.sans-serif": ["DejaVu Sans"], "font.size": 12, "svg.fonttype": "none", "svg.hashsalt": "tactile_cube",
+    "path.simplify_threshold": 1.0, "axes.xmargin": 0, "axes.ymargin": 0.06, "axes.grid": True, "axes.axisbelow": True,
+    "axes.edgecolor": "#d0d7de", "grid.color": GRID, "axes.labelcolor": FLOOR, "text.color": "#1b1f24",
+    "xtick.color": FLOOR, "ytick.color": FLOOR, "xtick.major.size": 0, "ytick.major.size": 0, "legend.frameon": False,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its interval; `neutral` is where it would change nothing."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    neutral: float | None = None
+
+
+@matplotlib.rc_context(STYLE)
+def empty_chart(height: float, left: float = 62, right: float = 14, top: float = 26, bottom: float = 40) -> Axes:
+    """Axes to draw in, with margins [px] of a picture that is `WIDTH` wide."""
+    figure = Figure(figsize=(WIDTH / 72, height / 72))  # a point of 1/72 inch is a pixel of the page
+    return figure.add_axes((left / WIDTH, bottom / height, 1 - (left + right) / WIDTH, 1 - (top + bottom) / height))
+
+
+@matplotlib.rc_context(STYLE)
+def time_chart(label: str, height: float = 240, x_label: str = "time [s]") -> Axes:
+    """Axes for curves over one x axis, time by default."""
+    axes = empty_chart(height)
+    axes.set(xlabel=x_label, ylabel=label)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+    axes.locator_params("y", nbins=5)
+    return axes
+
+
+@matplotlib.rc_context(STYLE)
+def svg(axes: Axes) -> str:
+    """The SVG element of a chart, with a legend above it where something has a label."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0, borderpad=0.3, ncols=9)
+    text = StringIO()
+    about = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    axes.figure.savefig(text, format="svg", metadata=about)  # type: ignore[union-attr]
+    # Groups are numbered in each figure anew: their ids would stand in a page several times.
+    plain = re.sub(r' id="[\w.]+_\d+"', "", text.getvalue()[text.getvalue().index("<svg") :])
+    return re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d)\d+|\s+(?=[LM\"])", r"\1", path[0]), plain)
+
+
+@matplotlib.rc_context(STYLE)
+def bar_chart(bars: Sequence[tuple[str, float]], unit: str, floor: float | None = None) -> str:
+    """Horizontal bars with their numbers; a dashed line marks the noise floor."""
+    axes = empty_chart(ROW * len(bars) + 34, left=230, right=110, top=4, bottom=30)
+    names, values = [name for name, _ in bars], [value for _, value in bars]
+    drawn = axes.barh(range(len(bars)), values, 0.7, color=SIMULATED)
+    axes.bar_label(drawn, [f"{value:.3g} {unit}" for value in values], padding=6)
+    axes.set(yticks=range(len(bars)), yticklabels=names, xticks=[], ylim=(len(bars) - 0.5, -0.5))
+    axes.set_xlim(0, max([*values, floor or 0.0]) or 1.0)
+    axes.spines[:].set_visible(False)
+    axes.grid(False)
+    if floor is not None:
+        axes.axvline(floor, color=FLOOR, linestyle="--", clip_on=False)
+        axes.set_xticks([floor], [f"noise floor {floor:.2g} {unit}"])
+    return svg(axes)
+
+
+@matplotlib.rc_context(STYLE)
+def heat_map(rows: Sequence[str], columns: Sequence[str], values: Sequence[Sequence[float | None]]) -> str:
+    """Ratios on a background that reddens with their logarithm, from 1 to the largest or 6; None stays empty."""
+    width = min(74, (WIDTH - 180) / max(1, len(columns)))
+    height = 150 + ROW * len(rows) + 8
+    axes = empty_chart(height, left=90, right=WIDTH - 90 - width * len(columns), top=150, bottom=8)
+    ratios = np.array(values, dtype=float)
+    heat = np.log(np.maximum(ratios, 1.0)) / np.log(np.nanmax([6.0, *ratios.flat]))
+    axes.pcolormesh(heat, cmap="Reds", vmin=0, vmax=1.25, edgecolors="white", linewidth=2)
+    for (row, column), ratio in np.ndenumerate(ratios):
+        color = "white" if heat[row, column] > 0.6 else "black"
+        if not np.isnan(ratio):
+            shown = f"{ratio:.1f}" if ratio < 99.5 else f"{ratio:.0f}"
+            axes.text(column + 0.5, row + 0.5, shown, ha="center", va="center_baseline", color=color)
+    axes.set_xticks(np.arange(len(columns)) + 0.5, columns, rotation=42, ha="left", rotation_mode="anchor")
+    axes.set_yticks(np.arange(len(rows)) + 0.5, rows)
+    axes.tick_params(top=True, labeltop=True, bottom=False, labelbottom=False, labelcolor="#1b1f24")
+    axes.invert_yaxis()
+    axes.spines[:].set_visible(False)
+    axes.grid(False)
+    return svg(axes)
+
+
+@matplotlib.rc_context(STYLE)
+def interval_chart(intervals: Sequence[Interval]) -> str:
+    """One row a value, each on an axis of its own: the interval as a bar, the value as a dot, the neutral as a tick."""
+    axes = empty_chart(ROW * len(intervals) + 12, left=330, right=250, top=6, bottom=6)
+    for row, one in enumerate(intervals):
+        known = [one.low, one.high, one.value, *([] if one.neutral is None else [one.neutral])]
+        width = (max(known) - min(known)) or 1.0
+        low, high, value, *neutral = [(place - min(known)) / width for place in known]
+        axes.hlines(row, low, high, color="#80b9d9", linewidth=7)
+        axes.plot(value, row, "o", color=SIMULATED)
+        axes.plot(neutral, [row] * len(neutral), "|", color=FLOOR, markersize=16, markeredgewidth=2)
+        label = f"{one.value:.4g} {one.unit} [{one.low:.4g}, {one.high:.4g}]"
+        axes.annotate(label, (1, row), (14, 0), axes.get_yaxis_transform(), textcoords="offset points", va="center")
+    axes.set(yticks=range(len(intervals)), yticklabels=[one.name for one in intervals], xticks=[], xlim=(-0.08, 1.08))
+    axes.set_ylim(len(intervals) - 0.5, -0.5)
+    axes.tick_params(labelcolor="#1b1f24")
+    axes.spines[:].set_visible(False)
+    return svg(axes)
