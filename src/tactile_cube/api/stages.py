@@ -75,9 +75,11 @@ def run_stages(job: Job) -> TrainingResult:
 def stages_of(job: Job) -> list[Stage]:
     """The stages that a job's configuration lists; what the user asked for holds in each of them."""
     own = [word for word in job.words if not NOT_A_STAGES.match(_key(word))]
+    chosen = {_key(word) for word in own}
     jobs: list[Job] = []
     for name, words in job.config.stages.items():
-        asked = {_key(word): word for word in (*words, *own, f"name={name}")}
+        fitting = [word for word in words if _key(word).partition(".")[0] not in chosen]  # not of another choice
+        asked = {_key(word): word for word in (*fitting, *own, f"name={name}")}
         jobs.append(called_job("train", tuple(asked.values()), job.folder / name, model=job.config.model))
         config: Any = jobs[-1].config
         if len(jobs) > 1:
