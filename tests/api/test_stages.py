@@ -70,7 +70,7 @@ def test_each_stage_goes_on_from_the_one_before_and_the_screen_says_what_is_mast
 
 
 def test_what_the_user_asks_for_holds_in_every_stage(tmp_path: Path) -> None:
-    words = ("+experiment=curriculum", "seed=3", "name=mine", "reward=air", "~stages.holding")
+    words = ("+experiment=curriculum", "seed=3", "name=mine", "reward=air", "start=paper", "~stages.holding")
     found = stages.stages_of(called_job("train", words, tmp_path, model="mine.yaml"))
     assert [stage.name for stage in found] == ["gaiting", "worlds"]
     assert {(stage.job.config.seed, stage.job.config.reward.spin) for stage in found} == {(3, 16)}
