@@ -29,7 +29,7 @@ torch:
 			--index-url $(TORCH_INDEX) "$$(grep ^torch== requirements.txt)"; \
 	} 2> /dev/null || echo "no torch from $(TORCH_INDEX): taking that of pip's own index, maybe with CUDA (several GB)"
 
-train: .venv/installed ## teach the hand; after Ctrl-C the same command goes on from the last checkpoint
+train: .venv/installed ## teach the hand, from nothing to a judged policy; after Ctrl-C the same command goes on from the last checkpoint
 	$(BIN)/python -m tactile_cube.train $(ARGS)
 
 test: .venv/installed ## run the tests

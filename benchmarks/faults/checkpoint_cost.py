@@ -16,7 +16,7 @@ from tactile_cube.training.replay import Replay
 
 def main(folder: Path) -> None:
     """Fill the ring, save at five barriers, load; print bytes and seconds."""
-    config = composed("train", ["+experiment=curriculum"])
+    config = composed("train", ["+experiment=taught"])
     environment = as_environment(instantiate(config.env))
     agent = instantiate(config.agent, _partial_=True)(environment.sizes)
     replay = Replay(config.training.replay_size, environment.sizes, environment.reward_terms, 0)

@@ -77,7 +77,7 @@ def _with_ancestors(folder: Path, given: set[str]) -> list[Ancestor]:
 def _named(path: Path, beside: Path, given: set[str]) -> list[Ancestor]:
     """The ancestry of a run in the folder `beside`, or of a policy of the package; else its name alone."""
     folder = path if path.is_dir() else path.parent
-    if folder.name in given:
+    if {folder.name, folder.parent.name} & given:  # a stage of a training has its costs in those of the whole
         return []
     if folder.resolve().parent == beside.resolve() and (folder / LEDGER).is_file():
         return _with_ancestors(folder, given)

@@ -15,7 +15,7 @@ from tactile_cube.evaluation.policy_path import SHIPPED
 
 Results = dict[str, Any]
 EVALUATE = "python -m tactile_cube.evaluate"
-TRAIN = "python -m tactile_cube.train +experiment=curriculum`, then `+experiment=finetune"
+TRAIN = "python -m tactile_cube.train +experiment=taught`, then `+experiment=finetune"
 HEAD = "| experiment | paper | here | policy, seed | CPU hours | command | commit |"
 SCRIPTED, REPLAY = "scripted", "replay"
 FINGER = "outputs/finger"

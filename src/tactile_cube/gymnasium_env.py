@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 
 from tactile_cube.api.job import as_input_errors
-from tactile_cube.env import OUTCOMES, REWARD_TERMS, RotationEnv
+from tactile_cube.env import BORNE_TERMS, OUTCOMES, REWARD_TERMS, RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.rollout import Recorder
 from tactile_cube.evaluation.verdict import EpisodeVerdict, judge
@@ -147,7 +147,7 @@ def _info(data: TensorDictBase) -> dict[str, Any]:
         "theta": float(data["theta"]),
         "outcome": OUTCOMES[int(data["outcome"])],
         "faulty": bool(data["faulty"]),
-        "reward_terms": dict(zip(REWARD_TERMS, data["reward_terms"][0].tolist(), strict=True)),
+        "reward_terms": dict(zip(REWARD_TERMS + BORNE_TERMS, data["reward_terms"][0].tolist(), strict=False)),
         "privileged": data["privileged"][0].numpy().copy(),
     }
 

@@ -2,7 +2,8 @@
 
 What a run writes into its folder: metrics.csv, tensorboard/, policy.safetensors (latest) and policy_best.safetensors,
 checkpoint.pt, checkpoint_before.pt and replay/ (to go on from), train.log (what the console showed), ledger.json
-(CPU-hours), finished.json (how it ended) and .hydra/ (configuration).
+(CPU-hours), finished.json (how it ended) and .hydra/ (configuration). A training in stages has such a folder for each
+of them in its own, and bullet/ and mujoco/ with the judgement.
 """
 
 from pathlib import Path

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.env import REWARD_TERMS, CubePose, Reward
+from tactile_cube.env import BORNE_TERMS, REWARD_TERMS, CubePose, Reward
 from tactile_cube.env import reward as terms
 from tactile_cube.errors import InputError
 
@@ -45,6 +45,18 @@ def test_advance_counts_fingers_that_go_back_and_not_those_that_turn_with_the_ob
     assert terms.advance(0.0, -1, np.array([3.1]), np.array([3.1]) + 0.3 - 2 * np.pi) == pytest.approx(0.3)
     assert terms.advance(0.0, -1, np.array([-3.1]), np.array([-3.1]) - 0.3 + 2 * np.pi) == pytest.approx(-0.3)
     assert terms.advance(0.0, -1, np.zeros(0), np.zeros(0)) == 0.0
+
+
+def test_climb_is_the_squared_height_above_the_start_and_a_lower_object_costs_nothing() -> None:
+    assert terms.climb(STILL._replace(z=0.01), STILL._replace(z=0.03, x=0.5)) == pytest.approx(4e-4)
+    assert terms.climb(STILL, STILL._replace(z=-0.03)) == 0.0
+
+
+def test_terms_of_how_the_object_is_held_are_there_only_with_a_weight() -> None:
+    assert Reward().terms == REWARD_TERMS
+    held = Reward(climb=400, link_spin=8, tips=0.25, links=0.5, link_force=2)
+    assert held.terms == REWARD_TERMS + BORNE_TERMS
+    assert held.weights().tolist() == [*Reward().weights().tolist(), -400, -8, 0.25, -0.5, -2]
 
 
 def test_published_weights_and_their_signs() -> None:

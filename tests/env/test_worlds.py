@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from torchrl.envs.utils import check_env_specs, step_mdp
@@ -64,3 +65,16 @@ def test_progress_acts_at_the_next_reset(rotation_task: MakeTask) -> None:
     assert env.tasks[0].constants.filter_time == pytest.approx(0.12)
     env.reset()
     assert env.tasks[0].constants.filter_time == pytest.approx(0.31)
+
+
+def test_steered_constants_are_drawn_by_the_odds_of_the_last_progress_and_told(rotation_task: MakeTask) -> None:
+    steered = Randomization(values={"cube_mass": Uniform(0.0, 0.8)}, steered=0.5)
+    env = WorldsEnv([rotation_task(randomization=steered) for _ in range(3)])
+    check_env_specs(env)
+    fifth = np.eye(8)[[4]]
+    env.set_progress(0, 0.0, fifth)
+    places = env.reset()["places"].flatten().tolist()
+    masses = [task.constants.cube_mass for task in env.tasks]
+    assert all(0.4 <= mass < 0.5 for mass in masses)
+    assert masses == pytest.approx([0.8 * place for place in places])
+    assert "places" not in WorldsEnv([rotation_task(randomization=VARIED)]).reset()

@@ -9,12 +9,13 @@ import pytest
 from torchrl.envs import TransformedEnv
 
 from tactile_cube.env import Task
+from tactile_cube.env.touch import TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.evaluation import Evaluation, NearlyEqualStart
 from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy, ScriptedPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.rollout import run_episode
-from tactile_cube.evaluation.touch import TOUCH_FORCE, support
+from tactile_cube.evaluation.touch import support
 from tactile_cube.evaluation.variant import Pull, Variant
 from tactile_cube.evaluation.verdict import EpisodeVerdict
 from tactile_cube.hand import DLR_HAND2, tip_positions

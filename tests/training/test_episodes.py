@@ -1,8 +1,10 @@
 """Statistics of finished episodes."""
 
+import pytest
 import torch
 from tensordict import TensorDict
 
+from tactile_cube.randomization import Learnability, Uniform
 from tactile_cube.training.episodes import WINDOW, EpisodeStatistics
 
 
@@ -47,6 +49,27 @@ def test_endings_are_named() -> None:
     statistics = EpisodeStatistics(("running", "time_limit", "dropped"))
     statistics.add(block([[1.0, 1.0]], [[True, True]], outcome=[[1, 2]]))
     assert statistics.summary()["ended_dropped"] == 0.5
+
+
+def test_kept_says_nothing_before_the_window_is_full() -> None:
+    statistics = EpisodeStatistics(("running", "time_limit", "dropped"))
+    statistics.add(block([[0.0] * (WINDOW - 1)], [[True] * (WINDOW - 1)]))
+    assert statistics.kept == 0.0
+    statistics.add(block([[0.0, 0.0]], [[True, True]], outcome=[[2, 2]]))
+    assert statistics.kept == 1 - 2 / WINDOW
+
+
+def test_the_last_reward_terms_are_logged_and_lost_worlds_counted() -> None:
+    statistics = EpisodeStatistics((), ("tips",), Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
+    steps = block([[1.0, 1.0]], [[False, True]], terminated=[[False, True]])
+    steps["next", "reward_terms"] = torch.tensor([[[9.0, 0.0], [9.0, 1.0]]])
+    steps["next", "places"] = torch.full((1, 2, 1), 0.99)
+    statistics.add(steps)
+    assert statistics.summary()["tips"] == 0.5
+    assert statistics.worlds.lost[0] == pytest.approx([0.5] * 7 + [0.525])
+    again = EpisodeStatistics((), ("tips",), Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
+    again.load_state_dict(statistics.state_dict())
+    assert again.state_dict() == statistics.state_dict()
 
 
 def test_statistics_come_back_from_a_checkpoint() -> None:

@@ -1,5 +1,6 @@
 """Same seed, same weights: for two runs, for other ways of collecting, and for a run that was interrupted."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import torch
 
 from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.errors import InputError
+from tactile_cube.randomization import Learnability, Uniform
 from tactile_cube.training.build import FROZEN
 from tactile_cube.training.loop import barrier_seed
 from tactile_cube.training.run import Run
@@ -105,7 +107,7 @@ def test_run_gives_up_without_regrasping_and_finishes_early_when_good(tmp_path: 
     assert "no regrasping" in tiny_run(tmp_path / "a", stop_if_no_regrasp_by=80).train()
     good = tiny_run(tmp_path / "b", stop_when_angle_above=0.0001, random_steps=0)
     good.learner.episodes.angles.append(1.0)
-    assert "stop_when_angle_above" in good.train()
+    assert good.train() == "mastered: above 0.0001 rad"
 
 
 def test_warm_start_takes_networks_from_checkpoint_and_policy(tmp_path: Path) -> None:
@@ -189,3 +191,10 @@ def test_barriers_have_seeds_of_their_own() -> None:
     seeds = {barrier_seed(seed, k) for seed in range(20) for k in range(0, 500, 25)}
     assert len(seeds) == 400
     assert max(seeds) < 2**31
+
+
+def test_workers_are_told_the_odds_of_the_worlds_where_they_are_steered(tmp_path: Path) -> None:
+    steered = replace(tiny_environment(), learnability=lambda: Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
+    told = [tiny_run(tmp_path / str(n), environment=one).learner._progress() for n, one in enumerate((None, steered))]
+    assert told[0] == (0, 0.0)
+    assert told[1][2].tolist() == [[0.125] * 8]

@@ -34,6 +34,7 @@ class Job:
         folder: where its files go.
         command: the words on a command line that ask for the same.
         choices: group -> chosen option.
+        words: of the command line, without those that are Hydra's own.
         began: when it began, by `time.perf_counter` [s].
     """
 
@@ -41,6 +42,7 @@ class Job:
     folder: Path
     command: str
     choices: Mapping[str, str | None]
+    words: tuple[str, ...] = ()
     began: float = field(default_factory=time.perf_counter)
 
     @property
@@ -60,7 +62,8 @@ def typed_job(config: DictConfig) -> Job:
     import_named_effects(config)
     hydra = HydraConfig.get()
     words = ["python", "-m", f"tactile_cube.{hydra.job.config_name}", *sys.argv[1:]]
-    return Job(config, Path(hydra.runtime.output_dir), shlex.join(words), dict(hydra.runtime.choices))
+    own = tuple(hydra.overrides.task)
+    return Job(config, Path(hydra.runtime.output_dir), shlex.join(words), dict(hydra.runtime.choices), own)
 
 
 def called_job(command: str, settings: tuple[str, ...], folder: PathLike | None = None, **given: Any) -> Job:
@@ -83,11 +86,11 @@ def called_job(command: str, settings: tuple[str, ...], folder: PathLike | None 
             words.append(f"{key}={value}")
     import_named_effects(config)
     target = Path(config.hydra.run.dir if folder is None else folder)
-    choices = dict(config.hydra.runtime.choices)
+    choices, own = dict(config.hydra.runtime.choices), tuple(config.hydra.overrides.task)
     OmegaConf.set_struct(config, False)
     del config["hydra"]
     OmegaConf.set_struct(config, True)
-    return Job(config, target, shlex.join(["python", "-m", f"tactile_cube.{command}", *words]), choices)
+    return Job(config, target, shlex.join(["python", "-m", f"tactile_cube.{command}", *words]), choices, own)
 
 
 def import_named_effects(config: DictConfig) -> None:

@@ -74,23 +74,33 @@ def train(*settings: str, model: PathLike | None = None, folder: PathLike | None
     return run_training(job)
 
 
-def run_training(job: Job) -> TrainingResult:
-    """Build the run of a job, train through faults of the workers, and say how it went."""
+def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
+    """Build the run of a job, train through faults of the workers, and say how it went.
+
+    Args:
+        job: what to train, perhaps in stages.
+        stage: what lines of progress begin with where the run is a stage of several.
+        later: environment steps of the stages after it, at most.
+    """
     from functools import partial
 
     from tactile_cube.training.finished import Finished
     from tactile_cube.training.recovery import train_on
 
-    before = Finished.of(job.folder, _plain(job))
+    if job.config.stages:
+        from tactile_cube.api.stages import run_stages  # needs this module
+
+        return run_stages(job)
+    before = Finished.of(job.folder, plain_settings(job))
     if before is not None:
         print(f"{job.folder}: finished before ({before.reason}); training.resume=never starts over")
         return TrainingResult(job.folder, before.reason, before.steps, before.final_angle)
-    run, reason = train_on(partial(training_run, job))
+    run, reason = train_on(partial(training_run, job, stage, later))
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 
-def training_run(job: Job) -> Run:
-    """The run that a job describes: new, or where its checkpoint says."""
+def training_run(job: Job, stage: str = "", later: int = 0) -> Run:
+    """The run that a job describes: new, or where its checkpoint says; see `run_training`."""
     from hydra.utils import instantiate
     from omegaconf import OmegaConf
 
@@ -101,12 +111,12 @@ def training_run(job: Job) -> Run:
     from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
     config: Any = job.config
-    plain = _plain(job)
+    plain = plain_settings(job)
     if teacher := config.exploration.get("teacher"):
         file = policy_path(teacher, "exploration.teacher")
         read_policy(file)  # a damaged one is the user's error here, a worker's later
         config = OmegaConf.merge(config, {"exploration": {"teacher": str(file)}})
-    return build_run(
+    run = build_run(
         folder=job.folder,
         seed=RunSettings(name=config.name, seed=config.seed).seed,
         environment=as_environment(instantiate(config.env)),
@@ -119,9 +129,11 @@ def training_run(job: Job) -> Run:
         },
         config=plain,
     )
+    run.line.stage, run.line.later = stage, later
+    return run
 
 
-def _plain(job: Job) -> dict[str, Any]:
+def plain_settings(job: Job) -> dict[str, Any]:
     """The resolved configuration: with a model's contents in the place of its file, and the checksum of a URDF."""
     import hashlib
 
@@ -132,6 +144,8 @@ def _plain(job: Job) -> dict[str, Any]:
 
     plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
     plain.pop("visualization", None)  # a run is the same whether or not somebody looks on
+    if not plain["stages"]:  # so runs from before there were stages stay the same
+        del plain["stages"], plain["judgement"]
     if job.config.model is not None:
         plain["env"]["model"] = read_model(job.config.model).model_dump()
     hand = plain["env"].get("hand") or {}

@@ -18,6 +18,8 @@ from tactile_cube.errors import InputError
 
 REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "off_centre", "leaving", "advance")
 """Names and order of the terms in the key "reward_terms"."""
+BORNE_TERMS = ("climb", "link_spin", "tips", "links", "link_force")
+"""Further terms, of how the object is held: measured, and part of that key, only where one of them has a weight."""
 
 
 def spin(before: CubePose, after: CubePose, direction: int, limit: float) -> float:
@@ -75,6 +77,14 @@ def advance(turned: float, direction: int, before: NDArray[np.float64], after: N
     return float(len(way) * turned - direction * way.sum())
 
 
+def climb(first: CubePose, after: CubePose) -> float:
+    """Squared height above where the episode began [m^2]. Not in the paper.
+
+    A cube that climbs into the hand runs with its upper edge against links that are no fingertips.
+    """
+    return max(after.z - first.z, 0.0) ** 2
+
+
 @dataclass(frozen=True)
 class Reward:
     """Weights of the terms, all given as positive numbers. Source: website, table of the reward.
@@ -89,6 +99,12 @@ class Reward:
         leaving: penalty for losing the cube (size not published). Must exceed what going on costs, or dropping pays.
         advance: of fingertips that go ahead of the object [1/rad]; 0 in the paper.
         fastest: rotation above this rate earns nothing more [rad/s].
+        climb: penalty for an object above where it began [1/m^2]; 0 in the paper, as all that follow.
+        link_spin: penalty for rotation in a step at whose end another link than a fingertip touches the object [1/rad].
+            Below `spin` a hand that rests has nothing to gain by it.
+        tips: of a step at whose end three or more fingertips touch the object.
+        links: penalty for one at whose end another link touches it.
+        link_force: penalty for the share of these links in the normal force.
     """
 
     spin: float = 16.0
@@ -100,21 +116,37 @@ class Reward:
     leaving: float = 10.0
     advance: float = 0.0
     fastest: float = 1.0
+    climb: float = 0.0
+    link_spin: float = 0.0
+    tips: float = 0.0
+    links: float = 0.0
+    link_force: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
-        for key in (*REWARD_TERMS, "fastest"):
+        for key in (*REWARD_TERMS, *BORNE_TERMS, "fastest"):
             if not (math.isfinite(getattr(self, key)) and getattr(self, key) >= 0.0):
                 raise InputError(
                     f"reward.{key} is {getattr(self, key)}; give a finite weight >= 0 (signs are built in)"
                 )
 
+    @property
+    def borne_terms(self) -> tuple[str, ...]:
+        """BORNE_TERMS where one of them has a weight, else none."""
+        return BORNE_TERMS if any(getattr(self, key) for key in BORNE_TERMS) else ()
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the terms that are measured, in their order."""
+        return REWARD_TERMS + self.borne_terms
+
     def weights(self, penalty_scale: float = 1.0) -> NDArray[np.float32]:
-        """Signed weights (8,) in the order of REWARD_TERMS: reward = reward_terms @ weights.
+        """Signed weights in the order of `terms`: reward = reward_terms @ weights.
 
         Args:
             penalty_scale: factor on height, plane and tilt, from the curriculum.
         """
         motion = [-penalty_scale * w for w in (self.height, self.plane, self.tilt)]
         others = [-self.proximal, -self.off_centre, -self.leaving, self.advance]
-        return np.array([self.spin, *motion, *others], dtype=np.float32)
+        borne = [-self.climb, -self.link_spin, self.tips, -self.links, -self.link_force] if self.borne_terms else []
+        return np.array([self.spin, *motion, *others, *borne], dtype=np.float32)

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from tactile_cube.env import reward as terms
 from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
-from tactile_cube.env.reward import REWARD_TERMS, Reward
+from tactile_cube.env.reward import Reward
 from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Conditions, Task
+from tactile_cube.env.touch import borne, normal_forces
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
-from tactile_cube.randomization import GraspTable, Randomization, StartPoses
+from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places
 from tactile_cube.simulation import EpisodeConstants, World
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ class Moment:
         object_state: what only the critic may see `(13 + joints,)`: cube position (3) [m], sin 4theta, cos 4theta, phi,
             psi, linear velocity (3) [m/s], angular velocity (3) [rad/s], q_f (joints) [rad]. Source: paper, section II.
         theta: rotation since the start in the rewarded direction, unwrapped [rad].
-        reward_terms: the terms before weighing, in the order of REWARD_TERMS `(8,)`.
+        reward_terms: the terms before weighing, in the order of `Reward.terms`.
         reward: their weighted sum.
         outcome: index into OUTCOMES; anything but 0 ends the episode.
         step: policy steps since the start.
@@ -70,6 +71,9 @@ class RotationEnv:
         world: what simulates.
         constants: constants of the running episode.
         conditions: conditions of the next episode.
+        steered: names of the constants that are drawn by `odds`.
+        odds: probability of each part of their ranges, in the next episode.
+        places: where in their ranges they lie in the running episode, each in [0, 1).
         target: q_n of the last step `(joints,)` [rad].
 
     Example:
@@ -105,6 +109,9 @@ class RotationEnv:
         self.start_poses = start
         self._frame = frame_along(task.axis_vector())
         self.conditions = task.conditions()
+        unknown = randomization.learnability(self.nominal)
+        self.steered, self.odds = tuple(unknown.ranges), unknown.odds
+        self.places = np.zeros(len(self.steered))
         self.constants = self.nominal
         self.target = np.asarray(hand.start_angles, dtype=np.float64)
         self._middle = 0.5 * (np.asarray(hand.action_lower) + np.asarray(hand.action_upper))
@@ -123,14 +130,16 @@ class RotationEnv:
         """Starts the next episode."""
         rng = np.random.default_rng([self._seed, self._index, self._episode])
         self._episode += 1
-        drawn = self.randomization.constants(self.nominal, rng)
+        self.places = drawn_places(self.odds, rng)
+        places = dict(zip(self.steered, self.places.tolist(), strict=True))
+        drawn = self.randomization.constants(self.nominal, rng, places)
         self.constants = self.task.apply(drawn, self.conditions)
         self.world.reset(self.constants, self.start_poses.sample(self.randomization, self.constants, rng))
         self._weights = self.reward.weights(self.conditions.penalty_scale)
         self._limit = self.reward.fastest * self.world.options.policy_dt
         self._first = self._pose = self._pose_now(None)
         self._tips = self._azimuths()
-        self._moment = self._observe(np.zeros(len(REWARD_TERMS)), RUNNING, 0)
+        self._moment = self._observe(np.zeros(len(self.reward.terms)), RUNNING, 0)
         return self._moment
 
     def step(self, action: Array) -> Moment:
@@ -177,8 +186,16 @@ class RotationEnv:
                 terms.off_centre(self._first, after),
                 terms.leaving(outcome in LOST),
                 terms.advance(turned, self.task.direction, tips, self._tips),
+                *self._held(turned, after),
             )
         )
+
+    def _held(self, turned: float, after: CubePose) -> tuple[float, ...]:
+        """The terms of how the object is held; none where they earn nothing."""
+        if not self.reward.borne_terms:
+            return ()
+        tips, links, share = borne(normal_forces(self.world))
+        return terms.climb(self._first, after), max(turned, 0.0) * links, tips, links, share
 
     def _observe(self, measured: Array, outcome: int, step: int) -> Moment:
         world, pose = self.world, self._pose
@@ -195,6 +212,6 @@ class RotationEnv:
 
     def _fault(self, step: int) -> Moment:
         last = self._moment
-        nothing = np.zeros(len(REWARD_TERMS))
+        nothing = np.zeros(len(self.reward.terms))
         state = (last.joint_position, last.control_error, last.object_state, last.theta)
         return Moment(*state, nothing, 0.0, FAULTY, step)

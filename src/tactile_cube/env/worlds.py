@@ -11,19 +11,18 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from tactile_cube.env.reward import REWARD_TERMS
-from tactile_cube.env.rotation import OBJECT, Moment, RotationEnv
+from tactile_cube.env.rotation import OBJECT, Array, Moment, RotationEnv
 from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions, Curriculum
 
 
-def float_sizes(joints: int) -> dict[str, int]:
+def float_sizes(joints: int, terms: int) -> dict[str, int]:
     """Keys and sizes of the real-valued observations of a hand with so many joints, as Moment describes them."""
     return {
         "joint_position": joints,
         "control_error": joints,
         "object_state": OBJECT + joints,
         "theta": 1,
-        "reward_terms": len(REWARD_TERMS),
+        "reward_terms": terms,
     }
 
 
@@ -31,9 +30,9 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
     """Rotation tasks side by side, batch size `[worlds]`.
 
     Keys, for a hand with 12 joints: "joint_position" (12), "control_error" (12), "object_state" (25), "theta" (1),
-    "reward_terms" (8), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1), "action" (12),
-    "reward" (1), "done", "terminated", "truncated" (1). Transitions whose "faulty" is true come from broken physics
-    and must not be learned from.
+    "reward_terms" (8, or 13, see Reward.terms), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1),
+    "action" (12), "reward" (1), "done", "terminated", "truncated" (1); where constants are steered also "places", see
+    RotationEnv. Transitions whose "faulty" is true come from broken physics and must not be learned from.
 
     Example:
         >>> env = WorldsEnv([RotationEnv(...), RotationEnv(...)])
@@ -52,8 +51,10 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         self._seed_tasks(0)
 
     def _make_specs(self) -> None:
-        n, joints = len(self.tasks), self.tasks[0].hand.joints
-        spec = Composite({key: Unbounded((n, size)) for key, size in float_sizes(joints).items()}, shape=(n,))
+        n, joints, terms = len(self.tasks), self.tasks[0].hand.joints, len(self.tasks[0].reward.terms)
+        spec = Composite({key: Unbounded((n, size)) for key, size in float_sizes(joints, terms).items()}, shape=(n,))
+        if self.tasks[0].steered:
+            spec["places"] = Unbounded((n, len(self.tasks[0].steered)))
         spec["episode_step"] = Unbounded((n, 1), dtype=torch.int64)
         spec["outcome"] = Categorical(len(OUTCOMES), shape=(n, 1), dtype=torch.int64)
         spec["faulty"] = Categorical(2, shape=(n, 1), dtype=torch.bool)
@@ -63,12 +64,13 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         flag = Categorical(2, shape=(n, 1), dtype=torch.bool)
         self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(n,))
 
-    def set_progress(self, environment_steps: int, performance: float) -> Conditions:
+    def set_progress(self, environment_steps: int, performance: float, odds: Array | None = None) -> Conditions:
         """Sets the conditions of the episodes that start from now on.
 
         Args:
             environment_steps: steps taken so far by all worlds of the training together.
             performance: mean final angle of recent episodes [rad].
+            odds: of the parts of the ranges of steered constants; None: as they are.
 
         Returns:
             The conditions in force.
@@ -78,6 +80,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
             conditions = self.curriculum.conditions(environment_steps, performance, conditions)
         for task in self.tasks:
             task.set_conditions(conditions)
+            task.odds = task.odds if odds is None else odds
         return conditions
 
     def _set_seed(self, seed: int | None) -> None:
@@ -120,6 +123,8 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
             "terminated": torch.tensor([[m.terminated] for m in moments]),
             "truncated": torch.tensor([[m.truncated] for m in moments]),
         }
+        if self.tasks[0].steered:
+            data["places"] = _rows([task.places for task in self.tasks])
         data["done"] = data["terminated"] | data["truncated"]
         if with_reward:
             data["reward"] = _rows([[m.reward] for m in moments])

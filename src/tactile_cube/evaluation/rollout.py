@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from torchrl.envs import TransformedEnv
 
-from tactile_cube.env import OUTCOMES, REWARD_TERMS, RotationEnv
+from tactile_cube.env import OUTCOMES, RotationEnv
 from tactile_cube.evaluation.episode_record import Array, ContactTable, EpisodeRecord
 from tactile_cube.evaluation.policies import Policy
 from tactile_cube.simulation import EpisodeConstants
@@ -90,7 +90,7 @@ class Recorder:
         """Return the episode so far."""
         task, samples = self._task, len(self._theta)
         weights = task.reward.weights(task.conditions.penalty_scale)
-        terms = np.array(self._terms).reshape(-1, len(REWARD_TERMS)) * weights
+        terms = np.array(self._terms).reshape(-1, len(weights)) * weights
         names = self._trace[0] if self._trace else {}
         return EpisodeRecord(
             time=np.arange(samples, dtype=np.float64) * task.world.options.policy_dt,
@@ -101,7 +101,7 @@ class Recorder:
             cube_position=np.array(self._rows["cube_position"]),
             cube_quaternion=np.array(self._rows["cube_quaternion"]),
             reward=np.array(self._reward),
-            reward_terms={name: terms[:, index] for index, name in enumerate(REWARD_TERMS)},
+            reward_terms={name: terms[:, index] for index, name in enumerate(task.reward.terms)},
             contacts=self._contact_table(),
             ending=OUTCOMES[self._outcome],
             direction=task.task.direction,

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tactile_cube.env.touch import SUPPORTING_TIPS, TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
-TOUCH_FORCE = 0.02
-"""Smallest normal force that counts as touching [N]: a twenty-fifth of the cube's weight."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +39,6 @@ def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
     firm = table.normal_force > TOUCH_FORCE
     result[table.step[firm], table.finger[firm]] = True
     return result
-
-
-SUPPORTING_TIPS = 3
-"""Fingertips that must touch the cube for it to count as supported by tips."""
 
 
 @dataclass(frozen=True)

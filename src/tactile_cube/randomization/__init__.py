@@ -13,6 +13,7 @@ from tactile_cube.randomization.distributions import (
 )
 from tactile_cube.randomization.grasp_starts import Grasps, GraspStarts, GraspTable
 from tactile_cube.randomization.identified import identified
+from tactile_cube.randomization.learnability import Learnability, drawn_places
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.randomization.start_states import StartPoses, StartStates
 
@@ -24,6 +25,7 @@ __all__ = [
     "GraspStarts",
     "GraspTable",
     "Grasps",
+    "Learnability",
     "LogUniform",
     "Normal",
     "Randomization",
@@ -31,6 +33,7 @@ __all__ = [
     "StartStates",
     "Uniform",
     "UniformPerJoint",
+    "drawn_places",
     "identified",
     "sample",
 ]

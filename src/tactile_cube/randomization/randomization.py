@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.randomization.distributions import Constant, Distribution, EffectRange, sample
+from tactile_cube.randomization.learnability import Learnability
 from tactile_cube.simulation import EpisodeConstants
 
 Array = NDArray[np.float64]
@@ -39,6 +40,7 @@ class Randomization:
         joint_offset: distribution of each encoder's zero error [rad].
         sensor_noise: standard deviation of the noise on q_m [rad].
         sticky_probability: probability that a step repeats the previous action.
+        steered: part of the episodes whose `values` are drawn by what a policy can learn from (`Learnability`).
     """
 
     values: Mapping[str, Distribution] = field(default_factory=dict)
@@ -51,6 +53,7 @@ class Randomization:
     joint_offset: Distribution = field(default_factory=lambda: Constant(0.0))
     sensor_noise: float = 0.0
     sticky_probability: float = 0.0
+    steered: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
@@ -66,6 +69,8 @@ class Randomization:
             raise InputError(f"randomization.sensor_noise is {self.sensor_noise}; give a standard deviation >= 0 [rad]")
         if not 0.0 <= self.sticky_probability < 1.0:
             raise InputError(f"randomization.sticky_probability is {self.sticky_probability}; give a number in [0, 1)")
+        if not 0.0 <= self.steered < 1.0:
+            raise InputError(f"randomization.steered is {self.steered}; give a number in [0, 1)")
 
     def _require_distributions(self) -> None:
         for group in ("values", "factors", "shifts", "cube_position", "cube_rotation"):
@@ -75,8 +80,16 @@ class Randomization:
         for group in ("start_angles", "joint_offset"):
             _require_distribution(group, getattr(self, group))
 
-    def constants(self, nominal: EpisodeConstants, rng: np.random.Generator) -> EpisodeConstants:
-        """Draws the constants of one episode around `nominal`."""
+    def learnability(self, nominal: EpisodeConstants) -> Learnability:
+        """What is known of the `values` of one number each before the first episode; of none unless `steered`."""
+        single = {k: d for k, d in self.values.items() if k in DRAWN_ONCE or not np.shape(getattr(nominal, k))}
+        return Learnability(single if self.steered else {}, self.steered)
+
+    def constants(
+        self, nominal: EpisodeConstants, rng: np.random.Generator, places: Mapping[str, float] | None = None
+    ) -> EpisodeConstants:
+        """Draws the constants of one episode around `nominal`; `places`: where in [0, 1) of its range a value lies."""
+        known = places or {}
         changed: dict[str, Any] = {}
         for group, combine in ((self.values, _replace), (self.factors, np.multiply), (self.shifts, np.add)):
             for key, distribution in group.items():
@@ -84,7 +97,9 @@ class Randomization:
                 if value is None:
                     raise InputError(f"randomization of {key}: the nominal value is None, there is nothing to vary")
                 shape = () if key in DRAWN_ONCE else np.shape(value)
-                changed[key] = _plain(combine(value, sample(distribution, rng, shape)))
+                given = group is self.values and key in known
+                drawn = distribution.quantile(np.array(known[key])) if given else sample(distribution, rng, shape)
+                changed[key] = _plain(combine(value, drawn))
         changed["force_seed"] = int(rng.integers(2**31))
         changed["effects"] = tuple(effect.draw(rng) for effect in self.effects)
         return dataclasses.replace(nominal, **changed)

@@ -105,7 +105,11 @@ def build_learner(
             agent=agent,
             replay=Replay(settings.replay_size, environment.sizes, environment.reward_terms, seed),
             collection=collection,
-            episodes=EpisodeStatistics(environment.outcomes),
+            episodes=EpisodeStatistics(
+                environment.outcomes,
+                environment.logged_terms,
+                environment.learnability() if environment.learnability is not None else None,
+            ),
             settings=settings,
             reward_weights=environment.reward_weights,
             seed=seed,

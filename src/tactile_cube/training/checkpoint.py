@@ -28,6 +28,7 @@ FREE_KEYS = {
     "training.stop_if_no_regrasp_by",
     "training.regrasp_angle",
     "training.stop_when_angle_above",
+    "training.stop_when_kept_above",
     "training.init_from",
     "own_effects",
     "collector.timeout",

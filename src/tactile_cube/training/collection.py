@@ -22,8 +22,9 @@ from tactile_cube.env import Conditions
 MakeEnv = Callable[..., EnvBase]
 """make_env(worlds=n, seed=s) -> batched environment of n worlds with a method set_progress(steps, performance)."""
 
-Progress = tuple[int, float]
-"""What a curriculum goes by: environment steps so far, and mean final angle [rad] of the last episodes."""
+Progress = tuple[Any, ...]
+"""What a curriculum goes by: environment steps so far, and mean final angle [rad] of the last episodes; where constants
+are steered also the odds of their parts."""
 
 
 class CollectionError(RuntimeError):

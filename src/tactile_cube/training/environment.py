@@ -1,6 +1,7 @@
 """What training needs to know about an environment besides how to make one."""
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ from torchrl.envs import TransformedEnv
 
 from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
-from tactile_cube.env import OUTCOMES, REWARD_TERMS, Conditions
+from tactile_cube.env import OUTCOMES, Conditions
 from tactile_cube.env.rotation import OBJECT
+from tactile_cube.randomization import Learnability
 from tactile_cube.training.collection import MakeEnv
 from tactile_cube.training.loop import RewardWeights
 from tactile_cube.transforms import EnvConfig, make_env
@@ -29,6 +31,8 @@ class Environment:
         reward_terms: number of reward terms.
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
+        learnability: makes what keeps account of the worlds; None: nothing does.
+        logged_terms: names of the last reward terms, whose means the training curves show.
         approximations: what its worlds compute less well than they could, in words.
     """
 
@@ -37,6 +41,8 @@ class Environment:
     reward_terms: int
     reward_weights: RewardWeights
     outcomes: tuple[str, ...] = ()
+    logged_terms: tuple[str, ...] = ()
+    learnability: Callable[[], Learnability] | None = None
     approximations: tuple[str, ...] = ()
 
 
@@ -46,9 +52,11 @@ def rotation_environment(config: EnvConfig) -> Environment:
     return Environment(
         make=functools.partial(_make, config),
         sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
-        reward_terms=len(REWARD_TERMS),
+        reward_terms=len(config.reward.terms),
         reward_weights=functools.partial(_weights, config),
         outcomes=tuple(OUTCOMES),
+        logged_terms=config.reward.borne_terms,
+        learnability=functools.partial(config.randomization.learnability, config.constants),
         approximations=tuple(config.approximations()),
     )
 

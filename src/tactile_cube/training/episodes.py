@@ -4,9 +4,13 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from tensordict import TensorDictBase
 
+from tactile_cube.randomization import Learnability
+
 WINDOW = 50
+"""Episodes, and blocks of steps, that the statistics go back."""
 
 
 class EpisodeStatistics:
@@ -14,10 +18,16 @@ class EpisodeStatistics:
 
     Args:
         outcomes: names of the outcome codes, e.g. ("running", "time", "dropped", ...); empty if the world has none.
+        terms: names of the last reward terms; their means over all steps of the last blocks are logged.
+        worlds: what becomes of the worlds that episodes draw.
     """
 
-    def __init__(self, outcomes: Sequence[str] = ()):
-        self.outcomes = tuple(outcomes)
+    def __init__(
+        self, outcomes: Sequence[str] = (), terms: Sequence[str] = (), worlds: Learnability | None = None
+    ) -> None:
+        self.outcomes, self.terms = tuple(outcomes), tuple(terms)
+        self.worlds = worlds or Learnability({}, 0.0)
+        self.measured: deque[list[float]] = deque(maxlen=WINDOW)
         self.angles: deque[float] = deque(maxlen=WINDOW)
         self.lengths: deque[float] = deque(maxlen=WINDOW)
         self.endings: deque[int] = deque(maxlen=WINDOW)
@@ -29,6 +39,8 @@ class EpisodeStatistics:
         following = block["next"]
         ended = following["done"].squeeze(-1)
         faulty = following["faulty"].squeeze(-1)
+        if self.terms:
+            self.measured.append(following["reward_terms"][..., -len(self.terms) :].flatten(0, -2).mean(0).tolist())
         self.faulty += int((ended & faulty).sum())
         self.episodes += int(ended.sum())
         exploring = following.get("exploring", None)  # missing where no extra exploration is configured
@@ -39,6 +51,8 @@ class EpisodeStatistics:
         last = following.transpose(0, 1)[counted.t()]
         self.angles.extend(last["theta"].flatten().tolist())
         self.lengths.extend(last["episode_step"].float().flatten().tolist())
+        if self.worlds.ranges:
+            self.worlds.add(last["places"].double().numpy(), last["terminated"].squeeze(-1).numpy())
         if self.outcomes:
             self.endings.extend(last["outcome"].flatten().tolist())
 
@@ -46,6 +60,12 @@ class EpisodeStatistics:
     def mean_angle(self) -> float:
         """Mean final angle [rad] of the last episodes; 0 before the first one ended."""
         return sum(self.angles) / len(self.angles) if self.angles else 0.0
+
+    @property
+    def kept(self) -> float:
+        """Share of the last episodes that came to their time limit; 0 before the window of them is full."""
+        full = len(self.endings) == WINDOW and "time_limit" in self.outcomes
+        return self.endings.count(self.outcomes.index("time_limit")) / WINDOW if full else 0.0
 
     def summary(self) -> dict[str, float]:
         """Numbers for the log."""
@@ -60,15 +80,17 @@ class EpisodeStatistics:
         for code, name in enumerate(self.outcomes):
             if name not in ("running", "faulty"):
                 result[f"ended_{name}"] = self.endings.count(code) / max(len(self.endings), 1)
-        return result
+        means = zip(*self.measured, strict=True) if self.measured else ([0.0] for _ in self.terms)
+        return result | {name: sum(values) / len(values) for name, values in zip(self.terms, means, strict=True)}
 
     def state_dict(self) -> dict[str, Any]:
         """The window and the counts."""
-        windows = {name: list(getattr(self, name)) for name in ("angles", "lengths", "endings")}
-        return {**windows, "episodes": self.episodes, "faulty": self.faulty}
+        windows = {name: list(getattr(self, name)) for name in ("angles", "lengths", "endings", "measured")}
+        return {**windows, "episodes": self.episodes, "faulty": self.faulty, "lost": self.worlds.lost.tolist()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Inverse of `state_dict`."""
-        for name in ("angles", "lengths", "endings"):
-            setattr(self, name, deque(state[name], maxlen=WINDOW))
+        for name in ("angles", "lengths", "endings", "measured"):
+            setattr(self, name, deque(state.get(name, ()), maxlen=WINDOW))
         self.episodes, self.faulty = state["episodes"], state["faulty"]
+        self.worlds.lost = np.array(state.get("lost", [])).reshape(self.worlds.lost.shape)

@@ -40,7 +40,7 @@ class Ledger:
 
     def __init__(self, path: Path, processes: int, simulating: Callable[[], float], in_process: bool):
         self.path = path
-        self.before = _read(path)
+        self.before = read_costs(path)
         self._processes = processes
         self._simulating = simulating
         self._in_process = in_process
@@ -61,13 +61,18 @@ class Ledger:
 
     def write(self, steps: int) -> None:
         """Put the costs into the run folder, in hours as in the paper."""
-        costs = self.costs()
-        hours = {f"{name}_hours": round(value / 3600, 4) for name, value in asdict(costs).items()}
-        text = json.dumps({"steps": steps, "seconds": asdict(costs), **hours}, indent=2) + "\n"
-        write_whole(self.path, text.encode())
+        write_costs(self.path, steps, self.costs())
 
 
-def _read(path: Path) -> Costs:
+def write_costs(path: Path, steps: int, costs: Costs) -> None:
+    """Write a ledger, in hours as in the paper."""
+    hours = {f"{name}_hours": round(value / 3600, 4) for name, value in asdict(costs).items()}
+    text = json.dumps({"steps": steps, "seconds": asdict(costs), **hours}, indent=2) + "\n"
+    write_whole(path, text.encode())
+
+
+def read_costs(path: Path) -> Costs:
+    """Spent according to a ledger; nothing where there is none."""
     try:
         return Costs(**json.loads(path.read_text())["seconds"])
     except (OSError, ValueError, KeyError, TypeError):

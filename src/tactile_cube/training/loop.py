@@ -18,7 +18,7 @@ from torch import Tensor
 
 from tactile_cube.agent.interface import Agent
 from tactile_cube.env import Conditions
-from tactile_cube.training.collection import Collection, CollectionError
+from tactile_cube.training.collection import Collection, CollectionError, Progress
 from tactile_cube.training.episodes import EpisodeStatistics
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.settings import TrainingSettings
@@ -94,8 +94,9 @@ class Learner:
         if transitions:
             self.replay.extend(transitions)
 
-    def _progress(self) -> tuple[int, float]:
-        return self.steps, self.episodes.mean_angle
+    def _progress(self) -> Progress:
+        worlds = self.episodes.worlds
+        return self.steps, self.episodes.mean_angle, *([worlds.odds] if worlds.ranges else [])
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that a resumed run needs; valid at barriers only."""

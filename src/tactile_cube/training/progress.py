@@ -17,15 +17,27 @@ class ProgressLine:
         steps: steps done before this session.
         updates: gradient steps done before this session.
         stream: where to print.
+
+    Attributes:
+        stage: what each line begins with where the run is a stage of several.
+        later: environment steps of the stages after it, at most.
     """
 
     def __init__(self, total: int, steps: int, updates: int, stream: TextIO | None = None):
         self._total = total
+        self.stage, self.later = "", 0
         self._stream = stream or sys.stdout
         self._printed = time.perf_counter()
         self._at_print = (steps, updates)
 
-    def show(self, steps: int, updates: int, summary: Mapping[str, float], conditions: Mapping[str, float]) -> None:
+    def show(
+        self,
+        steps: int,
+        updates: int,
+        summary: Mapping[str, float],
+        conditions: Mapping[str, float],
+        worlds: str = "",
+    ) -> None:
         """Print if the last line is old enough.
 
         Args:
@@ -33,6 +45,7 @@ class ProgressLine:
             updates: gradient steps so far.
             summary: statistics of episodes, see EpisodeStatistics.summary.
             conditions: the curriculum's values in force.
+            worlds: in which of them most is lost, in words.
         """
         now = time.perf_counter()
         if now - self._printed < INTERVAL:
@@ -41,14 +54,18 @@ class ProgressLine:
         step_rate = (steps - self._at_print[0]) / elapsed
         update_rate = (updates - self._at_print[1]) / elapsed
         self._printed, self._at_print = now, (steps, updates)
-        left = max(self._total - steps, 0) / max(step_rate, 1e-9)  # the last barrier may lie beyond
+        left = (max(self._total - steps, 0) + self.later) / max(step_rate, 1e-9)  # the last barrier may lie beyond
         values = " ".join(f"{key} {value:.3g}" for key, value in conditions.items())
+        kept = [f"{100 * summary['ended_time_limit']:.0f} % kept"] if "ended_time_limit" in summary else []
         parts = [
+            *filter(None, [self.stage]),
             f"{steps / 1e3:8.1f} k of {self._total / 1e3:.0f} k steps",
             f"{step_rate:4.0f} steps/s {update_rate:4.0f} updates/s",
             f"final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps",
+            *kept,
+            *filter(None, [worlds]),
             values,
-            f"{clock(left)} left",
+            f"{'at most ' if self.stage else ''}{clock(left)} left",
         ]
         self.say(" | ".join(parts), in_place=self._stream.isatty())
 

@@ -19,6 +19,8 @@ from tactile_cube.training.loop import Learner
 from tactile_cube.training.progress import ProgressLine, clock
 
 INTERRUPTED = "interrupted"
+MASTERED = "mastered:"
+"""How the reason begins for which a run ended that came to its goal."""
 POLICY, BEST_POLICY = "policy.safetensors", "policy_best.safetensors"
 
 
@@ -136,7 +138,7 @@ class Run:
         now = time.perf_counter()
         self._iteration_ended, self._iteration_seconds = now, now - self._iteration_ended
         summary = learner.episodes.summary()
-        self.line.show(learner.steps, learner.updates, summary, conditions)
+        self.line.show(learner.steps, learner.updates, summary, conditions, learner.episodes.worlds.hardest)
         if learner.iteration % learner.settings.log_iterations == 0:
             losses = {key: float(value) for key, value in learner.metrics.items()}
             costs = self.ledger.costs()
@@ -148,11 +150,11 @@ class Run:
 
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
-        angle = self.learner.episodes.mean_angle
+        angle, kept = self.learner.episodes.mean_angle, self.learner.episodes.kept
         if steps >= settings.steps:
             return f"all {settings.steps} steps done"
-        if settings.stop_when_angle_above is not None and angle > settings.stop_when_angle_above:
-            return f"mean final angle {angle:.2f} rad is above training.stop_when_angle_above"
+        if settings.mastered(angle, kept):
+            return f"{MASTERED} above {settings.goal}"
         deadline = settings.stop_if_no_regrasp_by
         if deadline is not None and steps >= deadline and self.best_angle < settings.regrasp_angle:
             return f"no regrasping (mean final angle never above {settings.regrasp_angle:g} rad) by {deadline} steps"

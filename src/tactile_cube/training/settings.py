@@ -84,6 +84,8 @@ class TrainingSettings(BaseModel):
         stop_if_no_regrasp_by: give up when the mean final angle is still below `regrasp_angle` after so many steps.
         regrasp_angle: angle [rad] no single twist reaches, so that beyond it the fingers must have regrasped.
         stop_when_angle_above: finish early at this mean final angle [rad].
+        stop_when_kept_above: finish early at this share of cubes kept in the last training episodes; where both are
+            given, both must hold.
         threads: torch threads of the learner; results differ in the last bits between thread counts.
 
     Source: website table of the paper for the schedule.
@@ -107,4 +109,17 @@ class TrainingSettings(BaseModel):
     stop_if_no_regrasp_by: PositiveInt | None = None
     regrasp_angle: PositiveFloat = 2.0
     stop_when_angle_above: PositiveFloat | None = None
+    stop_when_kept_above: PositiveFloat | None = None
     threads: PositiveInt = Field(default=1)
+
+    @property
+    def goal(self) -> str:
+        """What a run finishes early at, in words; "" where it does not."""
+        angle, kept = self.stop_when_angle_above, self.stop_when_kept_above
+        parts = [f"{angle:g} rad" if angle is not None else "", f"{100 * kept:g} % kept" if kept is not None else ""]
+        return " and ".join(filter(None, parts))
+
+    def mastered(self, angle: float, kept: float) -> bool:
+        """Whether a mean final angle [rad] and a share of cubes kept are above all that a run finishes early at."""
+        pairs = ((angle, self.stop_when_angle_above), (kept, self.stop_when_kept_above))
+        return bool(self.goal) and all(least is None or value > least for value, least in pairs)

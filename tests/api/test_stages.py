@@ -1,0 +1,140 @@
+"""A training in stages, by the one command."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+import tactile_cube
+from benchmarks.paper.ancestry import read_ancestry
+from tactile_cube import InputError
+from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.api import stages
+from tactile_cube.api.job import Job, called_job
+from tactile_cube.api.training import TrainingResult
+from tactile_cube.training.run import INTERRUPTED, Run
+
+TINY = [
+    "+experiment=curriculum",
+    "collector=single",
+    "collector.worlds=2",
+    "logger=csv",
+    "agent.hidden=[8]",
+    "agent.batch_size=8",
+    "training.steps=32",
+    "training.steps_per_iteration=4",
+    "training.barrier_iterations=2",
+    "training.updates_per_iteration=1",
+    "training.learning_starts=8",
+    "training.replay_size=200",
+    "training.policy_every=16",
+    "training.log_iterations=1",
+    "judgement=['protocol=smoke','protocol.episodes=1','protocol.seconds=0.3']",
+]
+NAMES = ["gaiting", "holding", "worlds"]
+
+
+@pytest.fixture
+def trained(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, int]]:
+    """What stages are asked to train: folder, networks to begin with, steps still to come after it; nothing is."""
+    asked: list[tuple[str, str, int]] = []
+
+    def run(job: Job, stage: str, later: int) -> TrainingResult:
+        asked.append((job.folder.name, str(job.config.training.init_from), later))
+        return TrainingResult(job.folder, "mastered: above 5 rad" if len(asked) < 3 else "all 9 steps done", 9, 5.0)
+
+    def judge(job: Job, last: Path) -> str:
+        (job.folder / "policy.safetensors").touch()
+        return f"judged {last.name}"
+
+    monkeypatch.setattr(stages, "run_training", run)
+    monkeypatch.setattr(stages, "judged", judge)
+    return asked
+
+
+def test_each_stage_goes_on_from_the_one_before_and_the_screen_says_what_is_mastered(
+    tmp_path: Path, trained: list[Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = tactile_cube.train("+experiment=curriculum", "training.steps=50", folder=tmp_path)
+    before = ["None", f"{tmp_path}/gaiting/checkpoint.pt", f"{tmp_path}/holding/checkpoint.pt"]
+    assert trained == list(zip(NAMES, before, (100, 50, 0), strict=True))
+    assert (result.reason, result.steps, result.folder) == ("judged worlds", 27, tmp_path)
+    said = capsys.readouterr().out
+    assert "stage 2 of 3, holding, until 5 rad and 93 % kept" in said
+    assert "gaiting: mastered: above 5 rad; to come: holding, worlds, mean" in said
+    assert "worlds: not mastered: all 9 steps done; to come: mean" in said
+    tactile_cube.train("+experiment=curriculum", "training.steps=50", folder=tmp_path)
+    assert len(trained) == 3, "finished before"
+
+
+def test_what_the_user_asks_for_holds_in_every_stage(tmp_path: Path) -> None:
+    words = ("+experiment=curriculum", "seed=3", "name=mine", "reward=air", "start=paper", "~stages.holding")
+    found = stages.stages_of(called_job("train", words, tmp_path, model="mine.yaml"))
+    assert [stage.name for stage in found] == ["gaiting", "worlds"]
+    assert {(stage.job.config.seed, stage.job.config.reward.spin) for stage in found} == {(3, 16)}
+    assert found[1].job.config.randomization.steered == 0.7
+    assert {stage.job.config.model for stage in found} == {"mine.yaml"}
+
+
+def test_no_stage_is_taught_by_anybody(tmp_path: Path) -> None:
+    for stage in stages.stages_of(called_job("train", ("+experiment=curriculum",), tmp_path)):
+        config = stage.job.config
+        assert (config.exploration.demonstrations, config.agent.demonstration_weight) == (0.0, 0)
+        assert "gaits" not in config.exploration
+        assert "teacher" not in config.exploration
+
+
+def test_a_hand_that_the_package_has_no_grasps_of_gets_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages, "GRASPS", 1)
+    first = stages.stages_of(called_job("train", ("+experiment=curriculum", "hand=three_finger"), tmp_path))[0]
+    assert first.job.config.start.file == str(tmp_path / "grasps.npz")
+    assert (tmp_path / "grasps.npz").is_file()
+
+
+def test_a_stage_that_cannot_be_composed_is_an_input_error(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nonsense"):
+        tactile_cube.train("+experiment=curriculum", "+stages.gaiting=['+experiment=nonsense']", folder=tmp_path)
+
+
+def interrupted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C in the middle of the second stage, the first time it is there; then before the third stage begins."""
+    to_come = ["in holding", "before worlds"]
+    reason, run = Run._reason_to_stop, stages.run_training
+
+    def stop(self: Run) -> str:
+        if "in holding" in to_come and self.folder.name == "holding" and self.learner.steps == 16:
+            to_come.remove("in holding")
+            return INTERRUPTED
+        return reason(self)
+
+    def before(job: Job, *rest: Any) -> TrainingResult:
+        if "before worlds" in to_come and job.folder.name == "worlds":
+            to_come.remove("before worlds")
+            raise KeyboardInterrupt
+        return run(job, *rest)
+
+    monkeypatch.setattr(Run, "_reason_to_stop", stop)
+    monkeypatch.setattr(stages, "run_training", before)
+
+
+def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_policy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = tactile_cube.train(*TINY, folder=tmp_path / "whole")
+    interrupted_once(monkeypatch)
+    parts = tmp_path / "parts"
+    assert tactile_cube.train(*TINY, folder=parts).reason == INTERRUPTED
+    assert not (parts / "worlds").exists()
+    with pytest.raises(KeyboardInterrupt):
+        tactile_cube.train(*TINY, folder=parts)
+    assert tactile_cube.train(*TINY, folder=parts).steps == whole.steps == 96
+    same, other = (load_policy(one / "policy.safetensors")[0].state_dict() for one in (tmp_path / "whole", parts))
+    assert all(torch.equal(same[key], other[key]) for key in same)
+    assert all((parts / engine / "results.json").is_file() for engine in ("bullet", "mujoco"))
+    assert [(run.name, run.steps) for run in read_ancestry([parts])] == [("parts", 96)]
+    with (parts / "metrics.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(row["stage"], int(row["steps"])) for row in rows][3:5] == [("gaiting", 32), ("holding", 40)]
+    assert {"tips", "links", "link_force", "climb"} <= rows[0].keys()
