@@ -37,6 +37,11 @@ def torque_behind_play(torque: Array, drop: Array, softness: Array) -> Array:
     return np.sign(torque) * u * softness
 
 
+def smooth_lead(torque: Array, smooth: float, softness: float) -> Array:
+    """Return how far the motor leads in a smooth play under a torque [rad]."""
+    return 0.5 * smooth * np.tanh(torque / softness)
+
+
 _torque_behind_play = compiled(torque_behind_play)
 
 
@@ -92,7 +97,7 @@ class Backlash(Effect):
         edge = np.where(p[..., 4] > 0.0, 0.0, 0.5 * p[..., 1])
         first = np.clip(lead, -edge, edge)
         torque = torque_behind_play(gain * (lead - first), gain * half, softness)
-        return np.asarray(first + half * np.tanh(torque / softness))
+        return np.asarray(first + smooth_lead(torque, p[..., 2], softness))
 
     @staticmethod
     def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

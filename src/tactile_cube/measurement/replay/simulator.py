@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects.backlash import Backlash, smooth_lead
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
@@ -273,12 +274,18 @@ class Simulator:
         return position, torque
 
     def _links(self, model: Model, windows: Windows) -> Array:
-        """Link positions (S, n) near those of the first row: measured less the deflection of the plain drive."""
+        """Link positions (S, n) near those of the first row: measured less what the motor leads at the first torque."""
         constants = model.constants
         error = windows.commands[:, windows.history * windows.substeps] - windows.position[:, 0]
         torque = constants["kp"] * error - constants["kd"] * windows.speed[:, 0]
         limit = constants["torque_limit"]
-        return windows.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
+        torque = np.clip(torque, -limit, limit)
+        links = windows.position[:, 0] - torque / constants["stiffness"]
+        for term in model.terms:
+            if term.effect is Backlash:
+                j = self.recording.joints.index(term.joint)
+                links[:, j] -= smooth_lead(torque[:, j], term.values["smooth"], term.values["softness"])
+        return links
 
 
 def _pybullet(plant: Plant) -> RigWorld:
