@@ -26,7 +26,7 @@ from tactile_cube.drivetrain.effects import (
     Place,
     catalogue,
 )
-from tactile_cube.drivetrain.signals import DAMPING, GAP, LOAD, LOOP_GAIN, LOOSE_TORQUE, ROWS, SENSOR_VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, GAP, LOOP_GAIN, LOOSE_TORQUE, ROWS, SENSOR_VELOCITY
 
 DT = 0.002
 Signal = float | tuple[float, ...] | list[float]
