@@ -57,6 +57,8 @@ def _stage(stage: Stage, effects: Sequence[type[Effect]], layout: MemoryLayout) 
             lines += _call(index, effect, layout)
         if stage is Stage.MOTOR_TORQUE and effect.defines("torque_law"):
             lines += _call(index, effect, layout, "torque_law", Stage.MOTOR_TORQUE)
+        if stage is Stage.POSITION_SENSOR and effect.stage is not stage and effect.defines("ahead_law"):
+            lines += _call(index, effect, layout, "ahead_law", stage)
     return _function(stage.name.lower(), lines)
 
 
@@ -65,7 +67,7 @@ def _ahead(effects: Sequence[type[Effect]], layout: MemoryLayout) -> str:
     lines = []
     for index, effect in enumerate(effects):
         if effect.defines("ahead_law"):
-            lines += _call(index, effect, layout, "ahead_law")
+            lines += _call(index, effect, layout, "ahead_law", Stage.POSITION_SENSOR)
         elif effect.stage is Stage.POSITION_SENSOR and effect.state_size(ANY_STEP) == 0:
             lines += _call(index, effect, layout)
     return _function("position_sensor_ahead", lines)

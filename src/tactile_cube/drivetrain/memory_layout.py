@@ -128,7 +128,10 @@ def _mechanism(chains: int, dofs: int) -> dict[str, Shape]:
 def _state(topology: Topology) -> dict[str, Shape]:
     joints, chains, dofs = topology.joints, topology.chains, len(topology.parent)
     return {
-        **{key: (joints,) for key in ("q", "v", "filtered", "limited", "extra", "extra_compliance", "contact")},
+        **{
+            key: (joints,)
+            for key in ("q", "v", "filtered", "limited", "extra", "extra_compliance", "held_back", "contact")
+        },
         "signals": (chains, ROWS, len(topology.leader)),
         "last_speed": (chains, dofs),
         "last_torque": (chains, dofs),

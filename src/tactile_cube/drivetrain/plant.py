@@ -175,7 +175,7 @@ class Plant:
         for key in ("q", "filtered", "limited", "goal"):
             self.view(memory, key)[...] = q
         self.view(memory, "v")[...] = v
-        for key in ("extra", "extra_compliance", "contact", "signals", "seen"):
+        for key in ("extra", "extra_compliance", "held_back", "contact", "signals", "seen"):
             self.view(memory, key)[...] = 0.0
         self.view(memory, "step")[...] = time / self.dt
         for effect in self.effects:

@@ -43,4 +43,10 @@ GAP = 18
 """Where the motor stands in its transmission: 0 there is no gap, 1 on a flank, 2 free, so that it does not show q."""
 WEIGHT = 19
 """Torque that holds the links against gravity [N m]: a part of LOAD. Zero unless some effect `weighs`."""
-ROWS = 20
+LOOP_GAIN = 20
+"""Slope of TORQUE against LEAD within a step: K_P / (1 + K_P compliance), or what a lag lets pass [N m/rad]."""
+LOOSE_TORQUE = 21
+"""Torque that the motor would carry did no law of the position sensor lead it or hold it back [N m]."""
+SENSOR_VELOCITY = 22
+"""Speed of what the position sensor reads: of the joint, or of a rotor behind a spring [rad/s]."""
+ROWS = 23

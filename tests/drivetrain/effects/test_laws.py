@@ -1,7 +1,7 @@
 """The law of every effect by its value: what the formula gives for plain numbers. An effect without a row fails."""
 
 from dataclasses import dataclass, field
-from math import cos, exp, nan, sin, tanh
+from math import cos, cosh, exp, nan, sin, tanh
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ from tactile_cube.drivetrain.effects import (
     Place,
     catalogue,
 )
-from tactile_cube.drivetrain.signals import DAMPING, GAP, ROWS
+from tactile_cube.drivetrain.signals import DAMPING, GAP, LOOP_GAIN, LOOSE_TORQUE, ROWS, SENSOR_VELOCITY
 
 DT = 0.002
 Signal = float | tuple[float, ...] | list[float]
@@ -101,6 +101,9 @@ BEND = {"bend": -0.5, "reference": 0.1}
 SHUNT = {"from_previous": 0.5, "from_next": -0.25}, {TORQUE: (0.1, 0.2, 0.4)}
 AT_7 = {ANGLE: 0.7, TORQUE: 0.5, JOINT_TORQUE: 0.5, MOTOR_POSITION: 0.5}
 SOFT = {"smooth": 0.02, "softness": 0.01}
+PLAY = {POSITION: 0.4, LOOP_GAIN: 3.0, LEAD: nan, GAP: 0.0}
+ROTOR = {"compliance": 0.05, "rotor": 0.002, "damping": 0.01}
+ROLLS = {VELOCITY: 2.0, TORQUE: 0.5, DAMPING: 1.0}
 HARDENING = {"compliance": 0.06, "cubic": 2e3}
 ONE_WAY = {"damping": 0.05, "difference": 0.04}
 LINE = {"first": -0.8, "last": 0.8} | {f"torque_{k}": 0.1 * k - 0.3 for k in range(17)}
@@ -234,7 +237,7 @@ ROWS_OF_LAWS = (
         "backlash",
         ({"play": 0.02}, {MOTOR_POSITION: [0.5, 0.53, 0.52, 0.51, 0.5]}, [0.5, 0.52, 0.52, 0.52, 0.51]),
         *(
-            (SOFT, {MOTOR_POSITION: 0.4, TORQUE: torque, DEFLECTION: 0.1}, 0.4 + lead, {DEFLECTION: 0.1 + lead})
+            (SOFT, {MOTOR_POSITION: 0.4, TORQUE: torque}, 0.4 + lead)
             for torque, lead in ((0.02, 0.01 * tanh(2.0)), (-0.005, -0.01 * tanh(0.5)), (1.0, 0.01), (-1.0, -0.01))
         ),
     ),
@@ -249,7 +252,31 @@ ROWS_OF_LAWS = (
                 (0.008, {"crossing": 0.004}, 0.006 * (1.0 - exp(-0.5)), {GAP: 2.0, DAMPING: 1.0}),
             )
         ),
+        *(  # a torque, and what it was before 3 N m/rad met its lead; another law shows 2 mrad before this one
+            (SOFT, PLAY | {MOTOR_POSITION: 0.402, LOOSE_TORQUE: torque + 3.0 * (0.002 + lead)}, 0.402 + lead, after)
+            for torque, lead, after in (
+                (0.02, 0.01 * tanh(2.0), {GAP: 1.0, DAMPING: 1.0 / (1.0 + 3.0 / cosh(2.0) ** 2)}),
+                (-0.005, -0.01 * tanh(0.5), {GAP: 2.0, LEAD: -0.005 / 3.0 - 0.01 * tanh(0.5)}),
+                (0.5, 0.01, {GAP: 1.0, DAMPING: 1.0}),
+                (0.0, 0.0, {GAP: 2.0, DAMPING: 0.25}),
+            )
+        ),
         law="ahead_law",
+    ),
+    *rows(  # hangs in a spring at first, then the rotor goes on at 3 rad/s while its link gets 0.4 rad/s slower
+        "elastic_joint",
+        (
+            {"compliance": 0.05},
+            {VELOCITY: 3.0, MEASURED_VELOCITY: 3.0, SENSOR_VELOCITY: 3.0, LOAD: 0.2, ACCELERATION: 0.0},
+            3.0,
+            {SENSOR_VELOCITY: 3.0},
+        ),
+    ),
+    *rows(  # 2 rotor / dt + damping is 3 N m s/rad of the motor, dt / 2 / compliance + damping 0.03 of the spring
+        "elastic_joint",
+        (ROTOR, ROLLS, 0.03 * 0.5 / 3.03, {DAMPING: 0.09 / 3.03 - 2.0}),
+        (ROTOR | {"gap": 0.02}, ROLLS, 0.0, {DAMPING: -2.0}),
+        law="torque_law",
     ),
     *rows(
         "transmission_error",
@@ -370,11 +397,11 @@ def test_neutral_values_change_nothing_bit_for_bit(row: Row) -> None:
 
 @pytest.mark.parametrize(
     "row",
-    # a stop's damper acts at the start of the step
+    # a stop's damper acts at the start of the step, a spring's torque has its own slope
     [
         row
         for row in ROWS_OF_LAWS
-        if row.row in (MEASURED_VELOCITY, TORQUE, JOINT_TORQUE) and row.effect != "joint_stop"
+        if row.row in (MEASURED_VELOCITY, TORQUE, JOINT_TORQUE) and row.effect not in ("joint_stop", "elastic_joint")
     ],
     ids=lambda row: row.effect,
 )

@@ -98,8 +98,17 @@ SHUNT = {"from_previous": 0.5, "from_next": -0.25}
 GIVEN = (0.5 * 0.3 - 0.25 * -0.6) / KP
 SIDES = {"command": np.outer([0.1, 0.0, -0.2], np.ones(STEPS)), "held": np.array([1.0, 0.0, 1.0])}
 # 20 N m/rad and 0.05 rad/(N m) in series are 10 N m/rad
+# a spring of 20 N m/rad between a rotor of 1e-3 and a link of 4e-3 kg m^2: q, q', th, th'
+TWO_MASSES = {"compliance": 0.05, "rotor": 1e-3, "damping": 0.01}
+LINK, ROTOR = [-5e3, -2.5, 5e3, 2.5], [2e4, 10.0, -2e4 - KP / 1e-3, -10.0 - KD / 1e-3]
+AS_LINK, AS_ROTOR = [[0, 1, 0, 0], LINK, [0, 0, 0, 1], ROTOR], [[0, 1, 0, 0], ROTOR[2:] + ROTOR[:2], [0, 0, 0, 1]]
+AS_ROTOR += [LINK[2:] + LINK[:2]]
+RIGID, ALONE = ([[0.0, 1.0], [-KP / inertia, -KD / inertia]] for inertia in (INERTIA, 1e-3))
+STANDS = {"drive": SERVO, "held": 1.0, "command": 0.05}
+AT_REST = np.where(T < 0.2, np.nan, 0.05 * 0.15 / 1.15)
 CUBIC = {"compliance": 0.05, "cubic": 2e3}
 (BENT,) = (root.real for root in np.roots([2e3, 0.0, 10.0 + KP, -KP * 0.3]) if abs(root.imag) < 1e-9)
+PLAY = {"smooth": 0.02, "softness": 0.001}
 CROSSED = 0.008 * (1.0 - np.exp(-(T + DT) / 0.05))
 WAVES = 0.003 * np.sin(60.0 * T) - 0.002 * np.cos(60.0 * T)
 WAVE = {"sine": 0.003, "cosine": -0.002, "harmonic": 30.0}
@@ -167,6 +176,11 @@ CLOSED_FORMS = (
     ("torque_crosstalk", SHUNT, SIDES | {"drive": SERVO, "q": np.array([0.0, GIVEN, 0.0])}, POSITION, GIVEN, 1e-9),
     ("elasticity", {"compliance": 0.05}, CLAMPED | {"command": 1.0}, TORQUE, 3.0 / 1.3, 1e-12),
     ("elasticity", {"compliance": 0.05}, CLAMPED | {"command": 1.0}, MOTOR_POSITION, 0.3 / 1.3, 1e-12),
+    ("elastic_joint", TWO_MASSES, START, POSITION, linear(AS_LINK, 0.2, 0.0, 0.2, 0.0), 3e-4),
+    ("elastic_joint", TWO_MASSES, START, MOTOR_POSITION, linear(AS_ROTOR, 0.2, 0.0, 0.2, 0.0), 3e-4),
+    ("elastic_joint", TWO_MASSES | {"compliance": 1e-7}, START, POSITION, linear(RIGID, 0.2, 0.0), 3e-4),
+    ("elastic_joint", TWO_MASSES, STANDS, MOTOR_POSITION, AT_REST, 1e-9),
+    ("elastic_joint", TWO_MASSES | {"gap": 0.2}, STANDS, MOTOR_POSITION, 0.05 + linear(ALONE, -0.05, 0.0), 2e-4),
     ("stiffening_elasticity", CUBIC, CLAMPED | {"command": 0.3}, MOTOR_POSITION, settled(BENT), 1e-9),
     ("stiffening_elasticity", CUBIC, CLAMPED | {"command": 0.3}, TORQUE, settled(KP * (0.3 - BENT)), 1e-9),
     *clamped("backlash", {"gap": 0.02}, 0.004, 0.004),
@@ -174,8 +188,9 @@ CLOSED_FORMS = (
     *clamped("backlash", {"gap": 0.02}, 0.03, 0.01),
     *clamped("backlash", {"gap": 0.02}, -0.05, -0.01),
     *clamped("backlash", {"gap": 0.02, "crossing": 0.05}, 0.008, CROSSED),
-    *clamped("backlash", {"smooth": 0.02, "softness": 0.002}, 0.05, settled(0.01)),
-    *clamped("backlash", {"smooth": 0.02, "softness": 0.002}, -0.05, settled(-0.01)),
+    *clamped("backlash", PLAY, 0.05, 0.01),
+    *clamped("backlash", PLAY, 0.0005 / SLOPE + 0.01 * np.tanh(0.5), 0.01 * np.tanh(0.5)),
+    *clamped("backlash", PLAY, -0.05, -0.01),
     ("backlash", {"play": 0.02}, {"v": 0.1}, MOTOR_POSITION, np.maximum(0.1 * T - 0.01, 0.0), 1e-9),
     ("backlash", {"play": 0.02}, {"v": -0.1}, MOTOR_POSITION, -np.maximum(0.1 * T - 0.01, 0.0), 1e-9),
     ("transmission_error", WAVE, {"v": 2.0}, MOTOR_POSITION, 2.0 * T + WAVES, 1e-9),
@@ -199,13 +214,19 @@ def test_a_joint_moves_as_the_closed_form_of_its_effect(row: tuple) -> None:
 
 # --- the same law in MuJoCo ------------------------------------------------------------------------------------------
 
-POSITION_SERVO = '<general joint="b" biastype="affine" gainprm="{kp}" biasprm="{bias} -{kp} -{kd}" {more}/>'
+POSITION_SERVO = '<general {of} biastype="affine" gainprm="{kp}" biasprm="{bias} -{kp} -{kd}" {more}/>'
 MOTOR = '<dcmotor joint="b" motorconst="1" resistance="1e9" {more}/>'
 SOLID = 'solreffriction="1e-4 1" solimpfriction="0.9999 0.9999 1 0.5 2"'
 
 
-def servo(kp: float = KP, kd: float = KD, bias: float = 0.0, more: str = "") -> str:
-    return POSITION_SERVO.format(kp=kp, kd=kd, bias=bias, more=more)
+MUJOCO_ROTOR = """<body><inertial pos="0 0 0" mass="1e-6" diaginertia="1e-3 1e-3 1e-3"/>
+<joint name="r" axis="0 1 0" stiffness="20" damping="0.01"/></body>"""
+SUM = """</actuator><tendon><fixed name="rotor"><joint joint="b" coef="1"/><joint joint="r" coef="1"/></fixed></tendon>
+<actuator>"""
+
+
+def servo(kp: float = KP, kd: float = KD, bias: float = 0.0, more: str = "", of: str = 'joint="b"') -> str:
+    return POSITION_SERVO.format(kp=kp, kd=kd, bias=bias, more=more, of=of)
 
 
 MUJOCO: dict[str, tuple[dict[str, float], dict[str, str]]] = {
@@ -222,6 +243,10 @@ MUJOCO: dict[str, tuple[dict[str, float], dict[str, str]]] = {
     "torque_saturation": ({"limit": 0.3}, {"actuator": servo(more='forcerange="-0.3 0.3"')}),
     "cogging": ({"joint_sine": 0.1, "harmonic": 9.0}, {"actuator": servo() + MOTOR.format(more='cogging="0.1 9 0"')}),
     "position_torque": ({"stiffness": 0.8, "bias": 0.2}, {"joint": 'stiffness="0.8" springref="0.25"'}),
+    "elastic_joint": (
+        TWO_MASSES,
+        {"joint": 'armature="0"', "body": MUJOCO_ROTOR, "actuator": servo(of='tendon="rotor"') + SUM},
+    ),
     "reflected_inertia": ({"excess": 0.004}, {"joint": 'armature="0.005"'}),
     "payload": (
         {"mass": 0.1, "distance": 0.15},

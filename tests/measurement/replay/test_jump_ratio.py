@@ -3,7 +3,7 @@ import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.measurement.replay.jump_ratio import jump_ratio
+from tactile_cube.measurement.replay.jump_ratio import free_way, jump_ratio
 from tests.drivetrain.rigs import wheel
 
 KP, STIFFNESS = 3.0, 20.0
@@ -17,7 +17,7 @@ def plant() -> Plant:
     return Plant([wheel()], dt=0.002, effects=(DELAY, LAG, BACKLASH), joint_names=["q"])
 
 
-def position_ratio(plant: Plant, *effects: object) -> float:
+def memory_of(plant: Plant, *effects: object) -> np.ndarray:
     one = np.ones(1)
     constants = DrivetrainConstants(
         kp=KP * one,
@@ -27,7 +27,11 @@ def position_ratio(plant: Plant, *effects: object) -> float:
         reflected_inertia=0.003 * one,
         torque_limit=one,
     )
-    memory = plant.memory(constants, gravity=(0.0, 0.0, 0.0), effects=list(effects))
+    return plant.memory(constants, gravity=(0.0, 0.0, 0.0), effects=list(effects))
+
+
+def position_ratio(plant: Plant, *effects: object) -> float:
+    memory = memory_of(plant, *effects)
     before = memory.copy()
     ratio = jump_ratio(plant, memory, np.zeros(1))[0]
     assert np.array_equal(memory, before)
@@ -46,8 +50,30 @@ def test_behind_a_delay_the_jump_comes_later_but_as_large(plant: Plant) -> None:
     assert position_ratio(plant, DELAY("q", delay=0.02)) == pytest.approx(PLAIN)
 
 
-def test_what_a_motor_follows_freely_within_a_gap_is_no_part_of_the_ratio(plant: Plant) -> None:
-    assert position_ratio(plant, BACKLASH("q", play=0.0, gap=0.02)) == pytest.approx(PLAIN)
+@pytest.mark.parametrize("values", [{"gap": 0.02}, {"smooth": 0.02, "softness": 0.003}])
+def test_what_a_motor_follows_freely_within_a_gap_is_no_part_of_the_ratio(plant: Plant, values: dict) -> None:
+    assert position_ratio(plant, BACKLASH("q", play=0.0, **values)) == pytest.approx(PLAIN)
+
+
+SMOOTH = {"smooth": 0.02, "softness": 0.003}
+
+
+@pytest.mark.parametrize(
+    ("values", "lead", "jump", "free"),
+    [  # beyond a gap of 0.02 rad all the time, within it all the time, coming out of it; crossing a smooth one
+        ({"gap": 0.02}, 0.1, 0.05, 0.0),
+        ({"gap": 0.02}, 0.001, 0.003, 0.003),
+        ({"gap": 0.02}, 0.1, 0.097, 0.007),
+        (SMOOTH, 0.003 / 2.0 + 0.01 * np.tanh(1.0), 0.003 / 2.0 + 0.01 * np.tanh(1.0), 0.01 * np.tanh(1.0)),
+        (SMOOTH, 0.1, 0.2, 0.02),
+    ],
+)
+def test_a_motor_follows_the_command_freely_as_far_as_its_gap_goes(
+    plant: Plant, values: dict, lead: float, jump: float, free: float
+) -> None:
+    """A torque of 0.003 N m leads by 0.0015 rad at 2 N m/rad, and by the softness' tanh(1) of half a smooth play."""
+    memory, one = memory_of(plant, BACKLASH("q", play=0.0, **values)), np.ones(1)
+    assert free_way(plant, memory, jump * one, lead * one, 2.0 * one) == pytest.approx(free, abs=1e-12)
 
 
 @pytest.mark.filterwarnings("error")

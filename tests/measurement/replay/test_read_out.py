@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.replay.read_out import before_steps, free_way, read_out
+from tactile_cube.measurement.replay.read_out import before_steps, read_out
 
 
 def test_the_next_command_is_not_felt_yet() -> None:
@@ -27,12 +27,9 @@ def test_a_torque_at_its_limit_does_not_jump() -> None:
     assert felt[0, 0] == 1.0
 
 
-@pytest.mark.parametrize(("lead", "jump", "free"), [(0.1, 0.05, 0.0), (0.001, 0.003, 0.003), (0.1, 0.097, 0.007)])
-def test_a_motor_follows_the_command_freely_as_far_as_the_gap_goes(lead: float, jump: float, free: float) -> None:
-    """A gap of 0.02 rad: beyond it all the time, within it all the time, and coming out of it."""
-    assert free_way(np.array([lead]), np.array([jump]), np.array([0.02])) == pytest.approx(free)
-    read, torque = read_out(np.zeros((1, 1)), np.zeros((1, 1)), jump, (0.1, 2.0), 1.0, free)  # type: ignore[arg-type]
-    assert (read[0, 0], torque[0, 0]) == pytest.approx((-free - 0.1 * (jump - free), -2.0 * (jump - free)))
+def test_what_a_motor_follows_freely_jumps_with_the_command() -> None:
+    read, torque = read_out(np.zeros((1, 1)), np.zeros((1, 1)), 0.05, (0.1, 2.0), 1.0, 0.007)  # type: ignore[arg-type]
+    assert (read[0, 0], torque[0, 0]) == pytest.approx((-0.007 - 0.1 * 0.043, -2.0 * 0.043))
 
 
 def test_before_a_step_of_the_command_the_row_goes_on_as_it_did() -> None:

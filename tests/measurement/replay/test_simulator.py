@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactile_cube.drivetrain.effects.backlash import Backlash
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.error import free_run_error
@@ -11,7 +12,7 @@ from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.known_force import force_torque
-from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.model import Model, Term
 from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Engine, Simulator, free_run
 from tests.measurement.small_rig import write
@@ -58,6 +59,15 @@ def test_a_clamped_link_shows_the_drive_stiffness(recording: Recording) -> None:
     ((result,),) = Simulator(recording).free_runs([nominal_model(recording)], [trial])
     slope = np.polyfit(result.torque[:, 0], result.position[:, 0], 1)[0]
     assert slope == pytest.approx(1 / 25.0, rel=1e-3)
+
+
+def test_a_free_run_starts_where_the_first_row_is_within_a_smooth_play(recording: Recording) -> None:
+    """3 N m/rad hold half of the softness' torque, at which the motor leads by 7 of 30 mrad."""
+    still = np.full_like(recording.trials[0].position, 0.1)
+    trial = replace(recording.trials[0], clamped=True, position=still, command=still + 0.5 * 0.004 / 3.0)
+    play = Term(Backlash, "a", {"play": 0.0, "gap": 0.0, "smooth": 0.03, "softness": 0.004, "crossing": 0.0}, ())
+    ((result,),) = Simulator(recording).free_runs([replace(nominal_model(recording), terms=(play,))], [trial])
+    assert result.position[:, 0] == pytest.approx(0.1, abs=1e-6)
 
 
 @pytest.mark.parametrize(("read", "felt"), [("after", 0), ("before", 1)])

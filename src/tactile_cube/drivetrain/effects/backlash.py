@@ -3,9 +3,46 @@
 from collections.abc import Mapping
 from math import exp, tanh
 
+import numpy as np
+
+from tactile_cube.compiled import compiled
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
 from tactile_cube.drivetrain.effects.scales import Scales
-from tactile_cube.drivetrain.signals import DAMPING, DEFLECTION, GAP, LEAD, MOTOR_POSITION, POSITION, TORQUE
+from tactile_cube.drivetrain.signals import (
+    DAMPING,
+    GAP,
+    LEAD,
+    LOOP_GAIN,
+    LOOSE_TORQUE,
+    MOTOR_POSITION,
+    POSITION,
+    TORQUE,
+)
+
+NEWTON_STEPS = 12
+SHOWN = 0.5
+"""Part of the link's motion that its sensor must show, or the link is free within its gap."""
+
+
+def torque_behind_play(torque: Array, drop: Array, softness: Array) -> Array:
+    """Return u softness with u softness + drop tanh(u) = torque: what is left when a smooth play has been crossed.
+
+    Newton's method from below the root, where the curve bends away: it never oversteps. Numbers or arrays.
+    """
+    ratio, most = drop / softness, np.abs(torque) / softness
+    u = np.maximum(most - ratio, most / (1.0 + ratio))
+    for _ in range(NEWTON_STEPS):
+        bent = np.tanh(u)
+        u += (most - u - ratio * bent) / (1.0 + ratio * (1.0 - bent * bent))
+    return np.sign(torque) * u * softness
+
+
+def smooth_lead(torque: Array, smooth: float, softness: float) -> Array:
+    """Return how far the motor leads in a smooth play under a torque [rad]."""
+    return 0.5 * smooth * np.tanh(torque / softness)
+
+
+_torque_behind_play = compiled(torque_behind_play)
 
 
 class Backlash(Effect):
@@ -48,6 +85,21 @@ class Backlash(Effect):
         return 4
 
     @staticmethod
+    def free_lead(lead: Array, p: Array, gain: Array) -> Array:
+        """Return how far the motor runs ahead within its gap (..., n) [rad].
+
+        Args:
+            lead: (..., n) signal LEAD [rad].
+            p: (..., n, 5) parameters.
+            gain: (..., n) signal LOOP_GAIN [N m/rad].
+        """
+        half, softness = 0.5 * p[..., 2], np.where(p[..., 3] > 0.0, p[..., 3], 1.0)
+        edge = np.where(p[..., 4] > 0.0, 0.0, 0.5 * p[..., 1])
+        first = np.clip(lead, -edge, edge)
+        torque = torque_behind_play(gain * (lead - first), gain * half, softness)
+        return np.asarray(first + smooth_lead(torque, p[..., 2], softness))
+
+    @staticmethod
     def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
         """Return the motor position [rad] without the drive's deflection and without the play."""
         half = 0.5 * p[1]
@@ -62,6 +114,15 @@ class Backlash(Effect):
                 if p[4] <= 0.0:
                     x[DAMPING, j] = 0.0
             reading += s[3]
+        if p[2] > 0.0:
+            gain, half = x[LOOP_GAIN, j], 0.5 * p[2]
+            loose = x[LOOSE_TORQUE, j] - gain * (reading - x[POSITION, j])
+            side = tanh(_torque_behind_play(loose, gain * half, p[3]) / p[3])
+            shown = 1.0 / (1.0 + gain * half * (1.0 - side * side) / p[3])
+            x[LEAD, j] = loose / gain + s[3]
+            x[DAMPING, j] *= shown
+            x[GAP, j] = 1.0 if shown > SHOWN else 2.0
+            reading += half * side
         return reading
 
     @staticmethod
@@ -77,8 +138,6 @@ class Backlash(Effect):
             s[0] = min(max(s[0] - (reading - s[2]), -half), half)
             s[2] = reading
             reading += s[0]
-        if p[2] > 0.0:  # in DEFLECTION too: the torque depends on it in the same step
-            lead = 0.5 * p[2] * tanh(x[TORQUE, j] / p[3])
-            x[DEFLECTION, j] += lead
-            reading += lead
+        if p[2] > 0.0:
+            reading += 0.5 * p[2] * tanh(x[TORQUE, j] / p[3])
         return reading + s[3]

@@ -14,6 +14,7 @@ from tactile_cube.drivetrain.signals import (
     MOTOR_POSITION,
     POSITION,
     ROWS,
+    SENSOR_VELOCITY,
     TIME,
     VELOCITY,
 )
@@ -97,23 +98,31 @@ def note_free(memory: Array, free: Array) -> None:
 
 
 @compiled
-def look_ahead(commands: Array, memory: Array, trial: Array, free: Array) -> None:
-    """Notes free joints in the steps to come, if any joint has a gap at all."""
+def copy_into(trial: Array, memory: Array) -> None:
+    """`trial[:] = memory`, whose general form takes the compiler seconds."""
+    for k in range(len(memory)):
+        trial[k] = memory[k]
+
+
+@compiled
+def look_ahead(commands: Array, first: int, last: int, memory: Array, trial: Array, free: Array) -> None:
+    """Notes free joints in the steps first..last of `commands` to come, if any joint has a gap at all."""
     gaps = 0.0
     for a in range(C * n):
         gaps += signals_of(a // n, memory)[GAP, a % n]
     if gaps > 0.0:
-        trial[:] = memory
-        for command in commands:
-            free_step(command, trial)
+        copy_into(trial, memory)
+        for k in range(first, min(last, len(commands))):
+            free_step(commands[k], trial)
             note_free(trial, free)
 
 
 @compiled
 def start_segment(position: Array, speed: Array, free: Array, trial: Array, memory: Array) -> None:
-    """Puts the sensor to its measured position and the joints to their measured speed; effects keep their past.
+    """Puts the sensor to its measured position and speed; effects keep their past.
 
-    `trial` has made the coming step already, which says how far the sensor is from the joint. A joint that is `free` of
+    `trial` has made the coming step already, which says how far the sensor is from the joint and how fast it leaves it.
+    A joint that is `free` of
     its sensor around the start goes on as it was.
     """
     for a in range(C * n):
@@ -121,7 +130,7 @@ def start_segment(position: Array, speed: Array, free: Array, trial: Array, memo
         x = signals_of(a // n, trial)
         if free[a] == 0.0:
             memory[plant.Q + a] = position[a] - (x[MOTOR_POSITION, column] - x[POSITION, column])
-            memory[plant.V + a] = speed[a]
+            memory[plant.V + a] = speed[a] - (x[SENSOR_VELOCITY, column] - x[VELOCITY, column])
 
 
 @compiled
@@ -138,7 +147,7 @@ def start_first(
 ) -> None:
     """The first start of a window, moved by its `initial_state`; the torque there is a guess at first."""
     for _ in range(4):
-        trial[:] = memory
+        copy_into(trial, memory)
         free_step(command, trial)
         start_segment(position, speed, free, trial, memory)
         for a in range(C * n):  # torques that are added after the closed form bend the drive from the start
@@ -174,12 +183,13 @@ def roll_segments(
             if part == 0:
                 start_first(commands[k], position[0], speed[0], initial_state, free, trial, memory)
             else:
-                look_ahead(commands[k : k + around], memory, trial, free)
-                trial[:] = memory
+                look_ahead(commands, k, k + around, memory, trial, free)
+                copy_into(trial, memory)
                 free_step(commands[k], trial)
                 start_segment(position[part], speed[part], free, trial, memory)
             move(correction, memory)
-            free[:] = 0.0
+            for a in range(C * n):
+                free[a] = 0.0
         elif (k - history) % segment >= segment - around:
             note_free(memory, free)
         row_of_steps(k, commands[k], history, substeps, memory, rows, out)

@@ -19,10 +19,13 @@ from tactile_cube.drivetrain.signals import (
     JOINT_TORQUE,
     LEAD,
     LOAD,
+    LOOP_GAIN,
+    LOOSE_TORQUE,
     MEASURED_VELOCITY,
     MOTOR_POSITION,
     POSITION,
     ROWS,
+    SENSOR_VELOCITY,
     TORQUE,
     VELOCITY,
     WEIGHT,
@@ -89,7 +92,12 @@ def drive(x: Array, c: int, dt: float, memory: Array) -> None:
     """Command to motor torque, q_m and the further torques on the joint."""
     read_sensors(x, c, dt, memory)
     control_torque(x, c, memory)
+    for j in range(n):
+        memory[plant.TRIAL + j] = x[DAMPING, j]
     plant.effects_motor_torque(x, c, dt, memory)
+    for j in range(n):
+        asked = memory[plant.TRIAL + j]
+        memory[plant.HELD_BACK + c * n + j] = 1.0 - x[DAMPING, j] / asked if asked > 0.0 else 0.0
     for j in range(n):
         x[DEFLECTION, j] = memory[plant.COMPLIANCE + c * n + j] * x[TORQUE, j]
     plant.effects_deflection(x, c, dt, memory)
@@ -107,13 +115,21 @@ def read_sensors(x: Array, c: int, dt: float, memory: Array) -> None:
     """The measured speed, and the part of q_m that needs no torque to be known."""
     for j in range(n):
         x[MEASURED_VELOCITY, j] = x[VELOCITY, j]
+        x[SENSOR_VELOCITY, j] = x[VELOCITY, j]
         x[DAMPING, j] = 1.0
         x[MOTOR_POSITION, j] = x[POSITION, j]
         x[ANGLE, j] = x[POSITION, j] + memory[plant.ANGLE_OFFSET + c * n + j]
     plant.effects_velocity_sensor(x, c, dt, memory)
     for j in range(n):
-        damped = memory[plant.KD + c * n + j] * x[MEASURED_VELOCITY, j] / memory[plant.KP + c * n + j]
+        a = c * n + j
+        kp, compliance = memory[plant.KP + a], memory[plant.COMPLIANCE + a] + memory[plant.EXTRA_COMPLIANCE + a]
+        damped = memory[plant.KD + a] * x[MEASURED_VELOCITY, j] / kp
         x[LEAD, j] = x[COMMAND, j] - x[POSITION, j] - damped
+        asked = kp * (x[COMMAND, j] - x[POSITION, j] - memory[plant.EXTRA + a])
+        asked = (asked - memory[plant.KD + a] * x[MEASURED_VELOCITY, j]) / (1.0 + kp * compliance)
+        passed = 1.0 - memory[plant.HELD_BACK + a]  # by the laws of the motor's torque
+        x[LOOP_GAIN, j] = passed * kp / (1.0 + kp * compliance)
+        x[LOOSE_TORQUE, j] = x[TORQUE, j] + passed * (asked - x[CONTROLLER_TORQUE, j])
         x[GAP, j] = 0.0
     plant.effects_position_sensor_ahead(x, c, dt, memory)
 

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import Plant
 from tactile_cube.drivetrain.effects.backlash import Backlash
-from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION, TORQUE
-from tactile_cube.measurement.replay.read_out import free_way
+from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
 from tactile_cube.measurement.replay.windows import SAFE
 
 Array = NDArray[np.float64]
+SEEN = MOTOR_POSITION, TORQUE, COMMAND, LEAD, LOOP_GAIN
 PROBE = 0.05  # [rad] beyond every dead zone
 NOTHING = 1e-9  # part of the probe below which it is rounding that passes
 
@@ -36,10 +36,10 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
         copy = memory.copy()
         plant.kernel.step(command, copy)
         plant.kernel.step(command + jump, copy)
-        seen.append([plant.signal(copy, row).copy() for row in (MOTOR_POSITION, TORQUE, COMMAND, LEAD)])
-    position, torque, acted, _ = np.array(seen[1]) - np.array(seen[0])
+        seen.append([plant.signal(copy, row).copy() for row in SEEN])
+    position, torque, acted = np.array(seen[1][:3]) - np.array(seen[0][:3])
     passed = np.abs(acted) > 0.5 * probe
-    free = free_way(seen[1][-1], acted, gaps(plant, memory))
+    free = free_way(plant, memory, acted, *seen[1][3:])
     passed &= np.abs(acted - free) > NOTHING * probe  # a gap wider than the probe lets nothing through
     position, acted = position - free, np.where(passed, acted - free, 1.0)
     plain = kp / (1.0 + kp * compliance)
@@ -47,10 +47,24 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
 
 
 def gaps(plant: Plant, memory: Array) -> Array:
-    """Width of the gap that each joint's motor moves through freely (n,) [rad]; 0 without one. `memory` is (size,)."""
+    """Width of the gap that each joint's motor moves through freely (..., n) [rad]; 0 without one."""
     if Backlash not in plant.effects:
         return np.zeros(len(plant.joint_names))
-    places = [[p.name for p in Backlash.parameters].index(name) for name in ("gap", "crossing")]
-    width, crossing = plant.view(memory, "parameters:backlash")[:, places].T
-    freely = (plant.view(memory, "active:backlash") != 0.0) & (crossing <= 0.0)
-    return np.asarray(np.where(freely, width, 0.0))
+    _, gap, smooth, _, crossing = np.moveaxis(plant.view(memory, "parameters:backlash"), -1, 0)
+    return np.asarray(np.where(crossing <= 0.0, gap, 0.0) + smooth)
+
+
+def free_way(plant: Plant, memory: Array, jump: Array, lead: Array, gain: Array) -> Array:
+    """The part of a jump of the command that a motor makes freely, within the gap of a transmission.
+
+    Args:
+        plant: the drivetrain.
+        memory: (..., size).
+        jump: (..., n) of the command [rad].
+        lead: (..., n) signal LEAD after the jump [rad].
+        gain: (..., n) signal LOOP_GAIN [N m/rad].
+    """
+    if Backlash not in plant.effects:
+        return np.zeros_like(jump)
+    p = plant.view(memory, "parameters:backlash")
+    return Backlash.free_lead(lead, p, gain) - Backlash.free_lead(lead - jump, p, gain)

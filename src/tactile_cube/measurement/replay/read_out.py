@@ -30,18 +30,6 @@ def simulated_jumps(acting: Array, windows: Windows) -> Array:
     return jumps
 
 
-def free_way(lead: Array, jump: Array, gap: Array) -> Array:
-    """The part of a jump of the command that a motor makes freely, within the gap of a transmission.
-
-    Args:
-        lead: (..., joints) signal LEAD after the jump [rad].
-        jump: (..., joints) of the command [rad].
-        gap: (joints,) widths, 0 without a gap [rad].
-    """
-    half = 0.5 * gap
-    return np.asarray(np.clip(lead, -half, half) - np.clip(lead - jump, -half, half))
-
-
 def read_out(
     position: Array,
     torque: Array,

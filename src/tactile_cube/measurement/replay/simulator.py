@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
+from tactile_cube.drivetrain.effects.backlash import Backlash, smooth_lead
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect
-from tactile_cube.drivetrain.signals import COMMAND, LEAD, MOTOR_POSITION, TORQUE
+from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.jump_ratio import gaps, jump_ratio
+from tactile_cube.measurement.replay.jump_ratio import free_way, gaps, jump_ratio
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.read_out import before_steps, free_way, read_out, simulated_jumps
+from tactile_cube.measurement.replay.read_out import before_steps, read_out, simulated_jumps
 from tactile_cube.measurement.replay.windows import SMOOTHING, Windows, asks_for_much, whole_trials
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ class Simulator:
         gap = gaps(self.plant, memory[0])
         ratios = self._jump_ratios(memory, windows)
         limit = self.plant.view(memory, "torque_limit")[:, None].copy()
-        rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, *([LEAD] if gap.any() else [])])
+        rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, *([LEAD, LOOP_GAIN] if gap.any() else [])])
         signals = np.zeros((len(windows), out.shape[2] * windows.substeps, len(rows), out.shape[3]))
         if self._world is not None:
             self._in_world(self._world, windows, memory, rows, signals)
@@ -179,7 +180,7 @@ class Simulator:
             self._in_closed_form(windows, correction, memory, rows, signals, pool)
         jump = simulated_jumps(signals[:, :, 2], windows)
         shown = signals[:, :: windows.substeps]
-        free = free_way(shown[:, :, 3], jump, gap) if gap.any() else 0.0
+        free = free_way(self.plant, memory[:, None], jump, shown[:, :, 3], shown[:, :, 4]) if gap.any() else 0.0
         position, torque = read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
         far = asks_for_much(jump, self.plant.view(memory, "kp")[:, None], limit)
         if far.any():
@@ -273,12 +274,18 @@ class Simulator:
         return position, torque
 
     def _links(self, model: Model, windows: Windows) -> Array:
-        """Link positions (S, n) near those of the first row: measured less the deflection of the plain drive."""
+        """Link positions (S, n) near those of the first row: measured less what the motor leads at the first torque."""
         constants = model.constants
         error = windows.commands[:, windows.history * windows.substeps] - windows.position[:, 0]
         torque = constants["kp"] * error - constants["kd"] * windows.speed[:, 0]
         limit = constants["torque_limit"]
-        return windows.position[:, 0] - np.clip(torque, -limit, limit) / constants["stiffness"]
+        torque = np.clip(torque, -limit, limit)
+        links = windows.position[:, 0] - torque / constants["stiffness"]
+        for term in model.terms:
+            if term.effect is Backlash:
+                j = self.recording.joints.index(term.joint)
+                links[:, j] -= smooth_lead(torque[:, j], term.values["smooth"], term.values["softness"])
+        return links
 
 
 def _pybullet(plant: Plant) -> RigWorld:
