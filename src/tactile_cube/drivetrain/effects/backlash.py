@@ -37,9 +37,9 @@ def torque_behind_play(torque: Array, drop: Array, softness: Array) -> Array:
     return np.sign(torque) * u * softness
 
 
-def smooth_lead(torque: Array, smooth: float, softness: float) -> Array:
+def smooth_lead(torque: Array, smooth: Array | float, softness: Array | float) -> Array:
     """Return how far the motor leads in a smooth play under a torque [rad]."""
-    return 0.5 * smooth * np.tanh(torque / softness)
+    return np.asarray(0.5 * smooth * np.tanh(torque / softness))
 
 
 _torque_behind_play = compiled(torque_behind_play)

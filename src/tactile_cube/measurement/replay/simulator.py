@@ -282,7 +282,7 @@ class Simulator:
         torque = np.clip(torque, -limit, limit)
         links = windows.position[:, 0] - torque / constants["stiffness"]
         for term in model.terms:
-            if term.effect is Backlash:
+            if term.effect is Backlash and term.values.get("smooth", 0.0) > 0.0:
                 j = self.recording.joints.index(term.joint)
                 links[:, j] -= smooth_lead(torque[:, j], term.values["smooth"], term.values["softness"])
         return links
