@@ -26,7 +26,7 @@ from tactile_cube.identification.search.residual_starts import residual_candidat
 from tactile_cube.identification.search.screening import Score, screen
 from tactile_cube.identification.search.shared_offset import shared_offset
 from tactile_cube.identification.search.shortlist import of_each, with_groups
-from tactile_cube.identification.search.simplicity import simplest
+from tactile_cube.identification.search.simplicity import named, simplest
 from tactile_cube.identification.search.special_laws import special_candidates
 from tactile_cube.identification.search.standard_model import standard_explanation
 from tactile_cube.identification.search.together import Proposal, Together
@@ -144,9 +144,13 @@ class Search(Division):
             ]
             if sets := Together(self, base, folds).run(self.leaders, best):
                 levels, surpassed, doubtful = [sets], found, []
-        found = [e for level in levels for e in level]
-        if found and (chosen := simplest(found, self.criteria)).explained(base) > self.criteria.most:
-            levels[-1] = (*levels[-1], *twins(self, chosen, base, found))
+        while found := [e for level in levels for e in level]:
+            chosen = simplest(found, self.criteria)
+            if chosen.explained(base) <= self.criteria.most or not (others := twins(self, chosen, base, found)):
+                break
+            levels[-1] = (*levels[-1], *others)
+            if len(named(simplest([*found, *others], self.criteria))) == len(named(chosen)):
+                break  # else fewer do as well, which may have others in their place too
         if not levels and base.largest_error <= self.criteria.floor:
             shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
             levels = [(shared,)] if shared else []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from tactile_cube.identification.search.evidence import worse
 from tactile_cube.identification.search.explanation import Explanation, without_effect
 from tactile_cube.identification.search.screening import screen
 from tactile_cube.identification.search.shortlist import with_groups
@@ -19,7 +20,7 @@ LEFT = 0.05  # share of what the effect explains that a brief refit of another l
 
 
 def twins(search: Search, chosen: Explanation, base: Explanation, found: Sequence[Explanation]) -> list[Explanation]:
-    """Return explanations with another law in the place of one of the chosen ones, of those not tried before.
+    """Return explanations as good, with another law in the place of one of the chosen ones, of those not tried before.
 
     The other effects and all constants are free. Without this, what is named hangs on the order in which effects were
     added: the second of two laws that do the same finds nothing left to explain. A law that contains the chosen one
@@ -51,8 +52,9 @@ def twins(search: Search, chosen: Explanation, base: Explanation, found: Sequenc
         near = [(candidate, fit) for candidate, fit in brief if fit.cost <= close]
         longer = [(candidate, search.continued(frozen, fit)) for candidate, fit in near]
         as_close = [pair for pair in longer if pair[1].cost <= AS_CLOSE * chosen.fit.cost]
-        others += [search.finish(parent, *one, len(as_close)) for one in as_close]
-    return others
+        finished = [search.finish(parent, *one, len(as_close)) for one in as_close]
+        others += [one for one in finished if not worse(one.judgement, chosen.judgement, search.criteria)]
+    return [search.pruned(one) for one in others]
 
 
 def without(search: Search, chosen: Explanation, place: int) -> Explanation:
