@@ -156,7 +156,7 @@ def test_a_sweep_keeps_its_record_in_its_own_folder(tmp_path: Path, monkeypatch:
     code = (
         "import sys\nfrom pathlib import Path\nfrom tactile_cube.cli import command\n"
         "def seen(config): print([*map(str, Path().rglob('.sweep-*'))], [*map(str, Path().iterdir())])\n"
-        "sys.argv = ['export', '-m', 'seed=1,2']\ncommand('export')(seen)()"
+        "sys.argv = ['export', '-m', 'name=one,two']\ncommand('export')(seen)()"
     )
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert re.search(r"\['outputs/export/\.sweep-\w+'\] \['outputs'\]", run.stdout)
