@@ -149,7 +149,7 @@ class Search(Division):
             if chosen.explained(base) <= self.criteria.most or not (others := twins(self, chosen, base, found)):
                 break
             levels[-1] = (*levels[-1], *others)
-            if len(named(simplest([*found, *others], self.criteria))) == len(named(chosen)):
+            if len(named(simplest([*found, *others], self.criteria))) >= len(named(chosen)):
                 break  # else fewer do as well, which may have others in their place too
         if not levels and base.largest_error <= self.criteria.floor:
             shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
