@@ -63,8 +63,13 @@ def test_a_changed_byte_anywhere_is_refused_in_one_line(tmp_path: Path, mask: in
 
 
 @pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.safetensors")), ids=lambda path: path.stem)
-def test_shipped_policies_are_read(path: Path) -> None:
-    load_policy(path)
+def test_shipped_policies_answer_differently_to_different_observations(path: Path) -> None:
+    actor, info = load_policy(path)
+    rest, bent = actor.deterministic(
+        torch.stack([torch.zeros(info.observation_size), torch.full((info.observation_size,), 0.3)])
+    )
+    assert rest.shape == (info.action_size,)
+    assert (rest - bent).abs().max() > 0.1
 
 
 def test_other_safetensors_file_is_refused(tmp_path: Path) -> None:
