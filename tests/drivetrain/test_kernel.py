@@ -13,7 +13,7 @@ import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import Effect, Parameter, Stage, find_effect, import_own_effects
-from tactile_cube.drivetrain.effects.backlash import Backlash
+from tactile_cube.drivetrain.effects.transmission import Backlash
 from tactile_cube.drivetrain.kernel import cache_directory, load_kernel
 from tactile_cube.errors import InputError
 from tests.drivetrain.rigs import finger, wheel

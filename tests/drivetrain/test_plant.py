@@ -15,8 +15,8 @@ from tactile_cube.drivetrain.effects import (
     TORQUE,
     VELOCITY,
 )
-from tactile_cube.drivetrain.effects.command_delay import CommandDelay
-from tactile_cube.drivetrain.effects.stribeck_friction import StribeckFriction
+from tactile_cube.drivetrain.effects.command import CommandDelay
+from tactile_cube.drivetrain.effects.friction import StribeckFriction
 from tactile_cube.errors import InputError
 from tests.drivetrain.effects.laws import CableDrag, HeavyTip
 from tests.drivetrain.rigs import finger, pendulum, wheel

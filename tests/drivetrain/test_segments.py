@@ -5,9 +5,8 @@ import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import Effect
-from tactile_cube.drivetrain.effects.backlash import Backlash
-from tactile_cube.drivetrain.effects.position_offset import PositionOffset
-from tactile_cube.drivetrain.effects.torque_bias import TorqueBias
+from tactile_cube.drivetrain.effects.motor import TorqueBias
+from tactile_cube.drivetrain.effects.transmission import Backlash, PositionOffset
 from tactile_cube.drivetrain.signals import MOTOR_POSITION
 from tests.drivetrain.rigs import wheel
 

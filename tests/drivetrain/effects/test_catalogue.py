@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.drivetrain.effects import Stage, catalogue, find_effect, import_own_effects, matching_joints, resolve
-from tactile_cube.drivetrain.effects.stribeck_friction import StribeckFriction
+from tactile_cube.drivetrain.effects.friction import StribeckFriction
 from tactile_cube.errors import InputError
 from tests.drivetrain.effects.laws import CableDrag
 

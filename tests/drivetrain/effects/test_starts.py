@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from tactile_cube.drivetrain.effects.elasticity import Elasticity
-from tactile_cube.drivetrain.effects.payload import Payload
+from tactile_cube.drivetrain.effects.mechanism import Payload
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales, unit_at
-from tactile_cube.drivetrain.effects.stiffening_elasticity import StiffeningElasticity
+from tactile_cube.drivetrain.effects.transmission import Elasticity, StiffeningElasticity
 
 CARRIAGE = Scales(
     torque=9.4, often=1.35, seldom=112.0, low=-0.116, high=0.1, speed=0.473, command_speed=0.517,

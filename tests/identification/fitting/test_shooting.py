@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue
-from tactile_cube.drivetrain.effects.backlash import Backlash
-from tactile_cube.drivetrain.effects.command_delay import CommandDelay
+from tactile_cube.drivetrain.effects.command import CommandDelay
+from tactile_cube.drivetrain.effects.transmission import Backlash
 from tactile_cube.identification.fitting.initial_states import with_initial_states
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.effects.backlash import Backlash
+from tactile_cube.drivetrain.effects.transmission import Backlash
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.error import free_run_error

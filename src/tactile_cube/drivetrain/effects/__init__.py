@@ -5,10 +5,10 @@ from tactile_cube.drivetrain.effects.catalogue import (
     find_effect,
     import_own_effects,
     matching_joints,
+    parse_effect,
     resolve,
 )
 from tactile_cube.drivetrain.effects.effect import Effect, Parameter, Place, Stage
-from tactile_cube.drivetrain.effects.effect_text import parse_effect
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
     ANGLE,

@@ -4,55 +4,19 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from tactile_cube.did_you_mean import suggestion
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.errors import InputError
 
 EffectClass = type[Effect]
-CATALOGUE_MODULES = (
-    "command_dead_zone",
-    "rate_limit",
-    "command_delay",
-    "integral_action",
-    "gravity_compensation",
-    "velocity_feedforward",
-    "torque_gain",
-    "torque_curve",
-    "torque_bias",
-    "torque_crosstalk",
-    "cogging",
-    "actuator_lag",
-    "torque_saturation",
-    "back_emf",
-    "elastic_joint",
-    "velocity_filter_lag",
-    "elasticity",
-    "stiffening_elasticity",
-    "transmission_error",
-    "position_offset",
-    "backlash",
-    "viscous_friction",
-    "nonlinear_drag",
-    "position_torque",
-    "joint_coupling",
-    "joint_stop",
-    "coulomb_friction",
-    "stribeck_friction",
-    "load_dependent_friction",
-    "asymmetric_friction",
-    "friction_drift",
-    "presliding_friction",
-    "reflected_inertia",
-    "payload",
-    "mount_tilt",
-    "coupling_error",
-)
-"""Files of this folder, in the order in which effects of one stage act."""
+CATALOGUE_MODULES = ("command", "motor", "transmission", "joint_torque", "friction", "mechanism")
+"""Files of this folder; effects of one stage act in the order in which these define them."""
 
 
 @cache
@@ -80,6 +44,30 @@ def find_effect(name: str) -> EffectClass:
             f"{suggestion(name, catalogue())}"
         )
     return _own_effect(name)
+
+
+def parse_effect(text: str, find: Callable[[str], Any] = find_effect) -> tuple[str, dict[str, float]]:
+    """Return `NAME@JOINT` and parameter -> value; parameters that are not given take their typical values.
+
+    Args:
+        text: as a user writes it.
+        find: returns the effect of a name.
+
+    Raises:
+        InputError: an unknown effect or parameter, or a value that is no number.
+    """
+    name, _, assignments = text.partition(":")
+    name = name.strip()
+    parameters = {one.name: one.typical for one in find(name.partition("@")[0]).parameters}
+    for assignment in filter(None, (part.strip() for part in assignments.split(","))):
+        key, equals, value = (part.strip() for part in assignment.partition("="))
+        if key not in parameters or not equals:
+            raise InputError(f"effect: '{assignment}' in '{text}': {name} has the parameters {sorted(parameters)}")
+        try:
+            parameters[key] = float(value)
+        except ValueError:
+            raise InputError(f"effect: '{assignment}' in '{text}': '{value}' is no number") from None
+    return name, parameters
 
 
 def import_own_effects(names: Iterable[str]) -> None:

@@ -64,6 +64,14 @@ class Parameter:
         return replace(self, **sizes, scale=scale, unit=unit_at(self.unit, scales.slides))
 
 
+def harmonic(source: str) -> Parameter:
+    """Return the parameter `harmonic`: repetitions in 2 pi rad of the joint [1/rad].
+
+    Its scale is a change that moves the ripple by a part of a period at the end of the range.
+    """
+    return Parameter("harmonic", "1/rad", neutral=10.0, low=1.0, high=250.0, typical=10.0, source=source, scale=0.5)
+
+
 @dataclass(frozen=True)
 class Place:
     """The joint that a mechanism effect changes.

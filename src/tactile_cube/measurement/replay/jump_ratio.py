@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import Plant
-from tactile_cube.drivetrain.effects.backlash import Backlash
+from tactile_cube.drivetrain.effects.transmission import Backlash
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
 from tactile_cube.measurement.replay.windows import SAFE
 

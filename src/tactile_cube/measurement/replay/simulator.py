@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects.backlash import Backlash, smooth_lead
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording

@@ -1,4 +1,6 @@
-"""A command or torque that is ignored while it is small."""
+"""What happens to a command before the controller has it."""
+
+from math import ceil
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
 from tactile_cube.drivetrain.effects.scales import Scales
@@ -72,3 +74,88 @@ class CommandDeadZone(Effect):
         if abs(x[TORQUE, j]) < p[4]:
             x[DAMPING, j] = 0.0
         return x[TORQUE, j] - min(max(x[TORQUE, j], -p[4]), p[4])
+
+
+RATES = (0.8, 0.4, 0.15)
+"""Limits at which a search starts, as parts of the fastest command."""
+
+
+class RateLimit(Effect):
+    """Command that the drive lets change only at a limited speed.
+
+    |dq_d / dt| <= speed.
+
+    In data: an error during fast commands only, which ends some time after them.
+    Confused with: `torque_saturation`; `actuator_lag`.
+    Source: set-point generators of servo drives.
+    """
+
+    name = "rate_limit"
+    stage = Stage.COMMAND
+    parameters = (
+        Parameter(
+            "speed", unit="rad/s", neutral=1e9, low=0.02, high=1e9, typical=1.0, source="below the fastest command"
+        ),
+    )
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Return limits below the fastest command."""
+        return [{"speed": share * scales.command_speed} for share in RATES]
+
+    @classmethod
+    def state_size(cls, dt: float) -> int:
+        """Return 2: limited command, first-call flag."""
+        return 2
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the command [rad]."""
+        if s[1] == 0.0:
+            s[0] = x[COMMAND, j]
+            s[1] = 1.0
+        step = p[0] * dt
+        s[0] = s[0] + min(max(x[COMMAND, j] - s[0], -step), step) if abs(x[COMMAND, j] - s[0]) > step else x[COMMAND, j]
+        return s[0]
+
+
+LONGEST = 0.1
+"""Longest delay that the state can hold [s]."""
+STEPS = 50
+"""Least number of steps that the state can hold."""
+
+
+class CommandDelay(Effect):
+    """Command that reaches the controller late.
+
+    q_d(t) = command(t - delay), interpolated between time steps, so that a fit can change the delay smoothly.
+
+    In data: an error proportional to the command's speed; its phase grows linearly with the frequency.
+    Confused with: `actuator_lag` and `velocity_filter_lag` in slow motion.
+    Source: bus, scheduler and filters of a controller, 2-60 ms.
+    """
+
+    name = "command_delay"
+    stage = Stage.COMMAND
+    parameters = (Parameter("delay", "s", 0.0, 0.0, LONGEST, 0.02, "2-60 ms"),)
+
+    @classmethod
+    def state_size(cls, dt: float) -> int:
+        """Return the size of: first-call flag, write index, ring of past commands."""
+        return 4 + max(STEPS, ceil(LONGEST / dt - 1e-9))
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the command [rad]."""
+        length = len(s) - 2
+        if s[0] == 0.0:
+            s[:] = x[COMMAND, j]
+            s[0], s[1] = 1.0, 0.0
+        newest = int(s[1])
+        s[2 + newest] = x[COMMAND, j]
+        s[1] = (newest + 1) % length
+        steps = min(max(p[0] / dt, 0.0), length - 2.0)
+        whole = int(steps)
+        later = s[2 + (newest - whole) % length]
+        earlier = s[2 + (newest - whole - 1) % length]
+        return later + (steps - whole) * (earlier - later)

@@ -1,0 +1,426 @@
+"""Between motor and link, and what the sensors there report."""
+
+from collections.abc import Mapping
+from math import asinh, cos, exp, pi, sin, sinh, sqrt, tanh
+
+import numpy as np
+
+from tactile_cube.compiled import compiled
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Place, Stage, View, harmonic
+from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.signals import (
+    ACCELERATION,
+    ANGLE,
+    DAMPING,
+    DEFLECTION,
+    GAP,
+    LEAD,
+    LOAD,
+    LOOP_GAIN,
+    LOOSE_TORQUE,
+    MEASURED_VELOCITY,
+    MOTOR_POSITION,
+    POSITION,
+    SENSOR_VELOCITY,
+    TORQUE,
+    VELOCITY,
+)
+
+RESONANCES = (8.0, 16.0, 32.0)
+"""Where a search starts at a finger [Hz], with half of the joint's inertia in the rotor."""
+DAMPING_RATIO = 0.03
+
+
+class ElasticJoint(Effect):
+    """Rotor that a spring connects with the link; controller and sensor see the rotor.
+
+    rotor th'' = tau - s, M_link q'' + h = s, s = (th - q) / compliance + damping (th' - q'), of th - q what is beyond
+    half of `gap`. The rotor is a part of the joint's stated inertia. Dry friction acts on the link.
+
+    In data: a resonance at sqrt((1 / rotor + 1 / M_link) / compliance) in what the motor's sensor shows.
+    Confused with: `elasticity` far below the resonance, `actuator_lag`.
+    Source: Spong, Modeling and control of elastic joint robots, 1987.
+    """
+
+    name = "elastic_joint"
+    stage = Stage.VELOCITY_SENSOR
+    contains = ("elasticity",)
+    parameters = (
+        Parameter("compliance", "rad/(N m)", 0.0, 0.0, 1.0, 0.05, "5-50 N m/rad"),
+        Parameter("rotor", "kg m^2", 0.0, 0.0, 0.0049, 0.0025, "gears are chosen for a rotor like the load"),
+        Parameter("damping", "N m s/rad", 0.0, 0.0, 0.2, 0.01, "2-5 % of critical"),
+        Parameter("gap", "rad", 0.0, 0.0, 0.15, 0.0, "0.1-1 deg", scale=0.005),
+    )
+
+    forms = ({"compliance": 0.05, "rotor": 0.0025, "damping": 0.01},)
+    details = ("gap",)
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Return springs with the resonances of `RESONANCES` at this joint's inertia."""
+        found = []
+        for resonance in RESONANCES:
+            fast = 2.0 * pi * resonance / scales.time
+            spring = fast * fast * 0.25 * scales.inertia
+            damping = 2.0 * DAMPING_RATIO * spring / fast
+            found.append({"compliance": 1.0 / spring, "rotor": 0.5 * scales.inertia, "damping": damping})
+        return found
+
+    @classmethod
+    def state_size(cls, dt: float) -> int:
+        """Return 6: th - q, th' - q', first-call flag, last q', rotor's mean speed at a resting link, its slope."""
+        return 6
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the rotor's speed [rad/s]; the last step is completed, now that the link's motion is known.
+
+        Relative angle and speed are kept: a simulation that is started anew moves rotor and link together.
+        """
+        if p[0] <= 0.0:
+            return x[MEASURED_VELOCITY, j]
+        if s[2] == 0.0:
+            s[2] = 1.0
+            s[0] = p[0] * x[LOAD, j]
+        else:
+            change = dt * x[ACCELERATION, j]
+            mean = s[4] + s[5] * (s[3] + 0.5 * change)
+            s[1] = 2.0 * (mean - s[3]) - s[1] - change
+            s[0] += dt * s[1]
+        s[3] = x[VELOCITY, j]
+        x[SENSOR_VELOCITY, j] += s[1]
+        return x[MEASURED_VELOCITY, j] + s[1]
+
+    @staticmethod
+    def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the rotor's angle [rad]."""
+        return x[MOTOR_POSITION, j] + s[0]
+
+    @staticmethod
+    def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the spring's torque on the link [N m].
+
+        Newmark's mean over three steps for the spring, at the mean speeds of rotor and link: stable at any stiffness,
+        exact in the limit of a rigid joint. The link's speed is found later: DAMPING is what the spring makes of it,
+        less the rotor's inertia, which the spring takes off the joint's.
+        """
+        if p[0] <= 0.0:
+            return x[TORQUE, j]
+        spring, damping, beyond = 1.0 / p[0], p[2], s[0]
+        if p[3] > 0.0:
+            beyond -= min(max(s[0], -0.5 * p[3]), 0.5 * p[3])
+            if beyond == 0.0:
+                spring = damping = 0.0
+        inertia = 2.0 * p[1] / dt
+        own, pull = inertia + x[DAMPING, j], 0.5 * dt * spring + damping
+        now = spring * (beyond - 0.5 * dt * s[1])
+        s[5] = pull / (own + pull) if own + pull > 0.0 else 0.0
+        s[4] = (own * (x[VELOCITY, j] + s[1]) + x[TORQUE, j] - now) / (own + pull) if own + pull > 0.0 else 0.0
+        x[DAMPING, j] = own * s[5] - inertia
+        return now + pull * s[4] - own * s[5] * x[VELOCITY, j]
+
+
+class VelocityFilterLag(Effect):
+    """Damping that acts on a filtered velocity.
+
+    time_constant * v_f' = v - v_f: the controller's velocity passes a first-order low-pass, and a second one where
+    `second` is above zero.
+
+    In data: less damping than stated in fast motion; overshoot.
+    Confused with: `command_delay` and `actuator_lag` in slow motion.
+    Source: any controller that differentiates an encoder; the filters of servo drives are of first or second order.
+    """
+
+    name = "velocity_filter_lag"
+    stage = Stage.VELOCITY_SENSOR
+    parameters = (
+        Parameter("time_constant", unit="s", neutral=0.0, low=0.0, high=0.5, typical=0.005, source="1-30 ms"),
+        Parameter("second", unit="s", neutral=0.0, low=0.0, high=0.5, typical=0.0, source="as the first, or none"),
+    )
+
+    forms = ({"time_constant": 0.005},)
+    details = ("second",)
+
+    @classmethod
+    def state_size(cls, dt: float) -> int:
+        """Return 6: first-call flag, last speed; for each filter its output and the share of its last input in that."""
+        return 6
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the measured velocity [rad/s], exact for an input that is linear from step to step.
+
+        The speed of a step is that of its middle. The last step's state is moved to its end before it is used.
+        """
+        asked = x[MEASURED_VELOCITY, j]
+        if p[0] <= 0.0:
+            return asked
+        if s[0] == 0.0:
+            s[0] = 1.0
+            s[1] = asked
+            s[2] = asked
+            s[4] = asked
+        later = 0.5 * dt * x[ACCELERATION, j]
+        before = s[1] + later
+        s[1] = asked
+        for k in range(2, 6, 2):
+            time_constant = p[k // 2 - 1]
+            if time_constant > 0.0:
+                later *= s[k + 1]
+                last = s[k] + later
+                kept = exp(-dt / time_constant)
+                mean = (1.0 - kept) * time_constant / dt
+                x[DAMPING, j] *= 1.0 - mean
+                s[k] = kept * last + (mean - kept) * before + (1.0 - mean) * asked
+                s[k + 1] = 1.0 - mean
+                before, asked = last, s[k]
+        return asked
+
+
+STIFF = 0.03
+"""Compliance of a stiffly controlled machine at which a search starts, as a part of a finger's."""
+
+
+class Elasticity(Effect):
+    """Drive that is softer than stated.
+
+    q_m - q = tau (1 / K_e + compliance): a linear spring in series with the nominal stiffness K_e.
+
+    In data: an error in phase with the torque; a resonance.
+    Confused with: `backlash` in motion of one amplitude; `torque_gain`.
+    Source: Sievers et al., ICRA 2022, eq. (2); Spong, Modeling and control of elastic joint robots, 1987.
+    """
+
+    name = "elasticity"
+    stage = Stage.MECHANISM
+    parameters = (Parameter("compliance", "rad/(N m)", 0.0, -0.03, 1.0, 0.05, "5-50 N m/rad"),)
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Return the compliance of a finger's drive at this joint's sizes, and that of a stiffly controlled machine."""
+        (form,) = cls.forms_at(scales)
+        return [{"compliance": part * form["compliance"]} for part in (1.0, STIFF)]
+
+    @staticmethod
+    def configure(view: View, place: Place, p: Array) -> None:
+        """Add to the drive's compliance."""
+        view("compliance")[..., place.joint] += p[..., 0]
+
+
+CUBIC = (0.01, 0.1, 1.0)
+"""Torques at which the cubic part of the spring equals the linear one where a search starts, in usual torques."""
+
+
+class StiffeningElasticity(Effect):
+    """Tendon or belt that gets stiffer as it is pulled.
+
+    tau = K d + cubic * d^3 with 1 / K = 1 / K_e + compliance, d = q_m - q.
+
+    In data: odd harmonics; soft at small torques, stiff at large ones.
+    Confused with: `elasticity` in motion of one amplitude; two preloads separate them.
+    Source: Palli et al., tendon transmissions; Spong 1987 with a cubic spring.
+    """
+
+    name = "stiffening_elasticity"
+    stage = Stage.DEFLECTION
+    contains = ("elasticity",)
+    parameters = (
+        Parameter("compliance", "rad/(N m)", 0.0, 0.0, 2.0, 0.1, "slack tendons: 2-20 N m/rad"),
+        Parameter("cubic", "N m/rad^3", 0.0, 0.0, 10000000.0, 2000.0, "as large as the linear part at 10-50 mrad"),
+    )
+
+    forms = ({"compliance": 0.1, "cubic": 2e3},)
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Return springs whose cubic part is as large as the linear one at the torques of `CUBIC`."""
+        (form,) = cls.forms_at(scales)
+        springs = (form["compliance"], STIFF * form["compliance"])
+        return [
+            {"compliance": soft, "cubic": 1.0 / (soft**3 * (part * scales.torque) ** 2)}
+            for soft in springs
+            for part in CUBIC
+        ]
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the deflection q_m - q [rad]: the real root of cubic * d^3 + K d = tau (Cardano)."""
+        torque = x[TORQUE, j]
+        deflection = x[DEFLECTION, j] + p[0] * torque
+        if p[1] <= 0.0 or torque * deflection <= 0.0:
+            return deflection
+        linear = torque / deflection / p[1]
+        half_width = sqrt(linear / 3.0)
+        return 2.0 * half_width * sinh(asinh(1.5 * torque / p[1] / (linear * half_width)) / 3.0)
+
+
+class TransmissionError(Effect):
+    """Position error that repeats with the turn of a gear.
+
+    q_m += sine * sin(harmonic q) + cosine * cos(harmonic q).
+
+    In data: a wave over the position, at any torque.
+    Confused with: `cogging`, whose error depends on the stiffness of control.
+    Source: Tuttle and Seering, A nonlinear model of a harmonic drive gear transmission, 1996.
+    """
+
+    name = "transmission_error"
+    stage = Stage.POSITION_SENSOR
+    parameters = (
+        Parameter("sine", unit="rad", neutral=0.0, low=-0.02, high=0.02, typical=0.003, source="1 arcmin to 0.5 deg"),
+        Parameter("cosine", unit="rad", neutral=0.0, low=-0.02, high=0.02, typical=0.0, source="1 arcmin to 0.5 deg"),
+        harmonic(source="eccentric pulleys to teeth"),
+    )
+
+    forms = ({"sine": 0.003, "cosine": 0.0, "harmonic": 10.0},)
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the motor position [rad]."""
+        angle = p[2] * x[ANGLE, j]
+        return x[MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)
+
+
+class PositionOffset(Effect):
+    """Encoder whose zero is wrong by the same angle in every initialisation.
+
+    q_m += offset.
+
+    In data: a constant error of the position, and an error of the weight's torque like cos q.
+    Confused with: the joint offset of an initialisation, `payload`, `torque_bias`.
+    Source: Sievers et al., ICRA 2022: joint-angle offsets dominate the model error.
+    """
+
+    name = "position_offset"
+    constant_reading = "offset"
+    stage = Stage.POSITION_SENSOR
+    parameters = (Parameter("offset", unit="rad", neutral=0.0, low=-0.3, high=0.3, typical=0.02, source="0.5-3 deg"),)
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the motor position [rad]."""
+        return x[MOTOR_POSITION, j] + p[0]
+
+
+NEWTON_STEPS = 12
+SHOWN = 0.5
+"""Part of the link's motion that its sensor must show, or the link is free within its gap."""
+
+
+def torque_behind_play(torque: Array, drop: Array, softness: Array) -> Array:
+    """Return u softness with u softness + drop tanh(u) = torque: what is left when a smooth play has been crossed.
+
+    Newton's method from below the root, where the curve bends away: it never oversteps. Numbers or arrays.
+    """
+    ratio, most = drop / softness, np.abs(torque) / softness
+    u = np.maximum(most - ratio, most / (1.0 + ratio))
+    for _ in range(NEWTON_STEPS):
+        bent = np.tanh(u)
+        u += (most - u - ratio * bent) / (1.0 + ratio * (1.0 - bent * bent))
+    return np.sign(torque) * u * softness
+
+
+def smooth_lead(torque: Array, smooth: Array | float, softness: Array | float) -> Array:
+    """Return how far the motor leads in a smooth play under a torque [rad]."""
+    return np.asarray(0.5 * smooth * np.tanh(torque / softness))
+
+
+_torque_behind_play = compiled(torque_behind_play)
+
+
+class Backlash(Effect):
+    """Play between motor and link, in its three usual descriptions.
+
+    - `play`: hysteresis of the reading. The motor encoder keeps its value until the link has moved through the gap.
+    - `gap`: dead band of the spring. Within it the motor carries no torque and stands where its controller asks for
+      none; on either flank it leads or lags by half a gap. Oil in the gap brings the motor 63 % of the way to that
+      place in the time `crossing`, and pulls the link meanwhile.
+    - `smooth`: the motor leads or lags by half of this angle as the torque changes its sign, softly over torques of
+      `softness`. Seals or grease carry the motor through its gap.
+
+    In data: a flat spot of fixed width in the position after each reversal, at any speed.
+    Confused with: `elasticity` and `stribeck_friction` in motion of one amplitude; a preload removes backlash.
+    Source: Nordin and Gutman, Controlling mechanical systems with backlash, 2002.
+    """
+
+    name = "backlash"
+    stage = Stage.POSITION_SENSOR
+    contains = ("elasticity",)
+    parameters = (
+        Parameter("play", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.01, source="0.1-1 deg"),
+        Parameter("gap", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.0, source="0.1-1 deg"),
+        Parameter("smooth", unit="rad", neutral=0.0, low=0.0, high=0.15, typical=0.0, source="0.1-1 deg"),
+        Parameter("softness", unit="N m", neutral=0.01, low=1e-4, high=0.5, typical=0.01, source="torque of a seal"),
+        Parameter("crossing", unit="s", neutral=0.0, low=0.0, high=0.2, typical=0.0, source="oil; ms", scale=0.005),
+    )
+
+    forms = ({"play": 0.01}, {"gap": 0.01}, {"smooth": 0.01, "softness": 0.01})
+    details = ("crossing",)
+
+    @classmethod
+    def details_at(cls, scales: Scales, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Return `crossing` where there is a gap to cross."""
+        return cls.details if values["gap"] > 0.0 else ()
+
+    @classmethod
+    def state_size(cls, dt: float) -> int:
+        """Return 4: offset within the play, first-call flag, last reading, offset within the gap."""
+        return 4
+
+    @staticmethod
+    def free_lead(lead: Array, p: Array, gain: Array) -> Array:
+        """Return how far the motor runs ahead within its gap (..., n) [rad].
+
+        Args:
+            lead: (..., n) signal LEAD [rad].
+            p: (..., n, 5) parameters.
+            gain: (..., n) signal LOOP_GAIN [N m/rad].
+        """
+        half, softness = 0.5 * p[..., 2], np.where(p[..., 3] > 0.0, p[..., 3], 1.0)
+        edge = np.where(p[..., 4] > 0.0, 0.0, 0.5 * p[..., 1])
+        first = np.clip(lead, -edge, edge)
+        torque = torque_behind_play(gain * (lead - first), gain * half, softness)
+        return np.asarray(first + smooth_lead(torque, p[..., 2], softness))
+
+    @staticmethod
+    def ahead_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the motor position [rad] without the drive's deflection and without the play."""
+        half = 0.5 * p[1]
+        reading = x[MOTOR_POSITION, j]
+        if half > 0.0:
+            x[LEAD, j] -= reading - x[POSITION, j]
+            lead = x[LEAD, j] if p[4] <= 0.0 else x[LEAD, j] + exp(-dt / p[4]) * (s[3] - x[LEAD, j])
+            s[3] = min(max(lead, -half), half)
+            x[GAP, j] = 1.0
+            if abs(lead) < half:
+                x[GAP, j] = 2.0
+                if p[4] <= 0.0:
+                    x[DAMPING, j] = 0.0
+            reading += s[3]
+        if p[2] > 0.0:
+            gain, half = x[LOOP_GAIN, j], 0.5 * p[2]
+            loose = x[LOOSE_TORQUE, j] - gain * (reading - x[POSITION, j])
+            side = tanh(_torque_behind_play(loose, gain * half, p[3]) / p[3])
+            shown = 1.0 / (1.0 + gain * half * (1.0 - side * side) / p[3])
+            x[LEAD, j] = loose / gain + s[3]
+            x[DAMPING, j] *= shown
+            x[GAP, j] = 1.0 if shown > SHOWN else 2.0
+            reading += half * side
+        return reading
+
+    @staticmethod
+    def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
+        """Return the motor position [rad]."""
+        reading = x[MOTOR_POSITION, j]
+        if p[0] > 0.0:
+            half = 0.5 * p[0]
+            if s[1] == 0.0:
+                s[0] = 0.0
+                s[2] = reading
+                s[1] = 1.0
+            s[0] = min(max(s[0] - (reading - s[2]), -half), half)
+            s[2] = reading
+            reading += s[0]
+        if p[2] > 0.0:
+            reading += 0.5 * p[2] * tanh(x[TORQUE, j] / p[3])
+        return reading + s[3]
