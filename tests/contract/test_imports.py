@@ -16,7 +16,8 @@ SOURCE = ROOT / "src"
 def test_every_command_can_be_imported() -> None:
     # in a process of its own: a command's module takes the place of the package's function of that name
     imports = "".join(f"from tactile_cube.{name} import main\nassert callable(main)\n" for name in commands())
-    subprocess.run([sys.executable, "-c", imports], check=True)
+    done = subprocess.run([sys.executable, "-c", imports], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def imports_of_the_package(text: str) -> set[tuple[str, str]]:

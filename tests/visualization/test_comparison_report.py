@@ -196,17 +196,20 @@ def test_a_diagnosis_with_an_object_shows_its_error_and_what_identify_takes(
     assert "effects=[command_delay@a,lateral_friction]" in text
 
 
-def test_an_ambiguous_diagnosis_names_the_next_experiment(comparison: Comparison, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("told", "said"), [(4.0, "4"), (9e7, "more than 100")])
+def test_an_ambiguous_diagnosis_names_the_next_experiment(
+    comparison: Comparison, tmp_path: Path, told: float, said: str
+) -> None:
     unsure = DIAGNOSIS | {"verdict": "ambiguous", "next_experiment": "next_experiment.csv"}
     time = np.linspace(0, 1, 50)
     wave = np.sin(time)[:, None] * [1.0, 1.0]
     predictions = {"command_delay@a": wave, "actuator_lag@a": 1.01 * wave}
-    experiment = Experiment("multisine", ("a", "b"), time, wave, 4.0, "a", predictions, half_used(2))
+    experiment = Experiment("multisine", ("a", "b"), time, wave, told, "a", predictions, half_used(2))
     report = diagnosis_report(unsure, comparison, None, "cmd", experiment=experiment)
     text = page(report, tmp_path / "d.html")
     assert "What to record next" in text
     assert "next_experiment.csv" in text
-    assert "Each should give 4 times the evidence" in text
+    assert f"Each should give {said} times the evidence" in text
     assert "multisine at 64 % of full size, 1 s" in text
     assert "stop beyond: position" in text
     assert "-0.9 to 0.9 rad (URDF)" in text

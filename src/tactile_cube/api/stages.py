@@ -106,7 +106,7 @@ def overview(stages: Sequence[Stage], results: Sequence[TrainingResult]) -> str:
 
 
 def judged(job: Job, last: Path) -> str:
-    """Write the mean of the last stage's policies, and try it in worlds that it was not trained in, in both engines."""
+    """Write the mean of the last stage's policies, and judge it in fresh draws of its worlds, in both engines."""
     from tactile_cube.agent.averaging import averaged, kept_policies
     from tactile_cube.agent.policy_file import save_policy
     from tactile_cube.api.evaluation import evaluate

@@ -45,25 +45,8 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
         "joint_range": {"lower": _plain(hand.lower), "upper": _plain(hand.upper), "unit": "rad"},
         "task": _task(setting),
         "start_angles": {"angles": _plain(hand.start_angles), "unit": "rad", "homing": asdict(Homing())},
-        "observation": {
-            "name": "observation",
-            "shape": ["batch", network.observation_size],
-            "dtype": "float32",
-            "readings": network.observation_size // reading_size(hand),
-            "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
-            "unit": "rad, not scaled",
-            "at_start": "the first reading fills all places",
-        },
-        "action": {
-            "name": "action",
-            "shape": ["batch", network.action_size],
-            "dtype": "float32",
-            "range": [-1.0, 1.0],
-            "meaning": "q_n = 0.5 * (lower + upper) + 0.5 * (upper - lower) * action, desired joint angles",
-            "lower": _plain(hand.action_lower),
-            "upper": _plain(hand.action_upper),
-            "unit": "rad",
-        },
+        "observation": _observation(network, hand),
+        "action": _action(network, hand),
         "rates": {"policy_hz": POLICY_RATE, "fast_loop_hz": {"simulation": 500, "robot": 1000}},
         "target_filter": {
             "law": "q_f += (1 - exp(-dt / T_s)) * (q_n - q_f), in the fast loop; starts at the measured angles",
@@ -90,6 +73,33 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
         "test_vector": _test_vector(network, hand) | {"tolerance": TOLERANCE},
         "sha256": {"weights": weights_hash(network), "of": "weight0, bias0, weight1, ... as little-endian float32"},
         "policy": {key: value for key, value in network.info.items() if key != "config"},
+    }
+
+
+def _observation(network: Network, hand: Hand) -> dict[str, Any]:
+    """What the policy reads."""
+    return {
+        "name": "observation",
+        "shape": ["batch", network.observation_size],
+        "dtype": "float32",
+        "readings": network.observation_size // reading_size(hand),
+        "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
+        "unit": "rad, not scaled",
+        "at_start": "the first reading fills all places",
+    }
+
+
+def _action(network: Network, hand: Hand) -> dict[str, Any]:
+    """What the policy gives."""
+    return {
+        "name": "action",
+        "shape": ["batch", network.action_size],
+        "dtype": "float32",
+        "range": [-1.0, 1.0],
+        "meaning": "q_n = 0.5 * (lower + upper) + 0.5 * (upper - lower) * action, desired joint angles",
+        "lower": _plain(hand.action_lower),
+        "upper": _plain(hand.action_upper),
+        "unit": "rad",
     }
 
 

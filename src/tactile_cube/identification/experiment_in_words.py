@@ -10,6 +10,7 @@ from tactile_cube.identification.safe_commands import SCALES, Safety
 from tactile_cube.measurement.units import TURNS, of_joint, short
 
 MODELS = "each explanation, also with parameters at either end of their intervals"
+PLENTY = 100.0  # times the evidence that is needed: how much more is of no use to anybody
 
 
 def next_steps(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
@@ -65,9 +66,10 @@ def watch_for(experiment: Experiment, units: Mapping[str, str]) -> list[str]:
 
 
 def _play(experiment: Experiment) -> str:
+    told = short(experiment.told, 2) if experiment.told < PLENTY else f"more than {PLENTY:g}"
     return (
         f"To decide, play {FILE} twice, add both trials and diagnose again: {_named(experiment)}, "
-        f"{_seconds(experiment)}. Each should give {short(experiment.told, 2)} times the evidence needed to reject the "
+        f"{_seconds(experiment)}. Each should give {told} times the evidence needed to reject the "
         "wrong one, however it is refitted."
     )
 

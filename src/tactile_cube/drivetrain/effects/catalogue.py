@@ -15,7 +15,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.errors import InputError
 
 EffectClass = type[Effect]
-CATALOGUE_MODULES = ("command", "motor", "transmission", "joint_torque", "friction", "mechanism")
+CATALOGUE_MODULES = ("command", "controller", "motor", "transmission", "joint_torque", "friction", "mechanism")
 """Files of this folder; effects of one stage act in the order in which these define them."""
 
 

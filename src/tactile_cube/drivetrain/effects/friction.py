@@ -84,7 +84,7 @@ class AsymmetricFriction(Effect):
     dry friction, also that of other effects, by 1 + r in the positive and 1 - r in the negative direction.
 
     In data: steps at reversals that are not symmetric about zero torque.
-    Confused with: `torque_bias` while the joint moves; `payload` in one posture.
+    Confused with: `torque_bias` while the joint moves; `payload` in one configuration.
     Source: Olsson et al., Friction models and friction compensation, 1998.
     """
 

@@ -32,9 +32,9 @@ class Payload(Effect):
     The mass lies `distance` from that link's joint, on the line through the link's centre of mass; below zero behind
     the joint, as a counterweight does. A negative mass makes the link lighter than stated.
 
-    In data: an error like the weight: sin q of the posture, also at rest; more inertia in fast motion.
-    Confused with: `torque_gain`; a second posture or a known weight separates them. `gravity_compensation`: a torque
-    sensor separates them. `position_offset`; `reflected_inertia`.
+    In data: an error like the weight: sin q, also at rest; more inertia in fast motion.
+    Confused with: `torque_gain`; a second configuration or a known weight separates them. `gravity_compensation`: a
+    torque sensor separates them. `position_offset`; `reflected_inertia`.
     Source: parallel-axis theorem.
     """
 
@@ -84,7 +84,7 @@ class MountTilt(Effect):
     Gravity turns by `first` about that axis of the base which is nearest to level, and by `second` about the level axis
     across it. Where gravity points along -z these are x and y. The joint says which chain of links it is.
 
-    In data: an error of the weight's torque, in every posture; none where a joint's axis points along gravity.
+    In data: an error of the weight's torque, in every configuration; none where a joint's axis points along gravity.
     Confused with: `position_offset` and the joint offset of an initialisation, exactly so where one joint alone moves;
     a level against the base separates them.
     Source: mounting by eye, 1-15 deg.
