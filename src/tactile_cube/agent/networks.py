@@ -8,7 +8,6 @@ import torch
 from torch import Tensor, nn
 
 from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.settings import AgentSettings
 
 LOG_SCALE_LOW, LOG_SCALE_HIGH = -5.0, 2.0
 """Bounds of log sigma; an untrained actor starts in the middle with sigma = 0.22."""
@@ -73,8 +72,6 @@ class Critic(nn.Module):
         return value
 
 
-def build_networks(sizes: Sizes, settings: AgentSettings) -> tuple[Actor, Critic, Critic]:
+def build_networks(sizes: Sizes, hidden: Sequence[int], layer_norm: bool) -> tuple[Actor, Critic, Critic]:
     """Actor and twin critics with torch's default initialisation, drawn in this order from torch's generator."""
-    actor = Actor(sizes, settings.hidden)
-    critics = [Critic(sizes, settings.hidden, settings.layer_norm) for _ in range(2)]
-    return actor, critics[0], critics[1]
+    return Actor(sizes, hidden), Critic(sizes, hidden, layer_norm), Critic(sizes, hidden, layer_norm)

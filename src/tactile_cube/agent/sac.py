@@ -73,7 +73,7 @@ class Sac:
                 f"agent.precision={self.settings.precision}: agent=sac knows fp32 only; use agent=sac_fast"
             )
         self.device = self.settings.torch_device()
-        self.actor, *critics = build_networks(sizes, self.settings)
+        self.actor, *critics = build_networks(sizes, self.settings.hidden, self.settings.layer_norm)
         self.loss = self._build_loss(critics).to(self.device)
         self.targets = SoftUpdate(self.loss, tau=self.settings.tau)
         networks = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
