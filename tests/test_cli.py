@@ -8,7 +8,7 @@ import pytest
 from hydra.utils import instantiate
 
 from tactile_cube import cli
-from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import Sac
 from tactile_cube.api.environment import env_config
 from tactile_cube.composition import composed

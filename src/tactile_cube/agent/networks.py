@@ -3,14 +3,27 @@
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-from tactile_cube.agent.batch import Sizes
-
 LOG_SCALE_LOW, LOG_SCALE_HIGH = -5.0, 2.0
 """Bounds of log sigma; an untrained actor starts in the middle with sigma = 0.22."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Widths of the signals: observation (actor), privileged (critics only), action."""
+
+    observation: int
+    privileged: int
+    action: int
+
+    @property
+    def critic(self) -> int:
+        """Width of a critic's input: observation, privileged state and action side by side."""
+        return self.observation + self.privileged + self.action
 
 
 def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:

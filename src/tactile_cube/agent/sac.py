@@ -3,7 +3,7 @@
 import copy
 from typing import Any
 
-from tensordict import TensorDict
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule
 from torch import Tensor
 from torchrl.data import Bounded
@@ -11,8 +11,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.modules import ProbabilisticActor, TanhNormal, ValueOperator
 from torchrl.objectives import SACLoss, SoftUpdate
 
-from tactile_cube.agent.batch import Batch, Sizes
-from tactile_cube.agent.networks import Actor, build_networks
+from tactile_cube.agent.networks import Actor, Sizes, build_networks
 from tactile_cube.agent.optimizer import build_optimizer
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.errors import InputError
@@ -42,7 +41,7 @@ class ImitatingLoss(SACLoss):  # type: ignore[misc]
 
     demonstration_weight: float = 0.0
 
-    def actor_loss(self, tensordict: TensorDict) -> tuple[Tensor, dict[str, Tensor]]:
+    def actor_loss(self, tensordict: TensorDictBase) -> tuple[Tensor, dict[str, Tensor]]:
         """The loss above, averaged over the batch; writes Q(s, a') to the key "value"."""
         with set_exploration_type(ExplorationType.RANDOM), self.actor_network_params.to_module(self.actor_network):
             policy = self.actor_network.get_dist(tensordict)
@@ -54,7 +53,7 @@ class ImitatingLoss(SACLoss):  # type: ignore[misc]
         tensordict.set("value", value.detach())
         return (self._alpha * log_prob - value + imitation).mean(), {"log_prob": log_prob.detach()}
 
-    def lower_value(self, tensordict: TensorDict, action: Tensor) -> Tensor:
+    def lower_value(self, tensordict: TensorDictBase, action: Tensor) -> Tensor:
         """The lower of both critics' values of an action (batch,), whose gradient is by the action alone."""
         judged = tensordict.select(*CRITIC_KEYS).set("action", action)
         values = self._vmap_qnetworkN0(judged, self._cached_detached_qvalue_params)["state_action_value"]
@@ -92,12 +91,12 @@ class Sac:
         loss.make_value_estimator(gamma=self.settings.gamma)
         return loss
 
-    def losses(self, batch: Batch) -> TensorDict:
+    def losses(self, batch: TensorDictBase) -> TensorDictBase:
         """The loss of a batch: loss_qvalue, loss_actor, loss_alpha, alpha, entropy, value of the actor's actions."""
-        data = self._tensordict(batch.to(self.device))
+        data = batch.to(self.device)
         return self.loss(data).set("value", data["value"].mean())
 
-    def update(self, batch: Batch) -> dict[str, Tensor]:
+    def update(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """One step of critics, actor and temperature, then of the target critics."""
         losses = self.losses(batch)
         (losses["loss_qvalue"] + losses["loss_actor"] + losses["loss_alpha"]).backward()
@@ -111,20 +110,6 @@ class Sac:
             "entropy": losses["entropy"],
             "value": losses["value"],
         }
-
-    def _tensordict(self, batch: Batch) -> TensorDict:
-        terminated = batch.terminated > 0.5
-        following = {
-            "observation": batch.next_observation,
-            "privileged": batch.next_privileged,
-            "reward": batch.reward,
-            "done": terminated,
-            "terminated": terminated,
-        }
-        current = {key: getattr(batch, key) for key in (*CRITIC_KEYS, "demonstrated")}
-        return TensorDict(
-            {**current, "steps_to_next_obs": batch.steps, "next": following}, batch_size=batch.reward.shape[:1]
-        )
 
     def policy(self) -> Actor:
         """A copy of the actor on the CPU, detached from the learner."""
