@@ -73,18 +73,20 @@ class Actor(nn.Module):
 
 
 class Critic(nn.Module):
-    """Q(observation, privileged, action) -> (batch, 1)."""
+    """Q(observation, privileged, action) -> (batch, outputs)."""
 
-    def __init__(self, sizes: Sizes, hidden: Sequence[int], layer_norm: bool = False):
+    def __init__(self, sizes: Sizes, hidden: Sequence[int], layer_norm: bool = False, outputs: int = 1):
         super().__init__()
-        self.body = perceptron((sizes.critic, *hidden, 1), layer_norm)
+        self.body = perceptron((sizes.critic, *hidden, outputs), layer_norm)
 
     def forward(self, observation: Tensor, privileged: Tensor, action: Tensor) -> Tensor:
-        """State-action value (batch, 1)."""
+        """State-action value (batch, outputs); several outputs are its quantiles."""
         value: Tensor = self.body(torch.cat((observation, privileged, action), -1))
         return value
 
 
-def build_networks(sizes: Sizes, hidden: Sequence[int], layer_norm: bool) -> tuple[Actor, Critic, Critic]:
-    """Actor and twin critics with torch's default initialisation, drawn in this order from torch's generator."""
-    return Actor(sizes, hidden), Critic(sizes, hidden, layer_norm), Critic(sizes, hidden, layer_norm)
+def build_networks(
+    sizes: Sizes, hidden: Sequence[int], layer_norm: bool, critics: int = 2, outputs: int = 1
+) -> tuple[Actor, list[Critic]]:
+    """Actor and critics with torch's default initialisation, drawn in this order from torch's generator."""
+    return Actor(sizes, hidden), [Critic(sizes, hidden, layer_norm, outputs) for _ in range(critics)]

@@ -66,7 +66,7 @@ class FastSac:
         self.settings = AgentSettings(**settings)
         self.device = self.settings.torch_device()
         self.networks = FlatNetworks(sizes, self.settings, self.device)
-        actor, *critics = build_networks(sizes, self.settings.hidden, self.settings.layer_norm)
+        actor, critics = build_networks(sizes, self.settings.hidden, self.settings.layer_norm)
         for flat, body in zip(self.networks.masters, [actor.body, *(critic.body for critic in critics)], strict=True):
             flat.copy_from(body)
         self.networks.target_master.copy_(self.networks.critic_part)
