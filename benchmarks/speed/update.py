@@ -48,6 +48,7 @@ def update(rounds: int, peers: bool = True, calls: int = CALLS, hidden: int = 51
         "tactile_cube sac_fast, bf16": _updating(FastSac(SIZES, precision="bf16", hidden=(hidden, hidden))),
         "tactile_cube sac_fast, fp32": _updating(FastSac(SIZES, precision="fp32", hidden=(hidden, hidden))),
         "TorchRL SACLoss (agent=sac)": _updating(Sac(SIZES, hidden=(hidden, hidden))),
+        "TorchRL SACLoss (agent=sac), bf16": _updating(Sac(SIZES, precision="bf16", hidden=(hidden, hidden))),
     }
     sb3 = find_peer("stable_baselines3", section.missing) if peers else None
     if sb3 is not None:
