@@ -12,7 +12,7 @@ from tactile_cube.evaluation.results_file import read_results
 Results = dict[str, Any]
 TITLE, DIFFERENCES = "# The paper's results beside ours", "## What is not as in the paper"
 AS_GOOD = 0.95
-"""Share of the nominal mean angle from which on a condition that loses no cube is only named."""
+"""Share of the nominal mean angle from which on a condition that loses at most one episode is only named."""
 BREAKS = 0.8
 """Share of the nominal condition's mean angle below which another simulation is said to break the policy."""
 
@@ -68,15 +68,12 @@ def _variant_section(title: str, protocol: str, results: Sequence[Results]) -> l
     for number, variant in enumerate(found["variants"]):
         kept, regrasping, angle = _counts(variant)
         of = variant["summary"]["episodes"]
-        if number and kept >= nominal[0] and regrasping >= nominal[1] and angle >= AS_GOOD * nominal[2]:
+        if number and kept >= nominal[0] - 1 and regrasping >= nominal[1] - 1 and angle >= AS_GOOD * nominal[2]:
             as_good.append(variant["variant"]["name"])
         else:
             lines.append(f"| {variant['variant']['name']} | {angle:.1f} | {kept}/{of} | {regrasping}/{of} |")
-    rest = (
-        [f"No worse than nominal, at {100 * AS_GOOD:.0f} % of its angle or more: {', '.join(as_good)}."]
-        if as_good
-        else []
-    )
+    note = f"With at most one episode less than nominal and {100 * AS_GOOD:.0f} % of its angle or more:"
+    rest = [note, f"- {', '.join(as_good)}"] if as_good else []
     return [f"## {title}", head, "\n".join(lines), *rest]
 
 
