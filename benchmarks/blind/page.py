@@ -160,6 +160,5 @@ def round_row(summary: dict[str, Any], command: str) -> str:
         ", ".join(f"`{one}`" for one in summary["commits"]),
         f"{outcomes} ({summary['confidently_wrong']})",
         "{} of {}".format(*summary["false_alarms"]),
-        ", ".join(map(str, summary["ambiguous_set_sizes"])) or "-",
     ]
     return f"| {' | '.join(cells)} | ... |"
