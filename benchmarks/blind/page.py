@@ -151,7 +151,7 @@ def markdown(lines: list[dict[str, Any]], s: dict[str, Any], command: str) -> st
 
 
 def round_row(summary: dict[str, Any], command: str) -> str:
-    """The round's line in docs/results/rounds.md, but for what changed since the round before."""
+    """The round's line in docs/results/rounds.md, but for remarks on how it ended."""
     options = dict(re.findall(r"(--\S+) (\S+)", command))
     first = options.pop("--first-seed", str(FIRST_SEED))
     outcomes = ", ".join(str(summary[key]) for key in ("right", "acceptable", "wrong"))

@@ -181,17 +181,6 @@ def _verdicts(name: str) -> Callable[[Results], str]:
     return lambda results: f"{summary_of(results)['verdicts'][name]}/{summary_of(results)['episodes']}"
 
 
-def _along(axis: str) -> Callable[[Results], str]:
-    """Where the cube was kept along one axis of the robustness map, and how far it was turned there."""
-
-    def ours(results: Results) -> str:
-        along = [one for one in results["variants"] if one["variant"].get("axis") == axis]
-        points = [(f"{one['variant']['value']:g}", one["summary"]) for one in along]
-        return f"{axis} " + "; ".join(f"{at}: {of['kept']}/{of['episodes']} kept" for at, of in points)
-
-    return ours
-
-
 def _training_cost(results: Results) -> str:
     """Hours and teacher of the policy's card, where it comes with the package."""
     file = SHIPPED / f"{results['policy']['label']}.md"
@@ -214,9 +203,5 @@ ROWS = (
     Row("hand-crafted trajectory", "11 rad, then drops", "paper", _with_endings, SCRIPTED),
     Row("failure (a): stuck with twisted fingers", "until q1 was penalised", "many", _verdicts("stuck_twisted")),
     Row("failure (c): turns on and drops it", "seen", "many", _verdicts("spun_and_dropped")),
-    Row("a finger is pulled", "withstands", "perturbations", _along("ring finger pulled [N]")),
-    Row("other orientations", "withstands", "perturbations", _along("hand tilted [deg]")),
-    Row("other cubes", "withstands, over 2 cm", "perturbations", _along("cube edge [mm]")),
-    Row("cuboids", "after fine-tuning", "perturbations", _along("cuboid: longer in x [mm]")),
 )
 """Source: paper, section IV, and the authors' website."""
