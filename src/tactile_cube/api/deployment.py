@@ -11,9 +11,9 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.deployment.control_loop import ControlLoop
+    from tactile_cube.deployment.controller import PlayedTargets
     from tactile_cube.deployment.limits import JointLimits
     from tactile_cube.deployment.network import Network
-    from tactile_cube.deployment.played_targets import PlayedTargets
     from tactile_cube.deployment.robot import Robot
     from tactile_cube.deployment.run_loop import LoopRun
     from tactile_cube.deployment.training_setting import TrainingSetting
@@ -60,7 +60,7 @@ class DeploymentResult:
 
     def write(self, folder: PathLike) -> Path | None:
         """Write the log of every run in which the policy decided as one recording; None if there is none."""
-        from tactile_cube.deployment.run_log import write_runs
+        from tactile_cube.deployment.run_loop import write_runs
 
         logs = [run.log for run in self.runs if run.log.time]
         resolution = float(self.job.config.robot.get("resolution", 0.0))
@@ -91,7 +91,7 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
 
     config, network = job.config, load_policy(job.config.policy)
     setting = setting_of(config, network, config.motion == "policy")
-    limits = limits_of(setting, config.rate_limit)
+    limits = robot_limits(setting, config.rate_limit)
     target = str(config.robot._target_)
     simulated = target.endswith(".SimulatedHand")
     own = {"setting": setting} if simulated else {"hand": setting.hand} if target.startswith("tactile_cube.") else {}
@@ -114,9 +114,8 @@ def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: J
     from hydra.utils import instantiate
 
     from tactile_cube.deployment.control_loop import ControlLoop
-    from tactile_cube.deployment.controller import PolicyController
+    from tactile_cube.deployment.controller import PolicyController, excited_targets
     from tactile_cube.deployment.homing import open_angles
-    from tactile_cube.deployment.played_targets import excited_targets
     from tactile_cube.errors import InputError
 
     config, hand = job.config, setting.hand
@@ -133,7 +132,7 @@ def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: J
     return ControlLoop(decides, time_constant, limits, rules, homing, seconds, hand, opened)
 
 
-def limits_of(setting: TrainingSetting, rate: float) -> JointLimits:
+def robot_limits(setting: TrainingSetting, rate: float) -> JointLimits:
     """The limits of the interface contract: the hand's range, the gains and the torque of the training.
 
     A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.

@@ -17,14 +17,14 @@ import numba
 import numpy as np
 
 from tactile_cube import compiled as decorator
-from tactile_cube.drivetrain import coupled_joints, dry_friction, impedance, signals, target_filter
+from tactile_cube.drivetrain import control_law, coupled_joints, dry_friction, signals
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.kernel_source import kernel_source
 from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology
 from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body_equations
 
-_PHYSICS = (coupled_joints, decorator, dry_friction, impedance, rigid_body_equations, signals, target_filter)
+_PHYSICS = (control_law, coupled_joints, decorator, dry_friction, rigid_body_equations, signals)
 _STEPS = Path(__file__).parent / "steps"
 _ENTRY_POINTS = "entry_points"
 

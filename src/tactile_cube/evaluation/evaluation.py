@@ -12,13 +12,12 @@ from torchrl.envs import TransformedEnv
 
 from tactile_cube.env import RotationEnv
 from tactile_cube.evaluation.episode_record import EpisodeRecord
-from tactile_cube.evaluation.lost_worlds import drawn, lost_where
 from tactile_cube.evaluation.policies import Policy, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.rollout import Interference, run_episode
-from tactile_cube.evaluation.summary import Summary, sentence, succeeded, summarise
+from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, succeeded, summarise
 from tactile_cube.evaluation.variant import NumbPolicy, Variant
-from tactile_cube.evaluation.verdict import EpisodeResult, judge
+from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
 from tactile_cube.hand import Hand
 from tactile_cube.simulation import Start
 from tactile_cube.simulation.health import unresolved_among
@@ -113,7 +112,7 @@ class Evaluation:
         results = []
         for episode in range(self.protocol.episodes):
             seed = episode_seed(self._seed, episode)
-            results.append(judge(run_episode(env, policy, seed, variant.pull), episode, seed))
+            results.append(judge_episode(run_episode(env, policy, seed, variant.pull), episode, seed))
             report(variant.name, results[-1])
         env.close()
         return self._variant_result(variant, results)
@@ -130,7 +129,7 @@ class Evaluation:
         replays = []
         for episode in range(self.protocol.episodes):
             displaced = NearlyEqualStart(episode_seed(self._seed, episode))
-            replays.append(judge(run_episode(env, replay, best.seed, displaced), episode, best.seed))
+            replays.append(judge_episode(run_episode(env, replay, best.seed, displaced), episode, best.seed))
             report(variant.name, replays[-1])
         env.close()
         return self._variant_result(variant, replays)

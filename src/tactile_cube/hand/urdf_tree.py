@@ -11,11 +11,11 @@ from dataclasses import replace
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.hand.urdf_elements import Body, Coupling, Joint, Placement, attribute, body_of, joint_of
+from tactile_cube.hand.urdf_elements import Body, Joint, Mimic, Placement, attribute, body_of, joint_of
 
 
 def read_movable_joints(
-    text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Coupling] | None = None
+    text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Mimic] | None = None
 ) -> tuple[list[Joint], tuple[str, ...]]:
     """The joints that move, parents before children, and the names of the actuated ones in order.
 
@@ -65,7 +65,7 @@ def robot_of(text: str) -> ElementTree.Element:
     return robot
 
 
-def _refuse_unknown(names: Mapping[str, Coupling] | Sequence[str], every: list[Joint]) -> None:
+def _refuse_unknown(names: Mapping[str, Mimic] | Sequence[str], every: list[Joint]) -> None:
     movable = [j.name for j in every if j.kind != "fixed"]
     for name in names:
         if name not in movable:

@@ -92,7 +92,7 @@ class Diagnosis:
         return ModelErrors(**overall, noise_floor=self.floor.overall, over_noise=over_noise, joints=joints)
 
 
-def diagnose(
+def diagnose_recording(
     recording: Recording,
     effects: Sequence[type[Effect]],
     engine: Engine = "pybullet",

@@ -5,14 +5,14 @@ from tactile_cube.drivetrain.model_file import ModelFile, Provenance
 from tactile_cube.identification.contact.choice import ContactSearch
 from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, verdict_of, with_contact
 from tactile_cube.measurement.comparing.error import ErrorSummary
-from tactile_cube.measurement.replay.hand_replay import Contact
+from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tests.identification.easy_contact import EasyTrial, GrippedTrial, friction
 
 
 def search(lateral: float = 0.9, spinning: float = 0.1) -> ContactSearch:
     trials = [friction(kind, k, lateral, spinning) for k in range(3) for kind in ("hold", "twist")]
     made = ContactSearch(trials[:4], trials[4:], lambda line: None)  # type: ignore[arg-type]
-    made.run(Contact({}))
+    made.run(ContactModel({}))
     return made
 
 
@@ -35,7 +35,7 @@ def test_the_effects_that_are_missing_are_found_and_no_others(truth: dict[str, f
 def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list[str]) -> None:
     trials = [GrippedTrial("hold", k, {("object_size", "excess"): size}, {}) for k in range(4)]
     found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
-    found.run(Contact({}))
+    found.run(ContactModel({}))
     assert [one.effect.name for one in found.found] == names
     assert [one.gain_of for one in found.found] == ["offsets"] * len(names)  # and not of the error, which stays
     assert found.rivals == []
@@ -50,7 +50,7 @@ def test_an_effect_that_explains_as_much_is_a_rival() -> None:
     key, other = ("lateral_friction", "coefficient"), ("tip_compliance", "compliance")
 
     class Confused(EasyTrial):
-        def residual(self, contact: Contact) -> np.ndarray:
+        def residual(self, contact: ContactModel) -> np.ndarray:
             soft = contact.values.get(other[0], {}).get(other[1], 0.0)
             rough = contact.values.get(key[0], {}).get(key[1], 0.9)
             off = min(abs(np.log(rough / 0.5)), abs(soft / 1e-3 - 1))
@@ -58,7 +58,7 @@ def test_an_effect_that_explains_as_much_is_a_rival() -> None:
 
     trials = [Confused("hold", k, {}, {}) for k in range(4)]
     found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
-    found.run(Contact({}))
+    found.run(ContactModel({}))
     assert verdict_of(found, 1e-3) == "ambiguous"
     named = {found.found[-1].effect.name, *(one.effect.name for one in found.rivals)}
     assert named == {"lateral_friction", "tip_compliance"}

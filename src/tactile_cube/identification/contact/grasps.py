@@ -11,15 +11,15 @@ import numpy as np
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.contact.trial import SIGMA, ContactTrial
 from tactile_cube.measurement.bench import with_object
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, contact_of
+from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, contact_of
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.split import held_out_split
 
 
 @dataclass(frozen=True)
-class Grasps:
+class GraspTrials:
     """What a contact is fitted to and judged by.
 
     Attributes:
@@ -33,12 +33,12 @@ class Grasps:
     joints: tuple[str, ...]
     fitted: list[ContactTrial]
     held_out: list[ContactTrial]
-    start: Contact
+    start: ContactModel
     noise_floor: float
 
 
 @contextmanager
-def open_grasps(recording: Recording, model: ModelFile | None, step: float, seed: int) -> Iterator[Grasps]:
+def open_grasps(recording: Recording, model: ModelFile | None, step: float, seed: int) -> Iterator[GraspTrials]:
     """Open the world that training uses for the trials with an object, and close it afterwards.
 
     Args:
@@ -51,7 +51,7 @@ def open_grasps(recording: Recording, model: ModelFile | None, step: float, seed
     fitted, held_out = held_out_split(held, seed=seed)
     replay = HandReplay(held, nominal_model(held, model), step)
     try:
-        yield Grasps(
+        yield GraspTrials(
             joints=tuple(held.joints),
             fitted=[ContactTrial(replay, trial) for trial in fitted.trials],
             held_out=[ContactTrial(replay, trial) for trial in held_out.trials],

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Parameter
-from tactile_cube.measurement.replay.hand_replay import Contact
+from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import ContactEffect
 
 Array = NDArray[np.float64]
@@ -16,7 +16,7 @@ COARSE, RATIO = 5, 2.3  # least number of values of a first grid; the largest ra
 
 
 @dataclass(frozen=True)
-class Unknown:
+class ContactUnknown:
     """One parameter of one effect.
 
     Attributes:
@@ -61,11 +61,11 @@ class Unknown:
         plain = float(np.exp(value)) if self.by_factors else value
         return float(np.clip(plain, self.parameter.low, self.parameter.high))
 
-    def put(self, contact: Contact, value: float) -> Contact:
+    def put(self, contact: ContactModel, value: float) -> ContactModel:
         """The contact with this parameter at a value."""
         return contact.changed(self.effect.name, **{self.parameter.name: value})
 
 
-def unknowns(effects: list[type[ContactEffect]]) -> list[Unknown]:
+def contact_unknowns(effects: list[type[ContactEffect]]) -> list[ContactUnknown]:
     """Every parameter of some effects."""
-    return [Unknown(effect, parameter) for effect in effects for parameter in effect.parameters]
+    return [ContactUnknown(effect, parameter) for effect in effects for parameter in effect.parameters]

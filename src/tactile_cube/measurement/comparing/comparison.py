@@ -18,12 +18,10 @@ from tactile_cube.measurement.comparing.error import (
     residuals,
     summarise_errors,
 )
-from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.joint_offsets import with_fitted_offsets
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.comparing.regimes import Regime, regimes
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
+from tactile_cube.measurement.comparing.regimes import Regime, regimes, where_it_fails
 from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
-from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
@@ -87,7 +85,7 @@ class Comparison:
         return self.errors.overall <= AT_THE_FLOOR * self.floor.reachable
 
 
-def compare(
+def compare_recording(
     recording: Recording,
     model: ModelFile | None = None,
     engine: Engine = "fast",

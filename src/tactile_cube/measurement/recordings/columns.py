@@ -16,7 +16,7 @@ SIGNALS = ("command", "position", "torque")
 
 
 @dataclass(frozen=True)
-class Columns:
+class TrialColumns:
     """A trial as written in its file: time (n,) and signals (n, joints); torque is None where it was not measured."""
 
     time: Array
@@ -25,7 +25,7 @@ class Columns:
     torque: Array | None
 
 
-def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Columns, list[str]]:
+def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[TrialColumns, list[str]]:
     """The named columns of a table, and warnings about what was left aside.
 
     Raises:
@@ -35,7 +35,7 @@ def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Col
     _require(table, ["time", *(f"{joint}.{signal}" for joint in joints for signal in SIGNALS[:2])], path)
     _require_length(len(table["time"]), path)
     torque, torque_warnings = _torque(table, joints, path)
-    columns = Columns(
+    columns = TrialColumns(
         _finite(table, "time", path),
         _stack(table, joints, "command", path),
         _stack(table, joints, "position", path),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.recordings.columns import Columns
+from tactile_cube.measurement.recordings.columns import TrialColumns
 
 Array = NDArray[np.float64]
 BEYOND = {0.9: 8.0, 0.99: 5.0}
@@ -22,8 +22,8 @@ NEAR = 2  # rows on either side
 
 
 def without_outliers(
-    columns: Columns, joints: tuple[str, ...], path: Path
-) -> tuple[Columns, NDArray[np.bool_], list[str]]:
+    columns: TrialColumns, joints: tuple[str, ...], path: Path
+) -> tuple[TrialColumns, NDArray[np.bool_], list[str]]:
     """Return the columns with outlying positions bridged, the mask of their rows (n,), and a warning per joint.
 
     A reading is an outlier if it differs far more than usual from the cubic through its neighbours, and by half of that
