@@ -75,7 +75,7 @@ def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, 
         **_scratch(len(topology.parent), len(topology.leader)),
         **_effects(topology.joints, effects),
     }
-    shapes |= {f"state:{e.name}": (topology.joints, e.state_size(dt)) for e in effects}
+    shapes |= {f"state:{e.name}": (topology.joints, e.kept(dt)) for e in effects}
     shapes["trace"] = (trace_rows, topology.chains, ROWS, len(topology.leader))
     entries, offset = {}, 0
     for key, shape in shapes.items():

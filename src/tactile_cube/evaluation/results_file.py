@@ -14,7 +14,7 @@ from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import VariantResult
-from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.policies import PolicySource
 from tactile_cube.evaluation.protocol import Protocol
 
 FORMAT = "tactile_cube results 1"

@@ -14,7 +14,7 @@ from tactile_cube.hand.hand import Array, CollisionShape
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import number_list, origin_element
 from tactile_cube.hand.urdf_elements import Placement, number, placement_of, triple
-from tactile_cube.hand.urdf_files import require_mesh
+from tactile_cube.hand.urdf_tree import require_mesh
 
 
 def read_shapes(link: ElementTree.Element, place: Placement) -> list[CollisionShape]:

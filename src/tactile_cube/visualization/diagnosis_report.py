@@ -19,7 +19,7 @@ from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import common_unit, milli, of_joint, short
-from tactile_cube.visualization.comparison_sections import (
+from tactile_cube.visualization.comparison_report import (
     band_section,
     overlay_section,
     recording_section,

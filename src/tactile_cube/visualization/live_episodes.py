@@ -23,7 +23,7 @@ from tactile_cube.composition import composed
 from tactile_cube.env import Conditions
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policy_source import PolicySource, find_policy
+from tactile_cube.evaluation.policies import PolicySource, find_policy
 from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.evaluation.verdict import judge_episode

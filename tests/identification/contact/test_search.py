@@ -2,8 +2,14 @@ import numpy as np
 import pytest
 
 from tactile_cube.identification.contact.fit import fit_contact, summarise_fit
-from tactile_cube.identification.contact.search import NARROWINGS, Opinion, first_value, narrowed, opinion
-from tactile_cube.identification.contact.unknown import contact_unknowns
+from tactile_cube.identification.contact.search import (
+    NARROWINGS,
+    Opinion,
+    contact_unknowns,
+    first_value,
+    narrowed,
+    opinion,
+)
 from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import (
     LateralFriction,

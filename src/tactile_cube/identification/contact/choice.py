@@ -13,6 +13,7 @@ from scipy import stats
 from tactile_cube.identification.contact.fit import evenly, shown_by
 from tactile_cube.identification.contact.search import (
     best_of,
+    contact_unknowns,
     first_value,
     narrowed,
     pooled_cost,
@@ -20,7 +21,6 @@ from tactile_cube.identification.contact.search import (
     solved,
 )
 from tactile_cube.identification.contact.trial import ContactTrial
-from tactile_cube.identification.contact.unknown import contact_unknowns
 from tactile_cube.identification.in_words import GAIN_OF
 from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue

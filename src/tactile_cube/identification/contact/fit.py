@@ -11,8 +11,10 @@ from scipy import stats
 from tactile_cube.drivetrain.model_file import Estimate
 from tactile_cube.identification.contact.search import (
     NARROWINGS,
+    ContactUnknown,
     Opinion,
     best_of,
+    contact_unknowns,
     first_value,
     narrowed,
     opinion,
@@ -20,7 +22,6 @@ from tactile_cube.identification.contact.search import (
     solved,
 )
 from tactile_cube.identification.contact.trial import ContactTrial
-from tactile_cube.identification.contact.unknown import ContactUnknown, contact_unknowns
 from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import ContactEffect
 

@@ -13,8 +13,7 @@ import numpy as np
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.fit import ContactFit, fit_contact, shown_by
-from tactile_cube.identification.contact.grasps import open_grasps
-from tactile_cube.identification.contact.trial import ContactTrial
+from tactile_cube.identification.contact.trial import ContactTrial, open_grasps
 from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_errors
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
