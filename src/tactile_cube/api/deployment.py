@@ -1,4 +1,4 @@
-"""Run a policy's control loop on a hand from a program."""
+"""Export a policy, and run its control loop on a hand, from a program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING, Any
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
-    from tactile_cube.deployment.network import Network
+    from tactile_cube.deployment.control_loop import ControlLoop
+    from tactile_cube.deployment.controller import Network, PlayedTargets
+    from tactile_cube.deployment.limits import JointLimits
+    from tactile_cube.deployment.robot import Robot
+    from tactile_cube.deployment.run_loop import LoopRun
     from tactile_cube.deployment.training_setting import TrainingSetting
     from tactile_cube.hand import Hand
 
@@ -27,7 +31,7 @@ def load_policy(policy: PathLike | None = None) -> Network:
     Example:
         >>> action = tactile_cube.load_policy("table")(observation)
     """
-    from tactile_cube.deployment.network import read_network
+    from tactile_cube.deployment.controller import read_network
     from tactile_cube.evaluation.policy_path import policy_path
 
     return read_network(policy_path(None if policy is None else str(policy)))
@@ -87,17 +91,6 @@ def setting_of(config: Any, network: Network, trained: bool = True) -> TrainingS
         return TrainingSetting.of(hand)
     object_: Any = OmegaConf.to_container(config.object, resolve=True) if config.get("object") else None
     return training_setting(network.info, hand, object_, network.label)
-
-
-if TYPE_CHECKING:
-    from tactile_cube.deployment.control_loop import ControlLoop
-    from tactile_cube.deployment.controller import PlayedTargets
-    from tactile_cube.deployment.limits import JointLimits
-    from tactile_cube.deployment.network import Network
-    from tactile_cube.deployment.robot import Robot
-    from tactile_cube.deployment.run_loop import LoopRun
-    from tactile_cube.deployment.training_setting import TrainingSetting
-    from tactile_cube.hand import Hand
 
 
 @dataclass(frozen=True)

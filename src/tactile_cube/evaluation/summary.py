@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import mannwhitneyu
@@ -56,10 +56,6 @@ class Summary:
     reward_terms: dict[str, float]
     verdicts: dict[str, int]
     exploits: dict[str, int]
-
-    def as_dict(self) -> dict[str, object]:
-        """Return plain data for JSON."""
-        return asdict(self)
 
 
 def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> Summary:

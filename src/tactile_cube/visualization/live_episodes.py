@@ -30,10 +30,9 @@ from tactile_cube.evaluation.verdict import judge_episode
 from tactile_cube.training.run import POLICY
 from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.visualization.blueprint import live_blueprint
-from tactile_cube.visualization.episode_recording import description, log_episode
+from tactile_cube.visualization.episode_recording import description, log_curves, log_episode
 from tactile_cube.visualization.live import read_request
 from tactile_cube.visualization.rerun_recording import APPLICATION, Branch
-from tactile_cube.visualization.run_view import log_curves
 from tactile_cube.visualization.viewer import Viewer, start_viewer
 
 NICENESS = 10

@@ -16,8 +16,8 @@ from tactile_cube.measurement.comparing.error import (
     raw_residuals,
     residuals,
     summarise_errors,
+    with_fitted_offsets,
 )
-from tactile_cube.measurement.comparing.joint_offsets import with_fitted_offsets
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
 from tactile_cube.measurement.comparing.regimes import Regime, regimes, where_it_fails
 from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
