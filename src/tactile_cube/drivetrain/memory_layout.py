@@ -68,7 +68,7 @@ class MemoryLayout:
 def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, trace_rows: int) -> MemoryLayout:
     """The layout for a topology and the effects that may act on its joints."""
     shapes = {
-        **_header(),
+        **dict.fromkeys(("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading", "unsure"), (1,)),
         **_joint_constants(topology.joints),
         **_mechanism(topology.chains, len(topology.parent)),
         **_state(topology),
@@ -82,10 +82,6 @@ def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, 
         entries[key] = offset, shape
         offset += prod(shape)
     return MemoryLayout(entries, offset)
-
-
-def _header() -> dict[str, Shape]:
-    return {key: (1,) for key in ("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading", "unsure")}
 
 
 def _joint_constants(joints: int) -> dict[str, Shape]:

@@ -35,7 +35,12 @@ def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Tri
     """
     warnings = _unknown_columns(table, joints, path)
     _require(table, ["time", *(f"{joint}.{signal}" for joint in joints for signal in SIGNALS[:2])], path)
-    _require_length(len(table["time"]), path)
+    samples = len(table["time"])
+    if samples < MINIMUM_SAMPLES:
+        raise InputError(
+            f"{path}: column 'time' has {samples} samples, last row {samples - 1}; a trial needs at least "
+            f"{MINIMUM_SAMPLES}: record it again or remove it from recording.yaml"
+        )
     torque, torque_warnings = _torque(table, joints, path)
     columns = TrialColumns(
         _finite(table, "time", path),
@@ -50,14 +55,6 @@ def _require(table: Table, names: list[str], path: Path) -> None:
     missing = [name for name in names if name not in table]
     if missing:
         raise InputError(f"{path}: column '{missing[0]}' is missing (missing: {missing}; the file has: {list(table)})")
-
-
-def _require_length(samples: int, path: Path) -> None:
-    if samples < MINIMUM_SAMPLES:
-        raise InputError(
-            f"{path}: column 'time' has {samples} samples, last row {samples - 1}; a trial needs at least "
-            f"{MINIMUM_SAMPLES}: record it again or remove it from recording.yaml"
-        )
 
 
 def _torque(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Array | None, list[str]]:
