@@ -18,7 +18,7 @@ import torch
 from numpy.typing import NDArray
 
 import tactile_cube
-from tactile_cube.evaluation.policy_source import find_policy
+from tactile_cube.evaluation.policies import find_policy
 
 STEPS, MOVED_AT, SHORTEST, LONGEST = 100, 35, 2, 7
 """Policy steps of an episode, the one at which the finger moves, and how many it holds its target."""

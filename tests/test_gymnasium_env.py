@@ -20,7 +20,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.policies import ScriptedPolicy
 from tactile_cube.evaluation.rollout import run_episode
-from tactile_cube.evaluation.verdict import EpisodeVerdict, judge
+from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.randomization import Randomization
 from tactile_cube.transforms import EnvConfig, make_env
@@ -88,11 +88,11 @@ def test_success_is_the_verdict_of_evaluate_told_in_the_last_step(
 ) -> None:
     judged = []
 
-    def judge(record: EpisodeRecord, episode: int, seed: int) -> SimpleNamespace:
+    def judge_episode(record: EpisodeRecord, episode: int, seed: int) -> SimpleNamespace:
         judged.append(record)
         return SimpleNamespace(verdict=verdict)
 
-    monkeypatch.setattr(gymnasium_env, "judge", judge)
+    monkeypatch.setattr(gymnasium_env, "judge_episode", judge_episode)
     env.reset(seed=0)
     infos = [env.step(np.zeros(12, dtype=np.float32))[-1] for _ in range(5)]
     assert [info.get("is_success") for info in infos] == [None] * 4 + [verdict is EpisodeVerdict.REGRASPING]
@@ -114,7 +114,7 @@ def test_the_scripted_gait_earns_the_success_that_evaluate_gives_it() -> None:
         step, ended = step + 1, terminated or truncated
     env.close()
     made = make_env(config, 1, 0, evaluation=True)
-    expected = judge(run_episode(made, ScriptedPolicy(), 0), 0, 0)
+    expected = judge_episode(run_episode(made, ScriptedPolicy(), 0), 0, 0)
     made.close()
     assert info["theta"] == pytest.approx(expected.final_angle)
     assert info["is_success"] == (expected.verdict is EpisodeVerdict.REGRASPING)

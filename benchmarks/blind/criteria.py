@@ -35,8 +35,7 @@ from tactile_cube.identification.search.together import Proposal, Together
 from tactile_cube.identification.search.worth import least_gain
 from tactile_cube.identification.simulations import Simulations, Unexplained
 from tactile_cube.identification.verdict import Verdict, decide
-from tactile_cube.measurement.comparing.noise_floor import noise_floor
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part
 

@@ -151,7 +151,7 @@ def markdown(lines: list[dict[str, Any]], s: dict[str, Any], command: str) -> st
 
 
 def round_row(summary: dict[str, Any], command: str) -> str:
-    """The round's line in docs/results/rounds.md, but for what changed since the round before."""
+    """The round's line in docs/results/rounds.md, but for remarks on how it ended."""
     options = dict(re.findall(r"(--\S+) (\S+)", command))
     first = options.pop("--first-seed", str(FIRST_SEED))
     outcomes = ", ".join(str(summary[key]) for key in ("right", "acceptable", "wrong"))
@@ -160,6 +160,5 @@ def round_row(summary: dict[str, Any], command: str) -> str:
         ", ".join(f"`{one}`" for one in summary["commits"]),
         f"{outcomes} ({summary['confidently_wrong']})",
         "{} of {}".format(*summary["false_alarms"]),
-        ", ".join(map(str, summary["ambiguous_set_sizes"])) or "-",
     ]
     return f"| {' | '.join(cells)} | ... |"

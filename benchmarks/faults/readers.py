@@ -20,13 +20,12 @@ from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy, sealed
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.composition import composed
-from tactile_cube.deployment.interface_contract import interface_contract
-from tactile_cube.deployment.network import read_network
+from tactile_cube.deployment.controller import read_network
+from tactile_cube.deployment.export import interface_contract
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
 from tactile_cube.env import Task
 from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policies import HoldPolicy
-from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2
 from tactile_cube.hand.model import finger_urdf
 from tactile_cube.hand.rigid_body import RigidBodyTree

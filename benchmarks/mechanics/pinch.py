@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand import DLR_HAND2, HandModel, grasp_angles
-from tactile_cube.hand.link import Capsule
+from tactile_cube.hand.model import Capsule
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.world import World
 

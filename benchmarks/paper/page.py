@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.paper.rows import EVALUATE, HEAD, newest, paper_rows, summary_of, typed
+from benchmarks.paper.rows import EVALUATE, HEAD, newest, paper_rows, typed
 from tactile_cube.evaluation.results_file import read_results
 
 Results = dict[str, Any]
 TITLE, DIFFERENCES = "# The paper's results beside ours", "## What is not as in the paper"
 AS_GOOD = 0.95
-"""Share of the nominal mean angle from which on a condition that loses no cube is only named."""
-BREAKS = 0.8
-"""Share of the nominal condition's mean angle below which another simulation is said to break the policy."""
+"""Share of the nominal mean angle from which on a condition that loses at most one episode is only named."""
 
 
 def paper_page(
@@ -35,7 +33,7 @@ def paper_page(
     parts = [introduction.strip(), rows, *([DIRTY] if "-dirty |" in rows else []), DIFFERENCES + differences]
     parts += _variant_section("Robustness", "perturbations", results)
     parts += [ROBUSTNESS_MAP] if any(one["protocol"] == "perturbations" for one in results) else []
-    parts += [*_variant_section("Other simulations", "sim_to_sim", results), *_what_breaks(results)]
+    parts += _variant_section("Other simulations", "sim_to_sim", results)
     return "\n\n".join(parts) + "\n"
 
 
@@ -59,40 +57,21 @@ def _variant_section(title: str, protocol: str, results: Sequence[Results]) -> l
     found = newest(results, lambda one: bool(one["protocol"] == protocol))
     if found is None:
         return [f"## {title}", f"Not run: `{EVALUATE} protocol={protocol}`"]
-    head = (
-        f"`{typed(found['command'])}`, {found['cpu_hours']:.2f} CPU hours, policy {found['policy']['label']}, commit "
-    )
-    head += f"{found.get('commit', 'not recorded')}."
-    lines = ["| condition | mean angle [rad] | kept | regrasping |", "|---|---|---|---|"]
-    as_good, nominal = [], _counts(found["variants"][0])
+    episodes, commit = found["variants"][0]["summary"]["episodes"], found.get("commit", "not recorded")
+    head = f"`{typed(found['command'])}`, {found['cpu_hours']:.2f} CPU hours, commit {commit}, {episodes} runs each."
+    lines = ["| condition | kept, regrasping | mean angle [rad] |", "|---|---|---|"]
+    as_good, nominal = 0, _counts(found["variants"][0])
     for number, variant in enumerate(found["variants"]):
         kept, regrasping, angle = _counts(variant)
-        of = variant["summary"]["episodes"]
-        if number and kept >= nominal[0] and regrasping >= nominal[1] and angle >= AS_GOOD * nominal[2]:
-            as_good.append(variant["variant"]["name"])
+        if number and kept >= nominal[0] - 1 and regrasping >= nominal[1] - 1 and angle >= AS_GOOD * nominal[2]:
+            as_good += 1
         else:
-            lines.append(f"| {variant['variant']['name']} | {angle:.1f} | {kept}/{of} | {regrasping}/{of} |")
-    rest = (
-        [f"No worse than nominal, at {100 * AS_GOOD:.0f} % of its angle or more: {', '.join(as_good)}."]
-        if as_good
-        else []
-    )
-    return [f"## {title}", head, "\n".join(lines), *rest]
+            lines.append(f"| {variant['variant']['name']} | {kept}, {regrasping} | {angle:.1f} |")
+    rest = f"{as_good} more conditions lose at most one episode and {100 - 100 * AS_GOOD:.0f} % of the angle."
+    return [f"## {title}", head, "\n".join(lines), rest]
 
 
 def _counts(variant: Mapping[str, Any]) -> tuple[int, int, float]:
     """Episodes that kept the cube, episodes that regrasped, and the mean angle [rad] of a condition."""
     summary = variant["summary"]
     return summary["kept"], summary["verdicts"].get("regrasping", 0), summary["mean_angle"]
-
-
-def _what_breaks(results: Sequence[Results]) -> list[str]:
-    """The conditions that cost most, the worst first: what a lab should identify before anything else."""
-    found = newest(results, lambda one: bool(one["protocol"] == "sim_to_sim"))
-    if found is None:
-        return []
-    nominal = summary_of(found)["mean_angle"]
-    angles = {one["variant"]["name"]: one["summary"]["mean_angle"] for one in found["variants"]}
-    broken = sorted((name for name, angle in angles.items() if angle < BREAKS * nominal), key=angles.__getitem__)
-    named = ", ".join(f"{name} ({angles[name]:.1f} rad)" for name in broken) or "none"
-    return [f"Below {100 * BREAKS:.0f} % of the nominal angle, the worst first, and so the first to identify: {named}."]

@@ -16,7 +16,7 @@ from tactile_cube.evaluation.policy_path import SHIPPED
 Results = dict[str, Any]
 EVALUATE = "python -m tactile_cube.evaluate"
 TRAIN = "python -m tactile_cube.train +experiment=taught`, then `+experiment=finetune"
-HEAD = "| experiment | paper | here | policy, seed | CPU hours | command | commit |"
+HEAD = "| experiment | paper | here | command | commit |"
 SCRIPTED, REPLAY = "scripted", "replay"
 FINGER = "outputs/finger"
 FREE_FINGER = f"python -m tactile_cube.record out={FINGER}` and `python -m tactile_cube.compare recording={FINGER}"
@@ -77,16 +77,17 @@ def paper_rows(results: Sequence[Results], free_finger: Mapping[str, Any] | None
         results: what `read_results` gave, the newest last.
         free_finger: from `read_comparison`.
     """
-    lines = [HEAD, "|---" * HEAD.count(" |") + "|"]
+    lines, before = [HEAD, "|---" * HEAD.count(" |") + "|"], ""
     for row in ROWS:
         found = newest(results, row.fits)
         if found is None:
-            lines.append(f"| {row.what} | {row.paper} | not run | | | `{row.command}` | |")
+            lines.append(f"| {row.what} | {row.paper} | not run | `{row.command}` | |")
             continue
-        cost = "" if row.made_by else f"{found['cpu_hours']:.2f}"
-        made = f"{found['policy']['label']}, {found['seed']} | {cost} | `{row.made_by or typed(found['command'])}`"
+        command = row.made_by or typed(found["command"])
         commit = found["policy"].get("commit") if row.made_by else found.get("commit")
+        made = f"`{command}`" if command != before else "the same"
         lines.append(f"| {row.what} | {row.paper} | {row.ours(found)} | {made} | {commit or 'not recorded'} |")
+        before = command
     lines.append(_free_finger_row(free_finger))
     return "\n".join(lines)
 
@@ -102,15 +103,14 @@ def _free_finger_row(comparison: Mapping[str, Any] | None) -> str:
     what = "one finger in free space, open loop (figure 4)"
     paper = "15 recordings of 3 initialisations lie among 50 randomised simulations"
     if comparison is None:
-        return f"| {what} | {paper} | not run | | | `{FREE_FINGER}` | |"
+        return f"| {what} | {paper} | not run | `{FREE_FINGER}` | |"
     band, trials = comparison["band"], comparison["trials"]
     starts = len({trial["initialisation"] for trial in trials})
     ours = (
         f"{100 * band['inside']:.0f} % of the samples of {len(trials)} recordings of {starts} initialisations of a "
         f"simulated finger lie among {band['simulations']}"
     )
-    cost, commit = f"{comparison['seconds'] / 3600:.2f}", comparison.get("commit", "not recorded")
-    return f"| {what} | {paper} | {ours} | | {cost} | `{FREE_FINGER}` | {commit} |"
+    return f"| {what} | {paper} | {ours} | `{FREE_FINGER}` | {comparison.get('commit', 'not recorded')} |"
 
 
 def newest(results: Sequence[Results], fits: Callable[[Results], bool]) -> Results | None:
@@ -181,17 +181,6 @@ def _verdicts(name: str) -> Callable[[Results], str]:
     return lambda results: f"{summary_of(results)['verdicts'][name]}/{summary_of(results)['episodes']}"
 
 
-def _along(axis: str) -> Callable[[Results], str]:
-    """Where the cube was kept along one axis of the robustness map, and how far it was turned there."""
-
-    def ours(results: Results) -> str:
-        along = [one for one in results["variants"] if one["variant"].get("axis") == axis]
-        points = [(f"{one['variant']['value']:g}", one["summary"]) for one in along]
-        return f"{axis} " + "; ".join(f"{at}: {of['kept']}/{of['episodes']} kept" for at, of in points)
-
-    return ours
-
-
 def _training_cost(results: Results) -> str:
     """Hours and teacher of the policy's card, where it comes with the package."""
     file = SHIPPED / f"{results['policy']['label']}.md"
@@ -214,9 +203,5 @@ ROWS = (
     Row("hand-crafted trajectory", "11 rad, then drops", "paper", _with_endings, SCRIPTED),
     Row("failure (a): stuck with twisted fingers", "until q1 was penalised", "many", _verdicts("stuck_twisted")),
     Row("failure (c): turns on and drops it", "seen", "many", _verdicts("spun_and_dropped")),
-    Row("a finger is pulled", "withstands", "perturbations", _along("ring finger pulled [N]")),
-    Row("other orientations", "withstands", "perturbations", _along("hand tilted [deg]")),
-    Row("other cubes", "withstands, over 2 cm", "perturbations", _along("cube edge [mm]")),
-    Row("cuboids", "after fine-tuning", "perturbations", _along("cuboid: longer in x [mm]")),
 )
 """Source: paper, section IV, and the authors' website."""

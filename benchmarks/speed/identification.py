@@ -17,7 +17,7 @@ from benchmarks.speed.peers import find_peer
 from benchmarks.speed.report import Figure, Section
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.error import free_run_error
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording

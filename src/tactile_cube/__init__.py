@@ -17,12 +17,11 @@ from tactile_cube.errors import InputError
 if TYPE_CHECKING:
     from tactile_cube.api.batch import diagnose_each
     from tactile_cube.api.comparison import compare
-    from tactile_cube.api.deployment import deploy
+    from tactile_cube.api.deployment import deploy, export, load_policy
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.effects import effects
     from tactile_cube.api.environment import env_config, make_env, search_grasps
     from tactile_cube.api.evaluation import evaluate
-    from tactile_cube.api.export import export, load_policy
     from tactile_cube.api.identification import identify
     from tactile_cube.api.monitoring import monitor
     from tactile_cube.api.recording import record
@@ -41,8 +40,8 @@ _PLACES = {
     "env_config": "api.environment",
     "make_env": "api.environment",
     "evaluate": "api.evaluation",
-    "export": "api.export",
-    "load_policy": "api.export",
+    "export": "api.deployment",
+    "load_policy": "api.deployment",
     "identify": "api.identification",
     "search_grasps": "api.environment",
     "monitor": "api.monitoring",

@@ -10,7 +10,7 @@ from tactile_cube.cli import command
 @command("export")
 def main(config: DictConfig) -> None:
     """Export the policy and say what was written."""
-    from tactile_cube.api.export import run_export
+    from tactile_cube.api.deployment import run_export
     from tactile_cube.api.job import typed_job
 
     output, contract = run_export(typed_job(config))

@@ -16,7 +16,7 @@ from tactile_cube.api.job import as_input_errors
 from tactile_cube.env import BORNE_TERMS, OUTCOMES, REWARD_TERMS, RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.rollout import Recorder
-from tactile_cube.evaluation.verdict import EpisodeVerdict, judge
+from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode
 from tactile_cube.transforms import EnvConfig, JointOffset, make_env
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
@@ -127,7 +127,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         self._recorder.add(data)
         if not bool(data["done"]):
             return {}
-        return {"is_success": judge(self._recorder.record(0), 0, 0).verdict is EpisodeVerdict.REGRASPING}
+        return {"is_success": judge_episode(self._recorder.record(0), 0, 0).verdict is EpisodeVerdict.REGRASPING}
 
     @contextmanager
     def _own_generator(self) -> Iterator[None]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def sweep_summary(folders: list[Path]) -> None:
     """Say what came of the runs of a sweep."""
-    from tactile_cube.evaluation.sweep_table import read_sweep, sweep_table
+    from tactile_cube.evaluation.training_curve import read_sweep, sweep_table
     from tactile_cube.visualization.curves import write_sweep_curves
 
     for sweep in dict.fromkeys(folder.parent for folder in folders):

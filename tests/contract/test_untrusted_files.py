@@ -22,8 +22,7 @@ from tactile_cube.composition import composed
 from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policies import HoldPolicy
-from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
 from tactile_cube.training.checkpoint import FILE, HEAD
 from tests.own_hands import description
 

@@ -10,8 +10,7 @@ import torch
 
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
-from tactile_cube.deployment.controller import PolicyController, TargetFilter
-from tactile_cube.deployment.network import Network, read_network
+from tactile_cube.deployment.controller import Network, PolicyController, TargetFilter, read_network
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policies import ActorPolicy
@@ -74,3 +73,25 @@ def test_the_robots_computer_needs_no_torch() -> None:
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
     assert run.stdout.strip() == "False"
+
+
+@pytest.fixture
+def policy(tmp_path: Path) -> tuple[Path, Actor]:
+    torch.manual_seed(0)
+    actor = Actor(Sizes(120, 0, 12), (512, 512))
+    save_policy(tmp_path / "policy.safetensors", actor, PolicyInfo.describe(actor, time_constant=0.5))
+    return tmp_path / "policy.safetensors", actor
+
+
+def test_numpy_and_torch_give_the_same_action(policy: tuple[Path, Actor]) -> None:
+    path, actor = policy
+    observation = np.random.default_rng(1).normal(0.0, 0.5, (50, 120)).astype(np.float32)
+    with torch.no_grad():
+        expected = actor.deterministic(torch.from_numpy(observation)).numpy()
+    np.testing.assert_allclose(read_network(path)(observation), expected, atol=2e-6)
+
+
+def test_metadata_comes_along(policy: tuple[Path, Actor]) -> None:
+    network = read_network(policy[0])
+    assert (network.observation_size, network.action_size) == (120, 12)
+    assert network.info["time_constant"] == 0.5

@@ -7,12 +7,10 @@ import pytest
 
 from tactile_cube.deployment import export
 from tactile_cube.deployment.control_loop import ControlLoop
-from tactile_cube.deployment.controller import PolicyController
-from tactile_cube.deployment.export import export_policy
+from tactile_cube.deployment.controller import Network, PolicyController
+from tactile_cube.deployment.export import export_policy, interface_contract
 from tactile_cube.deployment.homing import Homing
-from tactile_cube.deployment.interface_contract import interface_contract
 from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.network import Network
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, hand_urdf, tip_positions

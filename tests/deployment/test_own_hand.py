@@ -12,7 +12,7 @@ import torch
 import tactile_cube
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
-from tactile_cube.api.deployment import limits_of
+from tactile_cube.api.deployment import robot_limits
 from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
@@ -127,7 +127,7 @@ def test_a_file_cannot_widen_the_limits_of_a_hand(drives: dict[str, Any]) -> Non
 def test_the_limits_of_a_softer_training_are_the_hands() -> None:
     soft = {"kp": 2.0, "torque_limit": 0.8}
     setting = training_setting({"config": {"env": ENV | {"constants": ENV["constants"] | soft}}})
-    limits = limits_of(setting, 6.0)
+    limits = robot_limits(setting, 6.0)
     assert (limits.kp.min(), limits.torque) == (3.0, 0.8)
 
 

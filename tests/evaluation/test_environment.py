@@ -5,8 +5,7 @@ from tactile_cube.api.job import called_job
 from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed
 from tactile_cube.evaluation.environment import environment, worlds
-from tactile_cube.evaluation.policies import HoldPolicy
-from tactile_cube.evaluation.policy_source import PolicySource, find_policy
+from tactile_cube.evaluation.policies import HoldPolicy, PolicySource, find_policy
 from tactile_cube.randomization import StartStates
 
 EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))

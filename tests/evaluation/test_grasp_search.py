@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import tactile_cube
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.grasp_search import GraspSearch, search_grasps
+from tactile_cube.evaluation.grasp_search import GraspSearch, find_grasps
 from tactile_cube.hand import DLR_HAND2, tip_positions
 from tactile_cube.randomization import GraspStarts
 from tactile_cube.simulation import EpisodeConstants, World
@@ -15,7 +15,7 @@ CONSTANTS = EpisodeConstants(tip_spinning_friction=0.003)
 
 
 def test_found_grasps_touch_with_three_tips_and_equal_seeds_find_equal_ones() -> None:
-    one, two = (search_grasps(World(), CONSTANTS, GraspSearch(), 4, seed=1, say=lambda line: None) for _ in range(2))
+    one, two = (find_grasps(World(), CONSTANTS, GraspSearch(), 4, seed=1, say=lambda line: None) for _ in range(2))
     assert np.array_equal(one.angles, two.angles)
     assert np.array_equal(one.targets, two.targets)
     for angles, position, quaternion in zip(one.angles, one.positions, one.quaternions, strict=True):
@@ -28,12 +28,12 @@ def test_found_grasps_touch_with_three_tips_and_equal_seeds_find_equal_ones() ->
 def test_what_the_fingers_cannot_bear_is_not_kept() -> None:
     slippery = EpisodeConstants(tip_friction=0.01, tip_spinning_friction=0.0)
     with pytest.raises(InputError, match="0 of 1 grasps held in 6 tries"):
-        search_grasps(World(), slippery, GraspSearch(), 1, seed=0, most_tries=6, say=lambda line: None)
+        find_grasps(World(), slippery, GraspSearch(), 1, seed=0, most_tries=6, say=lambda line: None)
 
 
 def test_no_grasps_wanted_is_refused() -> None:
     with pytest.raises(InputError, match="grasps is 0"):
-        search_grasps(World(), CONSTANTS, GraspSearch(), 0, seed=0)
+        find_grasps(World(), CONSTANTS, GraspSearch(), 0, seed=0)
 
 
 def test_a_program_searches_grasps_of_its_object_and_starts_in_them(tmp_path: Path) -> None:

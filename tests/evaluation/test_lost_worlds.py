@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactile_cube.evaluation.lost_worlds import drawn, lost_where
-from tactile_cube.evaluation.verdict import EpisodeResult, judge
+from tactile_cube.evaluation.summary import drawn, lost_where
+from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
 from tests.evaluation.synthetic import episode
 
 
 def results(weight_matters: bool, count: int = 60) -> list[EpisodeResult]:
     """Episodes in worlds whose cube weighs 25 to 200 g, where those from 140 g on are lost, or any third one."""
-    one, rng = judge(episode()), np.random.default_rng(0)
+    one, rng = judge_episode(episode()), np.random.default_rng(0)
     found = []
     for number, mass in enumerate(rng.uniform(0.025, 0.2, count)):
         lost = mass > 0.14 if weight_matters else number % 3 == 0
@@ -23,7 +23,7 @@ def results(weight_matters: bool, count: int = 60) -> list[EpisodeResult]:
 
 def test_only_what_differs_between_the_worlds_was_drawn() -> None:
     assert drawn(results(True)) == ["cube_mass", "cube_size"]
-    assert drawn([judge(episode())] * 3) == []
+    assert drawn([judge_episode(episode())] * 3) == []
 
 
 def test_the_constant_that_tells_kept_from_lost_is_named() -> None:

@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.policies import find_policy
 from tactile_cube.evaluation.policy_path import SHIPPED, networks_path, policy_path
-from tactile_cube.evaluation.policy_source import find_policy
 
 
 def test_a_run_folder_means_its_latest_policy(tmp_path: Path) -> None:

@@ -5,18 +5,17 @@ import pytest
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import VariantResult
-from tactile_cube.evaluation.policies import HoldPolicy
-from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.results_file import EvaluationRun, read_results, write_results
 from tactile_cube.evaluation.summary import summarise
 from tactile_cube.evaluation.variant import Variant
-from tactile_cube.evaluation.verdict import judge
+from tactile_cube.evaluation.verdict import judge_episode
 from tests.evaluation.synthetic import episode
 
 
 def test_results_come_back_with_every_episode(tmp_path: Path) -> None:
-    results = [judge(episode(angle=angle), number) for number, angle in enumerate((5.0, 2.0))]
+    results = [judge_episode(episode(angle=angle), number) for number, angle in enumerate((5.0, 2.0))]
     variant = VariantResult(Variant(), results, summarise(results, 0.8), 0.8)
     protocol, source = Protocol("paper", success_share=0.8), PolicySource(HoldPolicy(), "hold")
     run = EvaluationRun(protocol, source, Task("full"), "mujoco", 4, "python -m x", 0.1, {"randomization": "wide"})

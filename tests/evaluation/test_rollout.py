@@ -9,7 +9,7 @@ import pytest
 from torchrl.envs import TransformedEnv
 
 from tactile_cube.env import Task
-from tactile_cube.env.touch import TOUCH_FORCE
+from tactile_cube.env.rotation import TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.evaluation import Evaluation, NearlyEqualStart
 from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy, ScriptedPolicy

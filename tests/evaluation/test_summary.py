@@ -1,16 +1,16 @@
 import pytest
 
 from tactile_cube.evaluation.summary import row, sentence, succeeded, summarise, wilson_interval
-from tactile_cube.evaluation.verdict import EpisodeResult, judge
+from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
 from tests.evaluation.synthetic import episode
 
 
 def results(*angles: float) -> list[EpisodeResult]:
-    return [judge(episode(angle=angle), episode=number) for number, angle in enumerate(angles)]
+    return [judge_episode(episode(angle=angle), episode=number) for number, angle in enumerate(angles)]
 
 
 def test_success_is_a_share_of_the_best_run_for_those_that_keep_the_cube() -> None:
-    lost = judge(episode(angle=14.0, ending="dropped"))
+    lost = judge_episode(episode(angle=14.0, ending="dropped"))
     assert succeeded([*results(15.0, 12.1, 11.9, 3.0), lost], 0.8) == [True, True, False, False, False]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.evaluation.verdict import EpisodeVerdict, judge, verdict
+from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode, verdict
 from tests.evaluation.synthetic import episode
 
 
@@ -29,7 +29,7 @@ def test_verdicts_follow_their_definitions(
 
 
 def test_judging_a_regrasping_episode() -> None:
-    result = judge(episode(angle=5.0), episode=3, seed=17)
+    result = judge_episode(episode(angle=5.0), episode=3, seed=17)
     assert (result.episode, result.seed, result.verdict) == (3, 17, EpisodeVerdict.REGRASPING)
     assert result.final_angle == pytest.approx(5.0)
     assert result.late_angle == pytest.approx(2.0)
@@ -42,29 +42,29 @@ def test_judging_a_regrasping_episode() -> None:
 def test_angle_and_time_count_from_the_start_and_the_largest_tilt_is_told() -> None:
     rock = np.outer(0.6 * np.sin(np.linspace(0.0, np.pi, 101)), [1.0, 0.0, 0.0])
     begun = {"theta": 7.0 + np.linspace(0.0, 0.2, 101), "time": 2.0 + 0.1 * np.arange(101)}
-    result = judge(episode(cube_quaternion=Rotation.from_rotvec(rock).as_quat(), **begun))
+    result = judge_episode(episode(cube_quaternion=Rotation.from_rotvec(rock).as_quat(), **begun))
     assert (result.final_angle, result.late_angle, result.duration) == pytest.approx((0.2, 0.08, 10.0))
     assert result.max_tilt == pytest.approx(0.6)
     assert (result.verdict, result.exploits) == (EpisodeVerdict.HOLDING, ())
 
 
 def test_judging_fingers_that_twist_with_the_cube() -> None:
-    assert judge(episode(angle=1.6, carried=True)).verdict == EpisodeVerdict.STUCK_TWISTED
+    assert judge_episode(episode(angle=1.6, carried=True)).verdict == EpisodeVerdict.STUCK_TWISTED
 
 
 @pytest.mark.parametrize("ending", ["dropped", "left_range", "tilted", "lifted", "faulty"])
 def test_every_early_ending_loses_the_cube(ending: str) -> None:
-    result = judge(episode(angle=1.6, carried=True, ending=ending))
+    result = judge_episode(episode(angle=1.6, carried=True, ending=ending))
     assert result.verdict == EpisodeVerdict.SPUN_AND_DROPPED
     assert not result.kept
 
 
 def test_a_result_is_plain_data() -> None:
-    result = judge(episode(steps=10, touch=np.zeros((11, 4), dtype=bool)))
+    result = judge_episode(episode(steps=10, touch=np.zeros((11, 4), dtype=bool)))
     assert json.loads(json.dumps(result.as_dict()))["kept"] is True
 
 
 def test_the_cubes_height_is_that_of_the_last_part() -> None:
     height = np.zeros((101, 3))
     height[:, 2] = np.where(np.arange(101) < 60, 0.01, 0.03)
-    assert judge(episode(cube_position=height)).rise == pytest.approx(0.02)
+    assert judge_episode(episode(cube_position=height)).rise == pytest.approx(0.02)

@@ -5,7 +5,7 @@ import pybullet
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.hand.rigid_body import Mimic, RigidBodyTree
 from tactile_cube.hand.rigid_body_equations import (
     WORK_COLUMNS,
     add_spin_inertia,
@@ -117,7 +117,7 @@ def test_a_mimic_joint_follows_its_leader() -> None:
 def test_a_coupling_given_beside_the_urdf_does_the_same_as_mimic() -> None:
     mimic = BRANCHED.replace('<axis xyz="1 0 0"/>', '<axis xyz="1 0 0"/><mimic joint="d" multiplier="2" offset="0.1"/>')
     inside = RigidBodyTree.from_urdf(mimic)
-    beside = RigidBodyTree.from_urdf(BRANCHED, coupled={"e": Coupling("d", 2.0, 0.1)})
+    beside = RigidBodyTree.from_urdf(BRANCHED, coupled={"e": Mimic("d", 2.0, 0.1)})
     q = np.array([0.1, 0.2, 0.3, 0.4])
     assert np.array_equal(inside.actuated_mass_matrix(q), beside.actuated_mass_matrix(q))
 
@@ -178,9 +178,9 @@ def test_changing_gravity_afterwards_equals_computing_with_it() -> None:
         (BRANCHED.replace('"0.15"', '"heavy"'), {}, 'value="heavy"'),
         (BRANCHED, {"joints": ("a", "q7")}, "no movable joint 'q7'"),
         (BRANCHED, {"joints": ("a", "a")}, "twice"),
-        (BRANCHED, {"coupled": {"q7": Coupling("a")}}, "no movable joint 'q7'"),
-        (BRANCHED, {"joints": ("a", "b"), "coupled": {"b": Coupling("a")}}, "choose one"),
-        (BRANCHED, {"coupled": {"b": Coupling("c"), "c": Coupling("a")}}, "'b' follows 'c'"),
+        (BRANCHED, {"coupled": {"q7": Mimic("a")}}, "no movable joint 'q7'"),
+        (BRANCHED, {"joints": ("a", "b"), "coupled": {"b": Mimic("a")}}, "choose one"),
+        (BRANCHED, {"coupled": {"b": Mimic("c"), "c": Mimic("a")}}, "'b' follows 'c'"),
     ],
 )
 def test_an_unusable_urdf_is_refused_with_one_line_that_names_the_fault(text, options, complaint) -> None:

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from tactile_cube.measurement.replay.hand_replay import Contact
+from tactile_cube.measurement.replay.hand_replay import ContactModel
 
 JOINTS = tuple("abcdefghijkl")
 
@@ -20,7 +20,7 @@ class EasyTrial:
         self.truth, self.neutral = truth, neutral
         self.noise = np.random.default_rng(initialisation).normal(size=(40, len(JOINTS)))
 
-    def residual(self, contact: Contact) -> np.ndarray:
+    def residual(self, contact: ContactModel) -> np.ndarray:
         off = 0.0
         for (effect, parameter), truth in self.truth.items():
             value = contact.values.get(effect, {}).get(parameter, self.neutral[effect, parameter])
@@ -29,20 +29,20 @@ class EasyTrial:
 
     freedom = 12
 
-    def prior_penalty(self, contact: Contact) -> float:
+    def prior_penalty(self, contact: ContactModel) -> float:
         """Of offsets that a grip needs for another size than the true one."""
         size = self.truth.get(("object_size", "excess"), 0.0)
         excess = contact.values.get("object_size", {}).get("excess", 0.0)
         return float(self.freedom + ((excess - size) / 1e-3) ** 2)
 
-    def cost(self, contact: Contact) -> float:
+    def cost(self, contact: ContactModel) -> float:
         return float(np.mean(self.residual(contact) ** 2) / 1e-6)
 
 
 class GrippedTrial(EasyTrial):
     """Joint offsets make up for every size of the object."""
 
-    def residual(self, contact: Contact) -> np.ndarray:
+    def residual(self, contact: ContactModel) -> np.ndarray:
         return 1e-3 * self.noise
 
 
@@ -51,7 +51,7 @@ class LoadedTrial(EasyTrial):
 
     truth_xyz = np.array([-0.006, 0.011, 0.004])
 
-    def residual(self, contact: Contact) -> np.ndarray:
+    def residual(self, contact: ContactModel) -> np.ndarray:
         values = contact.values.get("object_com", {})
         off = np.array([values.get(key, 0.0) for key in "xyz"]) - self.truth_xyz
         mixed = np.random.default_rng(7).normal(size=(len(JOINTS), 3))

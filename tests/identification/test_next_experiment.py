@@ -9,9 +9,9 @@ import polars as pl
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.diagnosis import UNPROVEN, Diagnosis, open_fits
 from tactile_cube.identification.diagnosis_json import safety_as_json
-from tactile_cube.identification.excitations import FASTEST, excitations
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
+from tactile_cube.identification.safe_commands import FASTEST, excitations
 from tactile_cube.identification.verdict import Kind, Verdict
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.reading import read_recording

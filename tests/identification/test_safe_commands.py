@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tactile_cube.identification.excitations import excitations
 from tactile_cube.identification.experiment_in_words import next_steps
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.next_experiment import next_experiment
-from tactile_cube.identification.safe_commands import PossibleMotions, Safety, interval_ends, trials_from_rest
+from tactile_cube.identification.safe_commands import (
+    PossibleMotions,
+    Safety,
+    excitations,
+    interval_ends,
+    trials_from_rest,
+)
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.randomization import Constant, Randomization, Uniform
+from tactile_cube.randomization import Constant, Learnability, Randomization, Uniform, drawn_places
+from tactile_cube.randomization.randomization import PARTS
 from tactile_cube.simulation import EpisodeConstants
 
 
@@ -51,3 +52,43 @@ def test_unknown_constant_is_refused_with_its_name() -> None:
 def test_impossible_disturbances_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError):
         Randomization(**wrong)
+
+
+MASS = Uniform(0.0, 0.8)
+
+
+def taught(share: float = 1.0) -> Learnability:
+    """Cubes below 0.2 kg are always kept, above 0.6 kg always lost, and between one of two."""
+    known = Learnability({"cube_mass": MASS}, share)
+    for number in range(4000):
+        place = (number % 40) / 40
+        known.add(np.array([[place]]), np.array([place >= 0.75 or (place >= 0.25 and number // 40 % 2 == 0)]))
+    return known
+
+
+def test_parts_are_drawn_by_p_times_1_minus_p() -> None:
+    known = taught()
+    p = known.lost[0]
+    assert p == pytest.approx([0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1], abs=0.15)
+    assert known.odds[0] == pytest.approx(p * (1 - p) / (p * (1 - p)).sum(), abs=1e-4)
+    assert taught(0.6).odds[0] == pytest.approx(0.6 * known.odds[0] + 0.4 / PARTS)
+    assert "most at cube_mass 0.6 to 0.7: 100 %" in known.hardest or "0.7 to 0.8: 100 %" in known.hardest
+
+
+def test_places_follow_the_odds_and_are_uniform_where_nothing_is_known() -> None:
+    rng = np.random.default_rng(0)
+    for known in (taught(), Learnability({"cube_mass": MASS}, 0.7)):
+        places = np.array([drawn_places(known.odds, rng)[0] for _ in range(4000)])
+        counts = np.bincount((places * PARTS).astype(int), minlength=PARTS) / len(places)
+        assert counts == pytest.approx(known.odds[0], abs=0.03)
+
+
+def test_a_place_says_where_in_its_range_a_value_lies_and_only_steered_ranges_have_one() -> None:
+    values = {"cube_mass": MASS, "kp": Constant(3.0)}
+    nominal, rng = EpisodeConstants(), np.random.default_rng(0)
+    assert not Randomization(values=values).learnability(nominal).ranges
+    steered = Randomization(values=values, steered=0.5)
+    assert list(steered.learnability(nominal).ranges) == ["cube_mass"], "kp has a number for each joint"
+    assert steered.constants(nominal, rng, {"cube_mass": 0.25}).cube_mass == pytest.approx(0.2)
+    with pytest.raises(InputError, match=r"randomization\.steered is 1"):
+        Randomization(steered=1.0)

@@ -13,12 +13,12 @@ import pytest
 
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
+from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay
 from tactile_cube.measurement.replay.nominal import nominal_model
 
 FOLDER = Path(__file__).parent / "recordings" / "mujoco_grasp"
-AS_RECORDED = Contact({"spinning_friction": {"radius": 3e-3}})
-STICKIER = Contact({"spinning_friction": {"radius": 2e-2}})
+AS_RECORDED = ContactModel({"spinning_friction": {"radius": 3e-3}})
+STICKIER = ContactModel({"spinning_friction": {"radius": 2e-2}})
 CLOSED, LOOSE = 5, 60  # rows: after the start, before anything slips
 
 
@@ -32,7 +32,7 @@ def replay(request: pytest.FixtureRequest, recording: Recording) -> HandReplay:
     return HandReplay(recording, nominal_model(recording), engine=request.param)
 
 
-def deviation(replay: HandReplay, recording: Recording, kind: str, contact: Contact) -> float:
+def deviation(replay: HandReplay, recording: Recording, kind: str, contact: ContactModel) -> float:
     """Largest deviation of a joint while the load is held [mrad]."""
     (trial,) = [trial for trial in recording.trials if trial.kind == kind]
     simulated = replay.simulate(trial, contact, np.zeros(12)).position

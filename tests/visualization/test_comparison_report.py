@@ -11,7 +11,7 @@ import pytest
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
-from tactile_cube.measurement.comparing.comparison import Comparison, compare
+from tactile_cube.measurement.comparing.comparison import Comparison, compare_recording
 from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.recordings.reading import read_recording
@@ -58,7 +58,7 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
     )
     kd = {"a": Estimate(value=0.22, low=0.2, high=0.24, unit="N m s/rad")}
     model = ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[delay])
-    return compare(recording, model, simulations=4, spread={"kd": 0.2})
+    return compare_recording(recording, model, simulations=4, spread={"kd": 0.2})
 
 
 def page(report: Report, path: Path) -> str:
@@ -129,7 +129,7 @@ def test_a_sliding_joint_is_shown_in_millimetres_and_newtons(tmp_path: Path) -> 
     friction = EffectEstimate(
         effect="coulomb_friction@a", parameters={"friction": Estimate(value=0.1, low=0.05, high=0.2, unit="N m")}
     )
-    one = compare(recording, ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[friction]))
+    one = compare_recording(recording, ModelFile(joints=["a", "b"], values={"kd": kd}, effects=[friction]))
     text = page(identification_report(one, DIAGNOSIS["error"], {}, "cmd", "m.yaml"), tmp_path / "i.html")
     assert "kd a0.20.1 .. 0.30.2N s/m" in text
     assert "kd b0.20.1 .. 0.30.2N m s/rad" in text
@@ -173,7 +173,7 @@ DIAGNOSIS = {
 def test_the_diagnosis_page_names_the_effect_its_interval_and_its_rivals_and_draws_traces_before_and_after(
     comparison: Comparison, tmp_path: Path
 ) -> None:
-    before = compare(comparison.recording, floor=comparison.floor)
+    before = compare_recording(comparison.recording, floor=comparison.floor)
     text = page(diagnosis_report(DIAGNOSIS, before, comparison, "cmd", "model.yaml"), tmp_path / "d.html")
     for name in ("before and after", "simulated before", "simulated after", "error before", "error after"):
         assert name in text

@@ -6,7 +6,7 @@ from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.summary import summarise
 from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.evaluation.variant import Variant
-from tactile_cube.evaluation.verdict import judge
+from tactile_cube.evaluation.verdict import judge_episode
 from tactile_cube.visualization.curves import write_learning_curves, write_robustness_map
 from tests.evaluation.synthetic import episode
 
@@ -29,7 +29,7 @@ def test_learning_curves_become_a_picture(tmp_path: Path) -> None:
 
 def test_a_robustness_map_has_a_panel_for_each_axis(tmp_path: Path) -> None:
     variants = [Variant(), *(Variant(name=str(i), axis=f"axis {i % 4}", value=i) for i in range(8))]
-    results = [judge(episode(angle=3.0, steps=10))]
+    results = [judge_episode(episode(angle=3.0, steps=10))]
     write_robustness_map(
         [VariantResult(v, results, summarise(results, None), None) for v in variants],
         {"axis 1": 2.5},

@@ -13,7 +13,7 @@ import tactile_cube
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy
 from tactile_cube.env import Conditions
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.policy_source import find_policy
+from tactile_cube.evaluation.policies import find_policy
 from tactile_cube.visualization.live import LiveView, request_line
 from tactile_cube.visualization.live_episodes import FILE, serve, under
 from tests.api.test_learning import SHORT

@@ -98,7 +98,7 @@ def compare(
 
 def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say: Say) -> ComparisonResult:
     """Compare as a job says: free motion, or grasps where there is nothing else."""
-    from tactile_cube.identification.contact.comparison import compare_contact
+    from tactile_cube.identification.contact.diagnosis import compare_contact
     from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
     from tactile_cube.measurement.comparing import comparison
 
@@ -111,7 +111,7 @@ def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say:
         say(f"{held} trials with an object are left out here; diagnose and identify use them")
     spread = {str(key): float(value) for key, value in config.band.spread.items()}
     band = (config.band.simulations, spread, config.seed)
-    compared = comparison.compare(without_touches(recording), model, config.engine, config.step, *band)
+    compared = comparison.compare_recording(without_touches(recording), model, config.engine, config.step, *band)
     return ComparisonResult(compared, job, job.seconds)
 
 

@@ -85,15 +85,15 @@ class DiagnosisResult:
 
     def _report_free(self, folder: Path, data: dict[str, Any], found: Diagnosis) -> None:
         from tactile_cube.measurement.bench import without_touches
-        from tactile_cube.measurement.comparing.comparison import compare
+        from tactile_cube.measurement.comparing.comparison import compare_recording
         from tactile_cube.visualization.comparison_episode import write_comparison
         from tactile_cube.visualization.comparison_summary import markdown
         from tactile_cube.visualization.diagnosis_report import diagnosis_report
         from tactile_cube.visualization.report import write_report
 
         config, recording = self.job.config, without_touches(self.recording)
-        before = compare(recording, self.known, "fast", config.step, floor=found.floor)
-        after = compare(recording, self.model, config.engine, config.step, floor=found.floor)
+        before = compare_recording(recording, self.known, "fast", config.step, floor=found.floor)
+        after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
         shapes = [shape for one in found.unexplained for shape in one.shapes[:SHAPES]]
         path = str(folder / "model.yaml")
         page = diagnosis_report(data, before, after, self.job.command, path, shapes, found.experiment)
@@ -169,7 +169,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     from tactile_cube.drivetrain.effects import catalogue, find_effect
     from tactile_cube.identification.contact.diagnosis import diagnose_contact, with_contact
     from tactile_cube.identification.criteria import Criteria
-    from tactile_cube.identification.diagnosis import diagnose as diagnose_free
+    from tactile_cube.identification.diagnosis import diagnose_recording
     from tactile_cube.identification.diagnosis_json import as_json
     from tactile_cube.identification.recommended import model_file
     from tactile_cube.measurement.bench import with_object, without_touches
@@ -178,7 +178,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     effects = tuple(dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)]))
     moving = without_touches(recording)
     criteria = Criteria(**config.criteria)
-    found = diagnose_free(moving, effects, config.engine, config.step, config.seed, say, known, criteria)
+    found = diagnose_recording(moving, effects, config.engine, config.step, config.seed, say, known, criteria)
     model = model_file(moving, found.fitted, found.errors(), [*found.held_out, *found.tested], job.command, config.seed)
     data = as_json(found, job.seconds) | {"units": recording.units}
     if known is not None:

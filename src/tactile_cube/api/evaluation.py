@@ -96,7 +96,7 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
 
     from tactile_cube.evaluation.environment import environment, worlds
     from tactile_cube.evaluation.evaluation import Evaluation
-    from tactile_cube.evaluation.policy_source import find_policy
+    from tactile_cube.evaluation.policies import find_policy
     from tactile_cube.evaluation.results_file import EvaluationRun
     from tactile_cube.evaluation.summary import HEADER, row
 

@@ -72,14 +72,16 @@ class IdentificationResult:
 
     def _free_report(self, folder: Path, found: Identification) -> Any:
         from tactile_cube.measurement.bench import without_touches
-        from tactile_cube.measurement.comparing.comparison import compare
+        from tactile_cube.measurement.comparing.comparison import compare_recording
         from tactile_cube.visualization.comparison_episode import write_comparison
         from tactile_cube.visualization.comparison_summary import markdown
         from tactile_cube.visualization.contact_report import contact_sections
         from tactile_cube.visualization.diagnosis_report import identification_report
 
         config, command = self.job.config, self.job.command
-        after = compare(without_touches(self.recording), self.model, config.engine, config.step, floor=found.floor)
+        after = compare_recording(
+            without_touches(self.recording), self.model, config.engine, config.step, floor=found.floor
+        )
         write_comparison(after, folder / "identification.rrd", markdown(after))
         held = contact_sections(self.contact, alone=False) if self.contact else []
         path = str(folder / "model.yaml")
@@ -140,7 +142,7 @@ def _of_free_motion(
     job: Job, recording: Recording, drive: list[str], effects: list[Any], say: Say
 ) -> IdentificationResult:
     from tactile_cube.identification.contact.identification import identify_contact
-    from tactile_cube.identification.identification import identify as identify_free
+    from tactile_cube.identification.identification import identify_effects
     from tactile_cube.identification.recommended import model_file
     from tactile_cube.measurement.bench import without_touches
     from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
@@ -148,7 +150,7 @@ def _of_free_motion(
     config = job.config
     offsets = bench_estimates(recording).offsets
     moving = without_touches(recording)
-    found = identify_free(moving, drive, config.engine, config.step, config.seed, say)
+    found = identify_effects(moving, drive, config.engine, config.step, config.seed, say)
     model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
     model = BenchEstimates(offsets=offsets).into(model)
     contact = identify_contact(recording, effects, model, config.step, config.seed, say) if effects else None

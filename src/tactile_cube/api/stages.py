@@ -28,7 +28,7 @@ GRASPS = 1000
 
 
 @dataclass(frozen=True)
-class Stage:
+class TrainingStage:
     """One training of several.
 
     Attributes:
@@ -72,7 +72,7 @@ def run_stages(job: Job) -> TrainingResult:
     return TrainingResult(job.folder, reason, total, results[-1].final_angle)
 
 
-def stages_of(job: Job) -> list[Stage]:
+def stages_of(job: Job) -> list[TrainingStage]:
     """The stages that a job's configuration lists; what the user asked for holds in each of them."""
     own = [word for word in job.words if not NOT_A_STAGES.match(_key(word))]
     chosen = {_key(word) for word in own}
@@ -89,13 +89,13 @@ def stages_of(job: Job) -> list[Stage]:
     return [_stage(one, f"stage {number} of {len(jobs)}") for number, one in enumerate(jobs, 1)]
 
 
-def _stage(job: Job, which: str) -> Stage:
+def _stage(job: Job, which: str) -> TrainingStage:
     training = TrainingSettings(**dict(job.config.training))
     until = f", until {training.goal}" if training.goal else ""
-    return Stage(job, f"{which}, {job.folder.name}{until}", training.steps)
+    return TrainingStage(job, f"{which}, {job.folder.name}{until}", training.steps)
 
 
-def overview(stages: Sequence[Stage], results: Sequence[TrainingResult]) -> str:
+def overview(stages: Sequence[TrainingStage], results: Sequence[TrainingResult]) -> str:
     """What is mastered, what is not, and what is to come, in one line."""
     lines = [
         f"{stage.name}: {result.reason if result.reason.startswith(MASTERED) else f'not mastered: {result.reason}'}"
@@ -133,7 +133,7 @@ def _own_grasps(job: Job, file: Path) -> str | None:
     from hydra.utils import instantiate
 
     from tactile_cube.agent.policy_file import current_commit
-    from tactile_cube.evaluation.grasp_search import GraspSearch, search_grasps
+    from tactile_cube.evaluation.grasp_search import GraspSearch, find_grasps
     from tactile_cube.randomization import GraspStarts
     from tactile_cube.simulation import SimulationOptions, World
 
@@ -143,7 +143,7 @@ def _own_grasps(job: Job, file: Path) -> str | None:
     except InputError:
         if not file.is_file():
             print(f"searching {GRASPS} grasps of hand '{env.hand.name}': {file}", flush=True)
-            found = search_grasps(World(env.hand, SimulationOptions()), env.constants, GraspSearch(), GRASPS, 0)
+            found = find_grasps(World(env.hand, SimulationOptions()), env.constants, GraspSearch(), GRASPS, 0)
             file.parent.mkdir(parents=True, exist_ok=True)
             replace(found, origin=found.origin | {"command": job.command, "commit": current_commit()}).save(file)
         return str(file)

@@ -87,8 +87,7 @@ def write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
     """Run the episodes of a job and write the best and the worst; gives what they were."""
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.evaluation.policy_path import BASELINES, policy_path
-    from tactile_cube.visualization.episode_recording import description
-    from tactile_cube.visualization.run_view import write_pair
+    from tactile_cube.visualization.episode_recording import description, write_pair
 
     config = job.config
     if config.run not in BASELINES:

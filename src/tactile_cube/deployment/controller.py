@@ -3,15 +3,69 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.network import Network
+from tactile_cube.agent.policy_file import read_policy
 from tactile_cube.deployment.training_setting import training_setting
-from tactile_cube.drivetrain.target_filter import low_pass
+from tactile_cube.drivetrain.control_law import low_pass
 from tactile_cube.errors import InputError
-from tactile_cube.hand import Hand
+from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.measurement.excitation import excitation
+
+Weights = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Network:
+    """Linear layers with ReLU between them; the first half of the last layer's outputs, through tanh, is the action.
+
+    Attributes:
+        weights: one matrix `(out, in)` a layer.
+        biases: one vector `(out,)` a layer.
+        info: the policy file's metadata.
+        label: how the policy is called in a message.
+    """
+
+    weights: tuple[Weights, ...]
+    biases: tuple[Weights, ...]
+    info: dict[str, Any]
+    label: str = "the policy"
+
+    @property
+    def observation_size(self) -> int:
+        """Width of the stacked observation."""
+        return int(self.weights[0].shape[1])
+
+    @property
+    def action_size(self) -> int:
+        """Number of joints commanded; the other half of the outputs is the exploration's scale."""
+        return int(self.weights[-1].shape[0]) // 2
+
+    def deterministic_layers(self) -> list[tuple[Weights, Weights]]:
+        """Return weights and biases without the outputs that only exploration uses."""
+        layers = list(zip(self.weights, self.biases, strict=True))
+        weight, bias = layers.pop()
+        return [*layers, (weight[: self.action_size], bias[: self.action_size])]
+
+    def __call__(self, observation: Weights) -> Weights:
+        """Return the action `(..., 12)` in [-1, 1] for observations `(..., 120)`."""
+        signal = observation
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            signal = np.maximum(signal @ weight.T + bias, 0.0)
+        mean = signal @ self.weights[-1][: self.action_size].T + self.biases[-1][: self.action_size]
+        return np.asarray(np.tanh(mean), dtype=np.float32)
+
+
+def read_network(path: Path) -> Network:
+    """Read a policy file; raises what `read_policy` does."""
+    info, layers = read_policy(path)
+    weights, biases = zip(*layers, strict=True)
+    return Network(weights, biases, info.model_dump(), f"policy={path}")
+
 
 Array = NDArray[np.float64]
 
@@ -92,3 +146,42 @@ class TargetFilter:
         for joint, goal in enumerate(q_n):
             self.filtered[joint] = low_pass(self.filtered[joint], goal, self.time_constant, 1.0 / self.rate)
         return self.filtered
+
+
+class PlayedTargets:
+    """Gives one row after the other at 10 Hz, and the last one for good.
+
+    Args:
+        targets: q_n `(steps, 12)` [rad].
+    """
+
+    def __init__(self, targets: Array) -> None:
+        self._targets, self._row = targets, 0
+
+    def reset(self) -> None:
+        """Begin with the first row."""
+        self._row = 0
+
+    def step(self, q_m: Array, q_f: Array) -> Array:
+        """Return the next row `(12,)` [rad], whatever the fingers do."""
+        row = self._targets[min(self._row, len(self._targets) - 1)]
+        self._row += 1
+        return np.asarray(row)
+
+
+def excited_targets(kind: str, reach: float, seconds: float, seed: int, hand: Hand = DLR_HAND2) -> PlayedTargets:
+    """Return an excitation about the start angles, within the action range.
+
+    Args:
+        kind: `ramps`, `holds`, `multisine` or another kind of excitation.
+        reach: half width [rad].
+        seconds: length [s].
+        seed: of its corners and phases.
+        hand: that moves.
+
+    Raises:
+        InputError: an unknown kind.
+    """
+    home = np.asarray(hand.start_angles)
+    low, high = np.maximum(home - reach, hand.action_lower), np.minimum(home + reach, hand.action_upper)
+    return PlayedTargets(excitation(kind, low, high, seconds, POLICY_RATE, np.random.default_rng(seed)))

@@ -4,15 +4,193 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tactile_cube.deployment.interface_contract import interface_contract
-from tactile_cube.deployment.network import Network
-from tactile_cube.deployment.training_setting import TrainingSetting
+from tactile_cube.deployment.controller import POLICY_RATE, Network, reading_size
+from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.limits import RATE, StopRules
+from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
+from tactile_cube.hand import Hand, HandModel
+
+FORMAT = "tactile_cube contract 3"
+FINGER = {
+    "q1": "abduction, 0 is straight",
+    "q2": "positive flexes, 0 is straight",
+    "q3": "positive flexes, 0 is straight",
+}
+TOLERANCE = 1e-5  # between float32 products in different orders
+
+
+def interface_contract(network: Network, setting: TrainingSetting | None = None) -> dict[str, Any]:
+    """Return the contract of a policy on the hand that it was trained on, ready for JSON.
+
+    Args:
+        network: the policy.
+        setting: that it was trained in; None: as its file says.
+    """
+    setting = setting or training_setting(network.info, label=network.label)
+    hand, constants = setting.hand, setting.constants
+    names = list(hand.joint_names)
+    return {
+        "format": FORMAT,
+        "hand": _hand(setting),
+        "joints": names,
+        "joint_convention": {
+            name: {"unit": "rad", "zero": 0.0, "direction": 1, "meaning": meaning}
+            for name, meaning in zip(names, _meanings(hand), strict=True)
+        },
+        "joint_range": {"lower": _plain(hand.lower), "upper": _plain(hand.upper), "unit": "rad"},
+        "task": _task(setting),
+        "start_angles": {"angles": _plain(hand.start_angles), "unit": "rad", "homing": asdict(Homing())},
+        "observation": _observation(network, hand),
+        "action": _action(network, hand),
+        "rates": {"policy_hz": POLICY_RATE, "fast_loop_hz": {"simulation": 500, "robot": 1000}},
+        "target_filter": {
+            "law": "q_f += (1 - exp(-dt / T_s)) * (q_n - q_f), in the fast loop; starts at the measured angles",
+            "time_constant_s": network.info.get("time_constant"),
+        },
+        "limits": {
+            "law": "the q_d nearest to q_f within joint_range, the rate since the last q_d and the torque, all at once",
+            "rate": {"value": RATE, "unit": "rad/s"},
+            "torque": {"value": constants.torque_limit, "unit": "N m"},
+            "torque_law": "q_d in [q_m - limit / K_P, q_m + limit / K_P], q_m as last accepted",
+        },
+        "impedance": {
+            "law": "tau = K_P (q_d - q_m) - K_D dq with q_d = q_f after the limits",
+            "kp": {"value": _alike(constants.kp), "unit": "N m/rad"},
+            "kd": {"value": _alike(constants.kd), "unit": "N m s/rad"},
+        },
+        "stop": {
+            "rules": asdict(StopRules()),
+            "unit": {"silence": "s", "lateness": "s", "margin": "rad", "speed": "rad/s", "saturation": "s"},
+            "accepted": "a q_m stamped within silence of now, in range by margin, no further from the last than speed "
+            "allows, around which a q_d keeps all limits; else q_f stays for this tick",
+            "then": "hold the last accepted angles, within the limits; start again from homing",
+        },
+        "test_vector": _test_vector(network, hand) | {"tolerance": TOLERANCE},
+        "sha256": {"weights": weights_hash(network), "of": "weight0, bias0, weight1, ... as little-endian float32"},
+        "policy": {key: value for key, value in network.info.items() if key != "config"},
+    }
+
+
+def _observation(network: Network, hand: Hand) -> dict[str, Any]:
+    """What the policy reads."""
+    return {
+        "name": "observation",
+        "shape": ["batch", network.observation_size],
+        "dtype": "float32",
+        "readings": network.observation_size // reading_size(hand),
+        "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
+        "unit": "rad, not scaled",
+        "at_start": "the first reading fills all places",
+    }
+
+
+def _action(network: Network, hand: Hand) -> dict[str, Any]:
+    """What the policy gives."""
+    return {
+        "name": "action",
+        "shape": ["batch", network.action_size],
+        "dtype": "float32",
+        "range": [-1.0, 1.0],
+        "meaning": "q_n = 0.5 * (lower + upper) + 0.5 * (upper - lower) * action, desired joint angles",
+        "lower": _plain(hand.action_lower),
+        "upper": _plain(hand.action_upper),
+        "unit": "rad",
+    }
+
+
+def _hand(setting: TrainingSetting) -> dict[str, Any]:
+    """Which mechanism it is, how it is held, and what touches the object."""
+    hand, constants = setting.hand, setting.constants
+    tips = [hand.finger_tips(k, hand.start_angles[None, hand.of_finger(k)])[0] for k in range(len(hand.fingers))]
+    return {
+        "name": hand.name,
+        "urdf": {"file": hand.urdf_name, "sha256": hand.urdf_sha256},
+        "coupled_joints": [_coupled(hand, k, *pair) for k in range(len(hand.fingers)) for pair in hand.coupled()],
+        "palm": {
+            "position": {"value": _plain(hand.position), "unit": "m"},
+            "rotation": [_plain(row) for row in hand.rotation],
+            "frame": "of the URDF's root link in the world: p_world = position + rotation @ p_palm",
+            "gravity": {"value": _plain(constants.gravity * hand.rotation.T @ constants.down), "unit": "m/s^2"},
+            "gravity_frame": "palm; hold the hand so that it is this",
+        },
+        "fingertips": [
+            {
+                "finger": finger.name,
+                "link": hand.link_names(k)[-1],
+                "radius": hand.tip_radius,
+                "at_start": _plain(hand.rotation.T @ (tip - hand.position)),
+            }
+            for k, (finger, tip) in enumerate(zip(hand.fingers, tips, strict=True))
+        ],
+        "fingertips_unit": "m; at_start: centre of the sphere in the palm's frame at the start angles",
+    }
+
+
+def _coupled(hand: Hand, finger: int, link: int, leader: int) -> dict[str, Any]:
+    joints = hand.chain_joints(finger)
+    return {"joint": joints[link], "follows": joints[leader], "ratio": 1.0}
+
+
+def _meanings(hand: Hand) -> list[str]:
+    """What each joint does: known of the DLR-Hand II, else as its URDF says."""
+    if isinstance(hand, HandModel):
+        return [FINGER[name[-2:]] for name in hand.joint_names]
+    return ["as in the URDF of the hand"] * hand.joints
+
+
+def _task(setting: TrainingSetting) -> dict[str, Any]:
+    """What is to be turned, and how."""
+    constants, task = setting.constants, setting.task
+    return {
+        "object": {
+            "shape": str(constants.object_shape),
+            "size": {"value": _plain(constants.cube_size), "unit": "m, edges of its bounding box"},
+            "mass": {"value": constants.cube_mass, "unit": "kg"},
+            "centre_of_mass": {"value": _plain(constants.cube_com), "unit": "m, from the middle of the bounding box"},
+            "friction": {"object": constants.cube_friction, "fingertips": constants.tip_friction, "law": "product"},
+        },
+        "axis": _plain(task.axis_vector()),
+        "direction": task.direction,
+        "frame": "world: origin in the object's middle at the start, z up; +1 is the right-handed sense about axis",
+        "on_a_table": task.table,
+    }
+
+
+def weights_hash(network: Network) -> str:
+    """Return the SHA-256 of what the file computes with."""
+    digest = hashlib.sha256()
+    for weight, bias in network.deterministic_layers():
+        digest.update(np.ascontiguousarray(weight, dtype="<f4").tobytes())
+        digest.update(np.ascontiguousarray(bias, dtype="<f4").tobytes())
+    return digest.hexdigest()
+
+
+def _test_vector(network: Network, hand: Hand) -> dict[str, Any]:
+    """An observation that leaves no place at zero, and the action that belongs to it."""
+    places = np.arange(network.observation_size)
+    rest = np.tile(
+        np.concatenate([hand.start_angles, np.zeros(hand.joints)]), network.observation_size // reading_size(hand)
+    )
+    observation = (rest + 0.05 * np.sin(1.0 + places)).astype(np.float32)
+    return {"observation": _plain(observation), "action": _plain(network(observation))}
+
+
+def _plain(values: Any) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _alike(values: Any) -> float | list[float]:
+    """One number where all joints have the same, else one each."""
+    numbers = _plain(values)
+    return numbers[0] if len(set(numbers)) == 1 else numbers
+
 
 OPSET = 17
 FORMATS = ("npz", "onnx")

@@ -13,7 +13,7 @@ from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.env import cube_pose
 from tactile_cube.env.cube_pose import frame_along, seen_along
 from tactile_cube.hand import DLR_HAND2
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
+from tactile_cube.simulation import SimulationOptions, Start, World
 
 Array = NDArray[np.float64]
 AWAY = (0.0, 0.0, -0.3)  # [m] where the cube waits
@@ -69,7 +69,8 @@ class SimulatedHand:
         self._ticks, self._late = 0, 0
         home = np.asarray(hand.start_angles)
         away = home - opened * np.tile([0.0, *[1.0] * (hand.joints_per_finger - 1)], len(hand.fingers))
-        self._world.reset(self._without_object(), Start(np.maximum(away, hand.lower), AWAY))
+        empty = replace(self._given, filter_time=NO_FILTER, gravity_scale=0.0, gravity_onset=0, table_height=None)
+        self._world.reset(empty, Start(np.maximum(away, hand.lower), AWAY))
         self._q_d = np.array(self._world.q_m)
         self._frame, self._theta = frame_along(self._setting.task.axis_vector()), [0.0]
 
@@ -128,6 +129,3 @@ class SimulatedHand:
     def _follow_object(self) -> None:
         seen = seen_along(self._frame, self._world.cube_quaternion.tolist())
         self._theta.append(cube_pose(self._world.cube_position.tolist(), seen, self._theta[-1]).theta)
-
-    def _without_object(self) -> EpisodeConstants:
-        return replace(self._given, filter_time=NO_FILTER, gravity_scale=0.0, gravity_onset=0, table_height=None)

@@ -1,7 +1,6 @@
 """From a desired joint angle to a joint torque: target filter, impedance law, elasticity, dry friction, effects."""
 
-from tactile_cube.drivetrain.constants import DrivetrainConstants
+from tactile_cube.drivetrain.constants import DrivetrainConstants, check_damping_stability, damping_number
 from tactile_cube.drivetrain.plant import Plant
-from tactile_cube.drivetrain.stability import check_damping_stability, damping_number
 
 __all__ = ["DrivetrainConstants", "Plant", "check_damping_stability", "damping_number"]

@@ -68,24 +68,20 @@ class MemoryLayout:
 def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, trace_rows: int) -> MemoryLayout:
     """The layout for a topology and the effects that may act on its joints."""
     shapes = {
-        **_header(),
+        **dict.fromkeys(("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading", "unsure"), (1,)),
         **_joint_constants(topology.joints),
         **_mechanism(topology.chains, len(topology.parent)),
         **_state(topology),
         **_scratch(len(topology.parent), len(topology.leader)),
         **_effects(topology.joints, effects),
     }
-    shapes |= {f"state:{e.name}": (topology.joints, e.state_size(dt)) for e in effects}
+    shapes |= {f"state:{e.name}": (topology.joints, e.kept(dt)) for e in effects}
     shapes["trace"] = (trace_rows, topology.chains, ROWS, len(topology.leader))
     entries, offset = {}, 0
     for key, shape in shapes.items():
         entries[key] = offset, shape
         offset += prod(shape)
     return MemoryLayout(entries, offset)
-
-
-def _header() -> dict[str, Shape]:
-    return {key: (1,) for key in ("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading", "unsure")}
 
 
 def _joint_constants(joints: int) -> dict[str, Shape]:

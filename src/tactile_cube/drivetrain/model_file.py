@@ -26,13 +26,13 @@ MAY_BE_INFINITE = ("stiffness", "torque_limit", "rate_limit")
 """Constants of a drive that need not end: a rigid one, one that is not limited."""
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
     """Unknown keys are refused: a misspelt key must not silently change nothing."""
 
     model_config = ConfigDict(extra="forbid")
 
 
-class Estimate(_Strict):
+class Estimate(Strict):
     """A value with its 95 % interval; `low` and `high` equal `value` where nothing was estimated."""
 
     value: float
@@ -62,7 +62,7 @@ class Estimate(_Strict):
         return all(map(math.isfinite, (self.low, self.value, self.high)))
 
 
-class EffectEstimate(_Strict):
+class EffectEstimate(Strict):
     """One effect, `NAME@JOINT` (or `NAME` alone for an effect of the object), and its parameters."""
 
     effect: str
@@ -84,7 +84,7 @@ class EffectEstimate(_Strict):
         return self.name in OBJECT_EFFECTS
 
 
-class Provenance(_Strict):
+class Provenance(Strict):
     """Where the values come from."""
 
     recording: str = ""
@@ -96,7 +96,7 @@ class Provenance(_Strict):
     held_out: list[str] = Field(default_factory=list)
 
 
-class ModelErrors(_Strict):
+class ModelErrors(Strict):
     """RMS position error [rad] on held-out trials at each stage; `joints` maps a stage to joint -> error.
 
     `over_noise` is that of the last stage in segments that are simulated one by one, in units of the sensor noise.
@@ -110,7 +110,7 @@ class ModelErrors(_Strict):
     joints: dict[str, dict[str, float]] = Field(default_factory=dict)
 
 
-class ModelFile(_Strict):
+class ModelFile(Strict):
     """An identified model.
 
     Attributes:

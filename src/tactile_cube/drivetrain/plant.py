@@ -141,7 +141,8 @@ class Plant:
 
         An effect on the MECHANISM changes the constants in place, so apply it once to a fresh memory.
         """
-        self._check_known(effect)
+        if effect not in self.effects:
+            raise InputError(f"effect '{effect.name}' is not among this plant's effects; name it when it is built")
         a = self._index(joint)
         block = np.empty((*memory.shape[:-1], len(effect.parameters)))
         for k, (key, default) in enumerate(effect.defaults(values).items()):
@@ -211,10 +212,6 @@ class Plant:
         if joint not in self.joint_names:
             raise InputError(f"joint '{joint}' is unknown; the joints are {', '.join(self.joint_names)}")
         return self.joint_names.index(joint)
-
-    def _check_known(self, effect: EffectClass) -> None:
-        if effect not in self.effects:
-            raise InputError(f"effect '{effect.name}' is not among this plant's effects; name it when it is built")
 
 
 def _common_topology(trees: Sequence[RigidBodyTree]) -> Topology:

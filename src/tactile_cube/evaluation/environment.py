@@ -10,7 +10,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from tactile_cube.agent.policy_parts import making, require_parts
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.policies import PolicySource
 from tactile_cube.transforms import EnvConfig
 
 CONSTANTS = "tactile_cube.simulation.constants_of"

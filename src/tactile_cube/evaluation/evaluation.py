@@ -8,17 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from torchrl.envs import TransformedEnv
 
 from tactile_cube.env import RotationEnv
 from tactile_cube.evaluation.episode_record import EpisodeRecord
-from tactile_cube.evaluation.lost_worlds import drawn, lost_where
 from tactile_cube.evaluation.policies import Policy, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
-from tactile_cube.evaluation.rollout import Interference, run_episode
-from tactile_cube.evaluation.summary import Summary, sentence, succeeded, summarise
+from tactile_cube.evaluation.rollout import run_episode
+from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, succeeded, summarise
 from tactile_cube.evaluation.variant import NumbPolicy, Variant
-from tactile_cube.evaluation.verdict import EpisodeResult, judge
+from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
 from tactile_cube.hand import Hand
 from tactile_cube.simulation import Start
 from tactile_cube.simulation.health import unresolved_among
@@ -46,7 +44,7 @@ class VariantResult:
         worlds = [{name: result.world[name] for name in varied} for result in self.results]
         return {
             "variant": dataclasses.asdict(self.variant),
-            "summary": self.summary.as_dict(),
+            "summary": dataclasses.asdict(self.summary),
             "episodes": [{**row, "world": w, "success": f} for row, w, f in zip(rows, worlds, flags, strict=True)],
             "lost_where": [dataclasses.asdict(one) for one in lost_where(self.results)],
             "unresolved": self.unresolved,
@@ -104,16 +102,21 @@ class Evaluation:
         config = variant.apply(self._config)
         traced = dataclasses.replace(config.simulation, trace=self.protocol.trace)
         env = make_env(dataclasses.replace(config, simulation=traced), 1, self._seed, evaluation=True)
-        policy = NumbPolicy(self._policy, variant.numb, self.hand) if variant.numb else self._policy
-        return self._closing(env, policy, result.seed, variant.pull)
+        try:
+            return run_episode(env, self._feeling(variant), result.seed, variant.pull)
+        finally:
+            env.close()
+
+    def _feeling(self, variant: Variant) -> Policy:
+        """The policy, without the senses that a variant takes away."""
+        return NumbPolicy(self._policy, variant.numb, self.hand) if variant.numb else self._policy
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
         env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
-        policy = NumbPolicy(self._policy, variant.numb, self.hand) if variant.numb else self._policy
-        results = []
+        policy, results = self._feeling(variant), list[EpisodeResult]()
         for episode in range(self.protocol.episodes):
             seed = episode_seed(self._seed, episode)
-            results.append(judge(run_episode(env, policy, seed, variant.pull), episode, seed))
+            results.append(judge_episode(run_episode(env, policy, seed, variant.pull), episode, seed))
             report(variant.name, results[-1])
         env.close()
         return self._variant_result(variant, results)
@@ -130,7 +133,7 @@ class Evaluation:
         replays = []
         for episode in range(self.protocol.episodes):
             displaced = NearlyEqualStart(episode_seed(self._seed, episode))
-            replays.append(judge(run_episode(env, replay, best.seed, displaced), episode, best.seed))
+            replays.append(judge_episode(run_episode(env, replay, best.seed, displaced), episode, best.seed))
             report(variant.name, replays[-1])
         env.close()
         return self._variant_result(variant, replays)
@@ -139,14 +142,6 @@ class Evaluation:
         share, options = self.protocol.success_share, variant.apply(self._config).simulation
         frictions = [float(result.world["tip_spinning_friction"]) for result in results]
         return VariantResult(variant, results, summarise(results, share), share, unresolved_among(frictions, options))
-
-    def _closing(
-        self, env: TransformedEnv, policy: Policy, seed: int, interference: Interference | None
-    ) -> EpisodeRecord:
-        try:
-            return run_episode(env, policy, seed, interference)
-        finally:
-            env.close()
 
 
 def episode_seed(seed: int, episode: int) -> int:

@@ -63,7 +63,7 @@ class GraspSearch:
     touching: int = 3
 
 
-def search_grasps(
+def find_grasps(
     world: World,
     constants: EpisodeConstants,
     search: GraspSearch,

@@ -14,7 +14,7 @@ from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.evaluation import VariantResult
-from tactile_cube.evaluation.policy_source import PolicySource
+from tactile_cube.evaluation.policies import PolicySource
 from tactile_cube.evaluation.protocol import Protocol
 
 FORMAT = "tactile_cube results 1"
@@ -66,7 +66,10 @@ def write_results(path: Path, run: EvaluationRun, variants: list[VariantResult])
         "commit": current_commit(),
         "variants": [variant.as_dict() for variant in variants],
     }
-    path.write_text(json.dumps(data, indent=1, default=_plain), encoding="utf-8")
+    path.write_text(
+        json.dumps(data, indent=1, default=lambda one: one.tolist() if hasattr(one, "tolist") else str(one)),
+        encoding="utf-8",
+    )
 
 
 def read_results(path: Path) -> dict[str, Any]:
@@ -85,7 +88,3 @@ def read_results(path: Path) -> dict[str, Any]:
     if missing:
         raise InputError(f"{path}: results without {', '.join(missing)}; run evaluate again")
     return data
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else str(value)

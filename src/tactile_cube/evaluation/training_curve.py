@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import csv
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import comb
 from pathlib import Path
+from statistics import median
 
 from tactile_cube.errors import InputError
 
@@ -74,3 +78,102 @@ def regrasping_begins(curve: Curve) -> int | None:
 def cpu_hours(curve: Curve, index: int) -> float:
     """Return the processor time spent on simulating and learning up to a row [h]."""
     return sum(curve.columns[name][index] for name in COSTS if name in curve.columns)
+
+
+INTERVALS = ("million steps: median (interval)", "angle at the end [rad]: median (interval)", "CPU hours of all runs")
+RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
+_FILTER_TIME = re.compile(r"task\.filter_time=(?P<time>[\d.]+)-(?P<task>task=\w+)$")
+
+
+def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
+    """Read the runs of a multirun: setting -> seed -> learning curve.
+
+    Args:
+        folder: holds run folders `<setting>-seed<N>` or `seed<N>`, or copies of their metrics.csv named like them.
+
+    Raises:
+        InputError: there is no such run in the folder.
+    """
+    runs: dict[str, dict[int, Curve]] = {}
+    for path in sorted(folder.glob("*seed*")):
+        name = path.stem if path.suffix == ".csv" else path.name
+        match = RUN.match(name)
+        if match and (path.suffix == ".csv" or (path / "metrics.csv").is_file()):
+            setting = _FILTER_TIME.sub(r"\g<task>, T_s \g<time> s", match["setting"] or folder.name)
+            runs.setdefault(setting, {})[int(match["seed"])] = read_curve(path, name)
+    if not runs:
+        raise InputError(f"{folder}: no run <setting>-seed<N> with a metrics.csv; give the folder of a multirun")
+    return runs
+
+
+def sweep_table(
+    runs: Mapping[str, Mapping[int, Curve]], paper: Mapping[str, str] | None = None, intervals: bool = False
+) -> str:
+    """Return the table of the runs, a line each setting.
+
+    Args:
+        runs: from `read_sweep`.
+        paper: published column by setting; its settings are the lines then, those without a run as such.
+        intervals: add columns of medians over the seeds, each with the interval of `median_interval`.
+    """
+    head = [
+        "setting",
+        *(["paper, million steps"] if paper else []),
+        "million steps, seed by seed",
+        "CPU hours (median)",
+        *(INTERVALS if intervals else []),
+    ]
+    lines = [head, ["---"] * len(head)]
+    for setting in paper or sorted(runs):
+        known = [paper[setting]] if paper else []
+        curves = runs.get(setting, {})
+        steps = ", ".join(_until(curves[seed]) for seed in sorted(curves))
+        more = _over_seeds(list(curves.values())) if intervals else []
+        lines.append([setting, *known, steps or "not run", _median_cost(list(curves.values())), *more])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """The median of some runs, and between which of them that of all runs lies with 95 % probability or more.
+
+    Ranks of the sample alone: nothing is assumed of the distribution, and a run that never got there is infinite. Of
+    fewer than six runs all are needed; the probability is then 1 - 2^(1 - n), 75 % for three.
+
+    Source: the sign test's interval; Conover, Practical Nonparametric Statistics, section 3.2.
+    """
+    ordered, n = sorted(values), len(values)
+    outside = 0
+    while 2 * sum(comb(n, k) for k in range(outside + 1)) <= 0.05 * 2**n:
+        outside += 1
+    first = max(outside - 1, 0)
+    return median(ordered), ordered[first], ordered[n - 1 - first]
+
+
+def _over_seeds(curves: Sequence[Curve]) -> list[str]:
+    if not curves:
+        return [""] * len(INTERVALS)
+    begun = [(curve, regrasping_begins(curve)) for curve in curves]
+    steps = [float("inf") if row is None else curve.columns[STEPS][row] / 1e6 for curve, row in begun]
+    angles = [curve.columns[ANGLE][-1] for curve in curves]
+    hours = [cpu_hours(curve, -1) for curve in curves]
+    return [_interval(steps, 3), _interval(angles, 2), f"{sum(hours):.3f}"]
+
+
+def _interval(values: Sequence[float], digits: int) -> str:
+    middle, low, high = (f"{value:.{digits}f}".replace("inf", "never") for value in median_interval(values))
+    return f"{middle} ({low} to {high})"
+
+
+def _until(curve: Curve) -> str:
+    row = regrasping_begins(curve)
+    if row is not None:
+        return f"{curve.columns[STEPS][row] / 1e6:.3f}"
+    return f"> {curve.columns[STEPS][-1] / 1e6:.3f} (at {curve.columns[ANGLE][-1]:.1f} rad)"
+
+
+def _median_cost(curves: Sequence[Curve]) -> str:
+    """Median over the runs; a run that does not regrasp counts as dearer than all others."""
+    begun = [(curve, regrasping_begins(curve)) for curve in curves]
+    costs = [float("inf") if row is None else cpu_hours(curve, row) for curve, row in begun]
+    middle = median(costs) if costs else float("inf")
+    return f"{middle:.3f}" if middle < float("inf") else "-"

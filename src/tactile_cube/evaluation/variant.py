@@ -160,8 +160,4 @@ def typical_effects(name: str, hand: Hand = DLR_HAND2) -> list[Effect]:
 
 
 def _plain(value: Any) -> Any:
-    return (
-        tuple(float(part) for part in value)
-        if isinstance(value, (list, tuple)) or hasattr(value, "__iter__")
-        else value
-    )
+    return tuple(float(part) for part in value) if hasattr(value, "__iter__") else value

@@ -100,7 +100,7 @@ class EpisodeResult:
         return {**asdict(self), "kept": self.kept}
 
 
-def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResult:
+def judge_episode(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResult:
     """Reduce an episode to its row."""
     histories = [finger_history(record, finger) for finger in range(len(record.fingers))]
     angle = float(record.theta[-1] - record.theta[0])
@@ -118,7 +118,7 @@ def judge(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResu
         finger_lifts=tuple(history.lifts for history in histories),
         face_changes=changes,
         faces_visited=tuple(len(set(history.faces)) for history in histories),
-        max_tilt=float(np.max(tilt(record))),
+        max_tilt=float(np.max(cube_tilt(record))),
         rise=float(np.mean(record.cube_position[begin:, 2]) - record.cube_position[0, 2]),
         tip_support=borne.tips,
         link_contact=borne.links,
@@ -156,7 +156,7 @@ MAX_STEP_ANGLE = np.pi / 4
 """Largest turn within one policy step [rad]: beyond it a quarter turn of the symmetric cube could hide."""
 
 
-def tilt(record: EpisodeRecord) -> Array:
+def cube_tilt(record: EpisodeRecord) -> Array:
     """Return the angle between the rotation's axis in the cube and in the world `(n + 1,)` [rad]."""
     axis = Rotation.from_quat(record.cube_quaternion).apply(record.axis)
     return np.asarray(np.arccos(np.clip(axis @ np.array(record.axis), -1.0, 1.0)), dtype=np.float64)
@@ -194,7 +194,7 @@ def exploits(record: EpisodeRecord) -> list[str]:
     if gained > 0.5 and free_spin(record) > MAX_FREE_SPIN_SHARE * gained:
         found.append("flung")
     # A cube that falls may tumble as it goes: the tilt counts only while it is held.
-    if not record.cut_short and np.max(tilt(record)) > MAX_TILT:
+    if not record.cut_short and np.max(cube_tilt(record)) > MAX_TILT:
         found.append("tumbled")
     if np.min(record.contacts.distance, initial=0.0) < -MAX_PENETRATION:
         found.append("penetration")

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand.hand import Array, FingerBase
-from tactile_cube.hand.link import Capsule, Link
-from tactile_cube.hand.model import HandModel
+from tactile_cube.hand.model import Capsule, HandModel, Link
 
 KP = 3.69
 """Stiffness of the impedance law [N m/rad]. Source: W, table."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, Array, Integers, mass_matrix_and_bias
-from tactile_cube.hand.urdf_elements import Coupling, Joint
+from tactile_cube.hand.urdf_elements import Joint, Mimic
 from tactile_cube.hand.urdf_tree import read_movable_joints
 
-__all__ = ["Coupling", "RigidBodyTree"]
+__all__ = ["Mimic", "RigidBodyTree"]
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class RigidBodyTree:
 
     @classmethod
     def from_urdf(
-        cls, text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Coupling] | None = None
+        cls, text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Mimic] | None = None
     ) -> RigidBodyTree:
         """Read a mechanism.
 

@@ -19,7 +19,7 @@ ROUNDING = 0.02
 
 
 @dataclass(frozen=True)
-class Coupling:
+class Mimic:
     """A joint that follows another one: position = ratio * position of `joint` + offset [rad or m]."""
 
     joint: str
@@ -79,7 +79,7 @@ class Joint:
     upper: float
     velocity: float
     effort: float
-    coupling: Coupling | None
+    coupling: Mimic | None
     body: Body
 
     @property
@@ -119,13 +119,13 @@ def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
     return value if value > 0.0 else float("inf")
 
 
-def _mimic(element: ElementTree.Element, name: str) -> Coupling | None:
+def _mimic(element: ElementTree.Element, name: str) -> Mimic | None:
     mimic = element.find("mimic")
     if mimic is None:
         return None
     where = f"the <mimic> of joint '{name}'"
     ratio, offset = number(mimic, "multiplier", where, 1.0), number(mimic, "offset", where, 0.0)
-    return Coupling(attribute(mimic, "joint", where), ratio, offset)
+    return Mimic(attribute(mimic, "joint", where), ratio, offset)
 
 
 def body_of(link: ElementTree.Element) -> Body:

@@ -15,9 +15,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand.hand import Array, CollisionShape, FingerBase, Hand
 from tactile_cube.hand.kinematics import grasp_angles
 from tactile_cube.hand.urdf import ROBOT_ROOT, origin_element, robot_element
-from tactile_cube.hand.urdf_files import package_of, with_own_files
-from tactile_cube.hand.urdf_finger import UrdfFinger, palm_shapes, read_finger
-from tactile_cube.hand.urdf_shapes import visual_elements
+from tactile_cube.hand.urdf_finger import UrdfFinger, palm_shapes, read_finger, visual_elements
+from tactile_cube.hand.urdf_tree import package_of, with_own_files
 from tactile_cube.untrusted_file import read_text
 
 DESCRIPTIONS = Path(__file__).parent / "descriptions"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.disturbances import Disturbance
@@ -22,13 +24,12 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
 from tactile_cube.identification.simulations import Unexplained, with_offsets
-from tactile_cube.identification.unseen import Unseen, unseen
 from tactile_cube.identification.verdict import Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.model import Model, effect_path
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
 from tactile_cube.measurement.replay.windows import steps_per_row
@@ -92,7 +93,7 @@ class Diagnosis:
         return ModelErrors(**overall, noise_floor=self.floor.overall, over_noise=over_noise, joints=joints)
 
 
-def diagnose(
+def diagnose_recording(
     recording: Recording,
     effects: Sequence[type[Effect]],
     engine: Engine = "pybullet",
@@ -220,3 +221,31 @@ def write_experiment(diagnosis: Diagnosis, folder: Path) -> Path | None:
     """The command file of the next experiment, if one is needed."""
     experiment = diagnosis.experiment
     return experiment.write(folder) if experiment and experiment.decides else None
+
+
+class Unseen(NamedTuple):
+    """An effect that a joint may have unseen.
+
+    Attributes:
+        effect: its name.
+        joint: where.
+        why: what the recording lacks.
+    """
+
+    effect: str
+    joint: str
+    why: str
+
+
+def unseen(effects: Sequence[type[Effect]], sizes: Mapping[str, Scales], named: Collection[str]) -> tuple[Unseen, ...]:
+    """Effects that no trial of a recording could show.
+
+    Args:
+        effects: the catalogue.
+        sizes: joint -> its sizes in the recording.
+        named: effects that were seen all the same, NAME@JOINT.
+    """
+    found = (
+        Unseen(effect_path(e), joint, why) for e in effects for joint, s in sizes.items() if (why := e.unseen_at(s))
+    )
+    return tuple(one for one in found if f"{one.effect}@{one.joint}" not in named)

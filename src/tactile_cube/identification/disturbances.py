@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.division import Division
 from tactile_cube.identification.search.evidence import judge, segment_errors
-from tactile_cube.measurement.comparing.repeats import repeats_of
+from tactile_cube.measurement.comparing.noise_floor import repeats_of
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model

@@ -24,8 +24,7 @@ from tactile_cube.identification.search.residual_starts import residual_candidat
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.simulations import with_offsets
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
@@ -62,7 +61,7 @@ class Identification:
         )
 
 
-def identify(
+def identify_effects(
     recording: Recording,
     effects: Sequence[str],
     engine: Engine = "pybullet",

@@ -15,8 +15,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.simulations import Simulations
 from tactile_cube.identification.verdict import Verdict, decide
-from tactile_cube.measurement.comparing.noise_floor import noise_floor
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.simulator import Engine
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part

@@ -8,7 +8,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.division import Division
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.description import MOST_LATE
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording

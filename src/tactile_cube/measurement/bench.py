@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.rigid_body import Coupling, RigidBodyTree
+from tactile_cube.hand.rigid_body import Mimic, RigidBodyTree
 from tactile_cube.measurement.excitation import safe_range
 from tactile_cube.measurement.recordings.description import Description, KnownForce, Touch, TrialEntry
 from tactile_cube.measurement.recordings.recording import Recording
@@ -45,7 +45,7 @@ class Bench:
 
     def tip(self) -> tuple[str, list[float]]:
         """The last joint and a point on its link, as far beyond its centre of mass as the joint is before it [m]."""
-        coupled = {name: Coupling(c.joint, c.ratio, c.offset) for name, c in self.description.coupled.items()}
+        coupled = {name: Mimic(c.joint, c.ratio, c.offset) for name, c in self.description.coupled.items()}
         tree = RigidBodyTree.from_urdf(self.rig.text, self.description.joints, coupled)
         return tree.dof_names[-1], (2 * tree.com[-1]).tolist()
 

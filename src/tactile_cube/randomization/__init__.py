@@ -11,11 +11,9 @@ from tactile_cube.randomization.distributions import (
     UniformPerJoint,
     sample,
 )
-from tactile_cube.randomization.grasp_starts import Grasps, GraspStarts, GraspTable
+from tactile_cube.randomization.grasp_starts import Grasps, GraspStarts, GraspTable, StartPoses, StartStates
 from tactile_cube.randomization.identified import identified
-from tactile_cube.randomization.learnability import Learnability, drawn_places
-from tactile_cube.randomization.randomization import Randomization
-from tactile_cube.randomization.start_states import StartPoses, StartStates
+from tactile_cube.randomization.randomization import Learnability, Randomization, drawn_places
 
 __all__ = [
     "Choice",

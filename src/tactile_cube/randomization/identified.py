@@ -61,7 +61,11 @@ def identified(
         values=ranges,
         factors=factors,
         shifts=shifts,
-        effects=[_range(effect, joint, one.parameters) for one, effect, joint in placed if _varies(effect)],
+        effects=[
+            _range(effect, joint, one.parameters)
+            for one, effect, joint in placed
+            if effect.stage is not Stage.MECHANISM
+        ],
         joint_offset=_offsets(model, randomization.joint_offset, joints),
     )
     effects = [effect(joint, **{k: e.value for k, e in one.parameters.items()}) for one, effect, joint in placed]
@@ -101,11 +105,6 @@ def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequen
             index = list(joints).index(joint)
             low[index], value[index], high[index] = estimate.low, estimate.value, estimate.high
     return low, value, high
-
-
-def _varies(effect: type[Effect]) -> bool:
-    """A changed mechanism is built into the world's bodies once and for all."""
-    return effect.stage is not Stage.MECHANISM
 
 
 def _range(effect: type[Effect], joint: str, parameters: Mapping[str, Estimate]) -> EffectRange:

@@ -105,7 +105,9 @@ class BulletBodies:
         bases = [hand.base_in_world(k) for k in range(len(hand.fingers))]
         self.fingers = [load_chain(self.client, urdf, *base) for urdf, base in zip(finger_urdfs, bases, strict=True)]
         self._inertias = [[self._inertia(body, link) for link in self._links] for body in self.fingers]
-        self._spare_links_without_a_shape()
+        for body, bare in zip(self.fingers, self._bare, strict=True):  # Bullet boxes links without a shape too
+            for link in (-1, *bare):
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
 
     def place(self, constants: EpisodeConstants, start: Start, angles: Array, velocities: Array) -> None:
         """Puts everything at the start of an episode.
@@ -252,12 +254,6 @@ class BulletBodies:
                     spinningFriction=constants.tip_spinning_friction if tip else 0.0,
                     physicsClientId=self.client,
                 )
-
-    def _spare_links_without_a_shape(self) -> None:
-        """Bullet boxes them too, and would compare them with their neighbours at every step."""
-        for body, bare in zip(self.fingers, self._bare, strict=True):
-            for link in (-1, *bare):
-                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
 
     def _forget_contacts(self) -> None:
         """Registers every finger anew with the broadphase; cube and table are new themselves.

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, Protocol
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain import Plant
+from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
 from tactile_cube.simulation.bullet_bodies import BulletBodies, com_arm
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import OBJECT_STATE
-from tactile_cube.simulation.loop import make_loop
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.native_library import find_compiler, load_native, native_library
+from tactile_cube.simulation.options import Loop, SimulationOptions
 
 Array = NDArray[np.float64]
 
@@ -90,3 +93,127 @@ class BulletEngine:
             state[:3] -= arm
             state[7:10] -= np.cross(state[10:13], arm)
         return state
+
+
+class PhysicsLoop(Protocol):
+    """Runs physics steps of bound arrays; both implementations give the same bits."""
+
+    kind: Literal["c", "python"]
+
+    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
+        """Says what the steps work on, in place.
+
+        Args:
+            chains: Body ids of the chains.
+            q: Positions of all joints of all chains, current before and after each run [rad].
+            v: Velocities, likewise [rad/s].
+            memory: The drivetrain's memory.
+        """
+        ...
+
+    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
+        """Runs physics steps.
+
+        Args:
+            steps: How many.
+            cube: Body id of the object; needed where `wrench` or `states` is given.
+            wrench: Force and torque on the object's centre (6,) [N, N m], or None.
+            states: (steps + 1, 13), filled with the object's state before each step and after the last, or None.
+        """
+        ...
+
+
+def make_loop(kind: Loop, client: int, plant: Plant) -> PhysicsLoop:
+    """The loop of that kind; `auto` takes the compiled one where it can be built."""
+    if kind == "python" or (kind == "auto" and find_compiler() is None):
+        return PythonLoop(client, plant)
+    try:
+        return NativeLoop(client, plant)
+    except (InputError, OSError):
+        if kind == "c":
+            raise
+        return PythonLoop(client, plant)
+
+
+class NativeLoop:
+    """All steps in one C call inside PyBullet's process."""
+
+    kind: Literal["c", "python"] = "c"
+
+    def __init__(self, client: int, plant: Plant) -> None:
+        """Attaches the compiled loop to a client as a PyBullet plugin; once for each client."""
+        self._library = load_native()
+        if pybullet.loadPlugin(str(native_library()), "_steps", physicsClientId=client) < 0:
+            raise InputError("PyBullet refused the compiled loop; choose simulation.loop=python")
+        self._handle = self._library.physics_client()
+        self._control = plant.kernel.control_address
+
+    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
+        """See `PhysicsLoop.bind`."""
+        self._chains = np.array(chains, dtype=np.int32)
+        self._bound = (q, v, np.zeros_like(q), memory)  # kept alive: C sees their addresses
+        self._who = (self._handle, self._chains.ctypes.data, len(chains), q.size // len(chains))
+        self._what = (self._control, *(array.ctypes.data for array in self._bound))
+
+    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
+        """See `PhysicsLoop.run`."""
+        if wrench is not None and states is None:
+            states = np.empty((steps + 1, OBJECT_STATE))
+        push, record = (None if array is None else array.ctypes.data for array in (wrench, states))
+        self._library.run_physics_steps(*self._who, steps, *self._what, cube, push, record)
+
+
+class PythonLoop:
+    """The same steps through PyBullet's Python functions."""
+
+    kind: Literal["c", "python"] = "python"
+
+    def __init__(self, client: int, plant: Plant) -> None:
+        """Takes the control step from the plant."""
+        self._client = client
+        self._control = plant.kernel.control_step
+
+    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
+        """See `PhysicsLoop.bind`."""
+        self._chains = list(chains)
+        self._q, self._v, self._memory = q, v, memory
+
+    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
+        """See `PhysicsLoop.run`."""
+        torque = np.zeros_like(self._q)
+        for i in range(steps):
+            self._control(i, self._q, self._v, torque, self._memory)
+            self._apply(torque)
+            if states is not None:
+                states[i] = self._object_state(cube)
+            if wrench is not None:
+                self._push(cube, wrench)
+            pybullet.stepSimulation(physicsClientId=self._client)
+            self._read(self._q, self._v)
+        if states is not None:
+            states[steps] = self._object_state(cube)
+
+    def _apply(self, torque: Array) -> None:
+        joints = range(torque.size // len(self._chains))
+        for body, forces in zip(self._chains, torque.reshape(len(self._chains), -1).tolist(), strict=True):
+            pybullet.setJointMotorControlArray(
+                body, joints, pybullet.TORQUE_CONTROL, forces=forces, physicsClientId=self._client
+            )
+
+    def _read(self, q: Array, v: Array) -> None:
+        joints = range(q.size // len(self._chains))
+        for c, body in enumerate(self._chains):
+            states = pybullet.getJointStates(body, joints, physicsClientId=self._client)
+            here = slice(c * len(joints), (c + 1) * len(joints))
+            q[here], v[here] = [state[0] for state in states], [state[1] for state in states]
+
+    def _object_state(self, cube: int) -> Array:
+        position, quaternion = pybullet.getBasePositionAndOrientation(cube, physicsClientId=self._client)
+        linear, angular = pybullet.getBaseVelocity(cube, physicsClientId=self._client)
+        return np.array([*position, *quaternion, *linear, *angular])
+
+    def _push(self, cube: int, wrench: Array) -> None:
+        centre, _ = pybullet.getBasePositionAndOrientation(cube, physicsClientId=self._client)
+        frame = pybullet.WORLD_FRAME
+        pybullet.applyExternalForce(cube, -1, wrench[:3].tolist(), centre, frame, physicsClientId=self._client)
+        pybullet.applyExternalTorque(cube, -1, wrench[3:].tolist(), frame, physicsClientId=self._client)

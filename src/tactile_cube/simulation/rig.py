@@ -19,8 +19,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import roll_pitch_yaw
 from tactile_cube.simulation.bullet_bodies import connect, load_chain
+from tactile_cube.simulation.bullet_engine import make_loop
 from tactile_cube.simulation.drive import LEAST_INERTIA, TENDON_DAMPING, TENDON_STIFFNESS
-from tactile_cube.simulation.loop import make_loop
 from tactile_cube.simulation.options import SimulationOptions
 
 Array = NDArray[np.float64]

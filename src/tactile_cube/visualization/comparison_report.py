@@ -1,18 +1,203 @@
 """The report of `compare`: how well the model follows, where it fails, how sure that is, what to do next."""
 
-from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import common_unit, milli, short
-from tactile_cube.visualization.comparison_sections import (
-    band_section,
-    error_section,
-    method_section,
-    overlay_section,
-    recording_section,
-    test_section,
-    where_section,
-)
+from tactile_cube.visualization import comparison_figures as figures
 from tactile_cube.visualization.comparison_summary import floor_source, outcome
-from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
+from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Report, Section, Table, Tile, Tone
+
+MOST_OVERLAYS = 6
+MOST_CORRELATIONS = 8
+MOST_WARNINGS = 4
+FLOORS = {
+    "repeats": "The noise floor is the scatter of repeats: how much trials of one command differ. It contains sensor "
+    "noise and what the machine does not repeat.",
+    "guess": "Nothing was repeated, so the noise floor is a guess: the position sensor's noise, from the fast part of "
+    "the signals and the sensor's resolution. It does not contain what the machine does not repeat.",
+    "contact": "The noise floor is the error of a grasp with all true contact effects: drives are known to some 10 % "
+    "only, and the contact solver stops early. Joint offsets and the object's place are fitted to each trial.",
+}
+
+
+def recording_section(recording: Recording, model: ModelFile | None) -> Section:
+    """What was compared with what, and what was odd about the recording."""
+    seconds = sum(trial.duration for trial in recording.trials)
+    kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
+    starts = len({trial.initialisation for trial in recording.trials})
+    said = "the values stated in recording.yaml"
+    if model is not None:
+        effects = ", ".join(one.effect for one in model.effects) or "no added effect"
+        said = f"a model file: values for {', '.join(model.values) or 'no constant'}; {effects}"
+    rows = [
+        ("recording", str(recording.folder)),
+        (
+            "joints",
+            ", ".join(recording.joints) + (f" (coupled: {', '.join(recording.coupled)})" if recording.coupled else ""),
+        ),
+        ("trials", f"{len(recording.trials)} of {kinds}; {seconds:.0f} s at {recording.rate:g} Hz"),
+        ("robot initialisations", f"{starts}, each with joint offsets of its own"),
+        ("simulated with", said),
+    ]
+    more = len(recording.warnings) - MOST_WARNINGS
+    shown = [*recording.warnings[:MOST_WARNINGS], *([f"and {more} more, see the terminal"] if more > 0 else [])]
+    odd = Callout(f"{len(recording.warnings)} things were odd about this recording:", "warn")
+    warnings: list[Block] = [odd, Listing(shown)] if shown else []
+    text = [
+        "The simulation received the rig's commands. It started where the rig started and ran freely to the end of "
+        "each trial: nothing pulls it back to the measurement."
+    ]
+    return Section("What was compared", text, [Table(("", ""), rows), *warnings])
+
+
+def error_section(comparison: Comparison) -> Section:
+    """The error of each joint beside its noise floor."""
+    floor, units = comparison.floor, comparison.recording.units
+    rows = []
+    for joint, error in comparison.errors.joints.items():
+        beside = [by_joint.get(joint) for by_joint in (floor.sensor, floor.step_size)]
+        rows.append(
+            (
+                joint,
+                milli(error, units[joint]),
+                milli(floor.joints[joint], units[joint]),
+                f"{error / floor.joints[joint]:.2f}",
+                *("" if one is None else milli(one, units[joint]) for one in beside),
+            )
+        )
+    unit = common_unit(units.values())
+    overall = (milli(comparison.errors.overall, unit), milli(floor.overall, unit))
+    rows.append(("all", *overall, f"{comparison.ratio:.2f}", "", ""))
+    text = [
+        f"{FLOORS[floor.source]} A perfect model scores 1 in the column 'error / floor'. A model that scores 3 lacks "
+        "something three times as large as the noise. The last two columns are the position sensor's own noise, and "
+        "what the simulator's time step adds to any model's error."
+    ]
+    header = ("joint", "error (RMS)", "noise floor", "error / floor", "sensor noise", "time step")
+    guess = [Callout("The noise floor is a guess: repeat each kind of trial to measure it.", "warn")]
+    return Section("How well", text, [Table(header, rows), *(guess if floor.source == "guess" else [])])
+
+
+def where_section(comparison: Comparison, title: str = "Where it fails") -> Section:
+    """In words, and as a map of joints and regimes."""
+    caption = (
+        "Error / noise floor of each joint in each regime: 1 is noise, red is where the model fails. An outlier in a "
+        "row hints at what is missing. Friction shows just after reversals and at low speed, delay and inertia at high "
+        "speed, gravity and springs by joint position."
+    )
+    blocks: list[Block] = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
+    return Section(title, (), blocks)
+
+
+def overlay_section(
+    comparison: Comparison, title: str = "Measured and simulated", before: Comparison | None = None
+) -> Section:
+    """Measured over simulated, the worst trial of each joint; with `before`, the model as it was is drawn too."""
+    worst = before or comparison
+    blocks = []
+    order = sorted(worst.errors.joints, key=lambda j: -worst.errors.joints[j] / worst.floor.joints[j])
+    for name in order[:MOST_OVERLAYS]:
+        joint = comparison.recording.joints.index(name)
+        trial = figures.worst_trial(worst, joint)
+        one, unit = comparison.recording.trials[trial], comparison.recording.units[name]
+        error = milli(comparison.trials[trial].joints[name], unit)
+        fell = error if before is None else f"{milli(before.trials[trial].joints[name], unit)} before, {error} after"
+        caption = f"{name}, its worst trial {one.name} ({one.kind}): {fell}."
+        blocks.append(Figure(figures.overlay(comparison, trial, joint, before), caption))
+        if before is None:
+            said = "Shaded: more than three noise floors."
+        else:
+            said = "Before and after, beside what noise alone leaves."
+        left = figures.residual(comparison, trial, joint, before)
+        blocks.append(Figure(left, f"What the simulation did not follow. {said}"))
+    return Section(title, (), blocks)
+
+
+def band_section(comparison: Comparison) -> list[Section]:
+    """The measurement among randomised simulations."""
+    if comparison.band is None:
+        return []
+    text = [
+        f"{comparison.band.simulations} simulations with constants drawn from their ranges. Training on these ranges "
+        "covers the real rig if the measured line lies in the band. 95 % of the samples should; "
+        f"{100 * comparison.band.inside:.0f} % do."
+    ]
+    rows = [(joint, f"{100 * share:.0f} %") for joint, share in comparison.band.joints.items()]
+    blocks: list[Figure | Table] = [Table(("joint", "measured samples inside"), rows)]
+    for name in list(comparison.errors.joints)[:MOST_OVERLAYS]:
+        joint = comparison.recording.joints.index(name)
+        trial = figures.worst_trial(comparison, joint)
+        trial_name = comparison.recording.trials[trial].name
+        blocks.append(
+            Figure(
+                figures.band(comparison, trial, joint),
+                f"{name} in {trial_name}: difference from the simulation with the central values.",
+            )
+        )
+    return [Section("Among randomised simulations", text, blocks)]
+
+
+def test_section(comparison: Comparison) -> Section:
+    """What is left beside the noise floor, and, where it is more, what it goes with."""
+    floor = comparison.floor.joints
+    ratios = {joint: error / floor[joint] for joint, error in comparison.errors.joints.items()}
+    memory = {one.joint: f"{1e3 * one.correlation_time:.0f} ms" for one in comparison.whiteness}
+    rows = [(joint, f"{ratio:.2f}", memory[joint], _what_is_left(ratio)) for joint, ratio in ratios.items()]
+    table = Table(("joint", "left, in noise floors", "correlation time of the error", "in words"), rows)
+    above = [joint for joint, ratio in ratios.items() if ratio > AT_THE_FLOOR]
+    if not above:
+        return Section(
+            "Is it noise?",
+            [
+                "Yes, as far as this recording can tell: no joint's error is above the noise floor. A free-running "
+                "simulation integrates every small error, so its error is correlated in time; a test of whiteness "
+                "says no more here."
+            ],
+            [table],
+        )
+    text = [
+        f"Not at {', '.join(above)}: the error is above the noise floor. Noise follows no other signal; the error "
+        "follows the signals below, which hint at its cause. 'By chance' is the probability of such a correlation "
+        "between unrelated signals with the same autocorrelation."
+    ]
+    strongest = [
+        (f"{c.joint} error", c.cause, f"{c.correlation:+.2f}", f"{1e3 * c.delay:.0f} ms", probability(c.p_value))
+        for c in comparison.cross_correlations
+        if c.joint in above
+    ][:MOST_CORRELATIONS]
+    header = ("", "follows", "correlation", "after", "by chance (p)")
+    return Section("Is it noise?", text, [table, *([Table(header, strongest)] if strongest else [])])
+
+
+def _what_is_left(ratio: float) -> str:
+    if ratio <= AT_THE_FLOOR:
+        return "at the noise floor"
+    return f"more than noise, {short(ratio, 2)} times: something is left to be found"
+
+
+def method_section() -> Section:
+    """How the numbers were made."""
+    lines = [
+        "Error: root mean square of measured minus simulated angle over all samples of all trials; the mean "
+        "difference of each joint in each robot initialisation is removed first, because a joint's zero is "
+        "calibrated anew each time.",
+        "Noise floor: standard deviation of repeats of one command about their mean, or the sensor's noise where "
+        "nothing was repeated; compare, diagnose and identify state the same. Time step: what the simulation's "
+        "own step adds, from the difference that steps of an eighth make. A model is at the floor within 1.3 "
+        "times both in quadrature.",
+        "Just after a reversal: within 0.2 s after a joint's velocity changed its sign. Standstill, low, medium and "
+        "high speed: below 0.02, 0.3, 1.5 rad/s and above (m/s where a joint slides). Low and "
+        "high load: below and above half of the largest torque.",
+        "Whiteness: Ljung-Box test over 20 lags. Cross-correlation: the strongest within 0.1 s; its p-value allows "
+        "for the autocorrelation of both signals.",
+    ]
+    return Section("How this was computed", (), [Listing(lines)], folded=True)
+
+
+def probability(value: float) -> str:
+    """A probability; very small ones are only said to be small."""
+    return "< 0.001" if value < 1e-3 else f"{value:.3f}"
 
 
 def comparison_report(comparison: Comparison, command: str, model_path: str | None) -> Report:

@@ -19,7 +19,7 @@ from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import common_unit, milli, of_joint, short
-from tactile_cube.visualization.comparison_sections import (
+from tactile_cube.visualization.comparison_report import (
     band_section,
     overlay_section,
     recording_section,
@@ -74,7 +74,11 @@ def diagnosis_report(
         said = headline(diagnosis)
     units = before.recording.units
     sets = diagnosis.get("sets", [])
-    names = sets_in_words(sets) if sets else _names(diagnosis["effects"], " and ")
+    names = (
+        sets_in_words(sets)
+        if sets
+        else " and ".join(f"{effect['name']} at {', '.join(effect['joints'])}" for effect in diagnosis["effects"])
+    )
     sections = [
         _verdict_section(diagnosis, units),
         staircase_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
@@ -192,7 +196,3 @@ def _tiles(diagnosis: Mapping[str, Any], unit: str) -> list[Tile]:
         if errors.get(key) is not None:
             tiles.append(Tile(milli(errors[key], unit), label))
     return tiles
-
-
-def _names(effects: Sequence[Mapping[str, Any]], between: str) -> str:
-    return between.join(f"{effect['name']} at {', '.join(effect['joints'])}" for effect in effects)

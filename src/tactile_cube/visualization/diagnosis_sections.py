@@ -18,7 +18,7 @@ from tactile_cube.visualization.charts import (
     svg,
     time_chart,
 )
-from tactile_cube.visualization.comparison_sections import probability
+from tactile_cube.visualization.comparison_report import probability
 from tactile_cube.visualization.report import Callout, Figure, Listing, Section, Table
 
 WIDE = 6  # joints from which on a table has them in its rows

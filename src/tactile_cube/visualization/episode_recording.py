@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
 
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
+from tactile_cube.evaluation.training_curve import Curve
 from tactile_cube.evaluation.verdict import EpisodeResult
 from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.visualization.blueprint import episode_blueprint
+from tactile_cube.visualization.blueprint import episode_blueprint, pair_blueprint
+from tactile_cube.visualization.curves import write_learning_curves
 from tactile_cube.visualization.episode_scene import FINGER_COLOURS, log_hand, log_motion
 from tactile_cube.visualization.rerun_recording import Branch, Colours, recording_file
 
@@ -108,3 +112,42 @@ def _joint_lines(
     count = values.shape[1]
     painted = None if colours is None else [colours[joint % len(colours)] for joint in range(count)]
     branch.lines(entity, time, values, [f"{signal}, joint {joint + 1}" for joint in range(count)], painted)
+
+
+PICTURE = (6.0, 6.0)
+"""Size of the learning curves [inch]: a column beside the episodes."""
+
+
+def write_pair(
+    path: Path,
+    episodes: Mapping[str, tuple[EpisodeRecord, str, str]],
+    hand: Hand,
+    curve: Curve | None,
+    words: str,
+) -> None:
+    """Write episodes side by side on one time line.
+
+    Args:
+        path: file to write, `.rrd`.
+        episodes: path below which each is written -> record, name, Markdown that describes it.
+        hand: the hand that acted.
+        curve: learning curve of the run; None: there is none.
+        words: Markdown about the run.
+    """
+    names = {root: name for root, (_, name, _) in episodes.items()}
+    fingers = next(iter(episodes.values()))[0].fingers
+    with recording_file(path, pair_blueprint(fingers, hand.name, names, curve is not None)) as stream:
+        for root, (record, _, described) in episodes.items():
+            log_episode(Branch(stream, f"{root}/"), record, hand, described)
+        branch = Branch(stream)
+        if curve is not None:
+            log_curves(branch, curve)
+        branch.always("run", rr.TextDocument(words, media_type="text/markdown"))
+
+
+def log_curves(branch: Branch, curve: Curve) -> None:
+    """Write the learning curves as a picture: a plot of the viewer would share the time line of the episodes."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "curves.png"
+        write_learning_curves([curve], file, curve.label, PICTURE)
+        branch.log("curves", rr.EncodedImage(path=file))

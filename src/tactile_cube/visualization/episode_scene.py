@@ -9,7 +9,7 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.env.touch import TOUCH_FORCE
+from tactile_cube.env.rotation import TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import ObjectMesh

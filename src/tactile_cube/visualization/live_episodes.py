@@ -23,17 +23,16 @@ from tactile_cube.composition import composed
 from tactile_cube.env import Conditions
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import environment
-from tactile_cube.evaluation.policy_source import PolicySource, find_policy
+from tactile_cube.evaluation.policies import PolicySource, find_policy
 from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.training_curve import read_curve
-from tactile_cube.evaluation.verdict import judge
+from tactile_cube.evaluation.verdict import judge_episode
 from tactile_cube.training.run import POLICY
 from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.visualization.blueprint import live_blueprint
-from tactile_cube.visualization.episode_recording import description, log_episode
+from tactile_cube.visualization.episode_recording import description, log_curves, log_episode
 from tactile_cube.visualization.live import read_request
 from tactile_cube.visualization.rerun_recording import APPLICATION, Branch
-from tactile_cube.visualization.run_view import log_curves
 from tactile_cube.visualization.viewer import Viewer, start_viewer
 
 NICENESS = 10
@@ -74,7 +73,7 @@ class LiveEpisodes:
         finally:
             env.close()
         stream = self._opened(config)
-        words = f"# {self._folder.name}: {steps} steps\n\n{description(judge(record))}"
+        words = f"# {self._folder.name}: {steps} steps\n\n{description(judge_episode(record))}"
         branch = Branch(stream, start=self._start, stride=STRIDE)
         log_episode(branch, record, config.hand, words)
         with contextlib.suppress(InputError):  # no row of metrics yet

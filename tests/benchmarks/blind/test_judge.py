@@ -260,7 +260,7 @@ def test_the_page_names_commit_seeds_and_what_was_drawn_again() -> None:
     said = page.markdown([pushed], judge.summarise([pushed]), command)
     assert "- trials that somebody pushed in: 1; pushes left out: 0; other stretches left out: 0" in said
     row = page.round_row(judge.summarise(judged), command)
-    assert row == "| 7, 1 | `abc` | 0, 1, 0 (0) | 0 of 0 | 2 | ... |"
+    assert row == "| 7, 1 | `abc` | 0, 1, 0 (0) | 0 of 0 | ... |"
 
 
 def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

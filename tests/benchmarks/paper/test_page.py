@@ -100,7 +100,7 @@ def test_what_training_cost_is_read_from_the_shipped_card() -> None:
     card = read_card(SHIPPED / "published.md")
     assert float(card["CPU hours"].split()[0]) > 0
     cost = f"{card['CPU hours']}; teacher: {card['teacher']}"
-    assert f"| 600, without a teacher | {cost} | published, 0 |" in line(
+    assert f"| 600, without a teacher | {cost} | `python" in line(
         paper_page([results("paper", "published")]), "CPU hours"
     )
 

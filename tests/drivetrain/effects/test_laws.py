@@ -77,7 +77,7 @@ class Row:
         """What the law returns at each step; the signals are changed in place."""
         effect = catalogue()[self.effect]
         p = np.array([values.get(one.name, one.neutral) for one in effect.parameters])
-        state = np.zeros(effect.state_size(DT))
+        state = np.zeros(effect.kept(DT))
         return [float(getattr(effect, self.law)(x, self.joint, p, state, DT)) for x in steps]
 
 

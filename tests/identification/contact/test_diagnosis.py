@@ -1,18 +1,26 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.model_file import ModelFile, Provenance
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, Provenance
+from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.choice import ContactSearch
-from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, verdict_of, with_contact
+from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, compare_contact, verdict_of, with_contact
+from tactile_cube.measurement.comparing.comparison import comparison_json
 from tactile_cube.measurement.comparing.error import ErrorSummary
-from tactile_cube.measurement.replay.hand_replay import Contact
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.writing import write_recording
+from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tests.identification.easy_contact import EasyTrial, GrippedTrial, friction
+from tests.measurement.replay.test_hand_replay import source
 
 
 def search(lateral: float = 0.9, spinning: float = 0.1) -> ContactSearch:
     trials = [friction(kind, k, lateral, spinning) for k in range(3) for kind in ("hold", "twist")]
     made = ContactSearch(trials[:4], trials[4:], lambda line: None)  # type: ignore[arg-type]
-    made.run(Contact({}))
+    made.run(ContactModel({}))
     return made
 
 
@@ -35,7 +43,7 @@ def test_the_effects_that_are_missing_are_found_and_no_others(truth: dict[str, f
 def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list[str]) -> None:
     trials = [GrippedTrial("hold", k, {("object_size", "excess"): size}, {}) for k in range(4)]
     found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
-    found.run(Contact({}))
+    found.run(ContactModel({}))
     assert [one.effect.name for one in found.found] == names
     assert [one.gain_of for one in found.found] == ["offsets"] * len(names)  # and not of the error, which stays
     assert found.rivals == []
@@ -50,7 +58,7 @@ def test_an_effect_that_explains_as_much_is_a_rival() -> None:
     key, other = ("lateral_friction", "coefficient"), ("tip_compliance", "compliance")
 
     class Confused(EasyTrial):
-        def residual(self, contact: Contact) -> np.ndarray:
+        def residual(self, contact: ContactModel) -> np.ndarray:
             soft = contact.values.get(other[0], {}).get(other[1], 0.0)
             rough = contact.values.get(key[0], {}).get(key[1], 0.9)
             off = min(abs(np.log(rough / 0.5)), abs(soft / 1e-3 - 1))
@@ -58,7 +66,7 @@ def test_an_effect_that_explains_as_much_is_a_rival() -> None:
 
     trials = [Confused("hold", k, {}, {}) for k in range(4)]
     found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
-    found.run(Contact({}))
+    found.run(ContactModel({}))
     assert verdict_of(found, 1e-3) == "ambiguous"
     named = {found.found[-1].effect.name, *(one.effect.name for one in found.rivals)}
     assert named == {"lateral_friction", "tip_compliance"}
@@ -104,3 +112,29 @@ def test_the_model_file_tells_which_trials_judged() -> None:
 def test_an_adequate_contact_adds_nothing_to_the_model() -> None:
     model = ModelFile(joints=["a"])
     assert diagnosis(0.9).into(model, alone=False).effects == []
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    folder: Path = tmp_path_factory.mktemp("twist") / "r"
+    made = source(kinds=["twist"], levers=[0.06], hidden=["spinning_friction: radius=0.01"]).recordings(seed=4)[""]
+    write_recording(folder, made)
+    return read_recording(folder)
+
+
+def test_a_model_with_the_hidden_effect_follows_the_grasp_better(recording: Recording) -> None:
+    truth = {"radius": Estimate(value=0.01, low=0.01, high=0.01, unit="m")}
+    model = ModelFile(
+        joints=list(recording.joints), effects=[EffectEstimate(effect="spinning_friction", parameters=truth)]
+    )
+    said: list[str] = []
+    stated, true = (compare_contact(recording, one, say=said.append) for one in (None, model))
+    assert true.errors.overall < 0.6 * stated.errors.overall
+    assert said == ["twist_0_0 simulated, 1 of 1"] * 2
+    assert comparison_json(true)["noise_floor"]["source"] == "guess"
+    assert np.isfinite(true.ratio)
+
+
+def test_a_model_of_another_rig_is_refused(recording: Recording) -> None:
+    with pytest.raises(InputError, match=r"joints \['a'\] are not those of the recording"):
+        compare_contact(recording, ModelFile(joints=["a"]))

@@ -7,11 +7,11 @@ from tactile_cube.identification.contact.trial import FARTHEST, ContactTrial
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
+from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tests.measurement.replay.test_hand_replay import source
 
-STATED, SLIPPERY = Contact({}), Contact({"spinning_friction": {"radius": 0.01}})
+STATED, SLIPPERY = ContactModel({}), ContactModel({"spinning_friction": {"radius": 0.01}})
 OFFSET = 0.015  # [rad] largest
 
 
@@ -49,11 +49,11 @@ def test_the_cost_of_a_value_does_not_depend_on_what_was_tried_between(replay: H
     other = ContactTrial(replay, trial.trial)
     other.cost(STATED)
     for radius in (0.003, 0.03):
-        other.cost(Contact({"spinning_friction": {"radius": radius}}))
+        other.cost(ContactModel({"spinning_friction": {"radius": radius}}))
     trial.cost(STATED)
     assert other.cost(SLIPPERY) == trial.cost(SLIPPERY)
 
 
 def test_a_neutral_value_is_simulated_once(trial: ContactTrial) -> None:
     stated = trial.residual(STATED)
-    assert trial.residual(Contact({"object_mass": {"excess": 0.0}})) is stated
+    assert trial.residual(ContactModel({"object_mass": {"excess": 0.0}})) is stated

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tactile_cube.measurement.comparing import comparison as module
-from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare, comparison_json
+from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import Table, table, write
 
@@ -13,7 +13,7 @@ from tests.measurement.small_rig import Table, table, write
 @pytest.fixture(scope="module")
 def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
     recording = read_recording(write(tmp_path_factory.mktemp("recording")))
-    return compare(recording, simulations=8, spread={"kd": 0.3, "offset": 0.02})
+    return compare_recording(recording, simulations=8, spread={"kd": 0.3, "offset": 0.02})
 
 
 def test_comparison_json_has_what_others_script_against(comparison: Comparison) -> None:
@@ -44,7 +44,7 @@ def test_steps_are_shorter_where_the_sensors_would_show_their_error(
         columns.update(table(noise=noise))
 
     recording = read_recording(write(tmp_path, fine_encoder, quiet))
-    comparison, usual = compare(recording, step=step), compare(recording, step=USUAL_STEP)
+    comparison, usual = compare_recording(recording, step=step), compare_recording(recording, step=USUAL_STEP)
     assert comparison.step == pytest.approx(used)
     smaller = comparison.floor.step_size["a"] / usual.floor.step_size["a"]
     assert smaller == pytest.approx(1.0 if used == USUAL_STEP else 1.0 / (module.FINER - 1))

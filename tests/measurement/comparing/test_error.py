@@ -1,10 +1,21 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.comparing.error import normalised_fit, raw_residuals, residuals, summarise_errors
+from tactile_cube.measurement.comparing.error import (
+    free_run_error,
+    normalised_fit,
+    raw_residuals,
+    residuals,
+    summarise_errors,
+    with_fitted_offsets,
+)
 from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.simulator import Simulator, free_run
 from tests.measurement.small_rig import write
 
 
@@ -40,3 +51,30 @@ def test_of_the_raw_error_nothing_is_removed_and_the_fit_is_what_is_left_of_the_
     assert summarise_errors(raw, recording.joints).joints["a"] == pytest.approx(0.02)
     halves = [trial.position.mean(axis=0) + 0.5 * (trial.position - trial.position.mean(axis=0)) for trial in trials]
     assert normalised_fit(trials, raw_residuals(trials, halves), ("a", "b"))["a"] == pytest.approx(50.0)
+
+
+STEP = 0.005
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Trials that the nominal model itself "measured", each initialisation with an offset of its own."""
+    read = read_recording(write(tmp_path_factory.mktemp("recording")))
+    nominal = nominal_model(read)
+    true = {key: np.array([0.04, 0.0]) for key in nominal.offsets}
+    made = free_run(read, replace(nominal, offsets=true), step=STEP)
+    return read.with_trials(
+        [replace(t, position=s.position, torque=s.torque) for t, s in zip(read.trials, made, strict=True)]
+    )
+
+
+def test_offsets_go_to_the_true_side_by_what_gravity_does_with_them(recording: Recording) -> None:
+    found = with_fitted_offsets(Simulator(recording, step=STEP), nominal_model(recording))
+    for offset in found.offsets.values():
+        assert 0.01 < offset[0] < 0.06
+
+
+def test_the_offsets_found_never_make_a_model_follow_worse(recording: Recording) -> None:
+    simulator, nominal = Simulator(recording, step=STEP), nominal_model(recording)
+    before, after = simulator.free_runs([nominal, with_fitted_offsets(simulator, nominal)])
+    assert free_run_error(recording, after).overall < free_run_error(recording, before).overall

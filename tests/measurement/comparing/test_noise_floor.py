@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.measurement.comparing.error import ErrorSummary
-from tactile_cube.measurement.comparing.noise_floor import noise_floor
-from tactile_cube.measurement.comparing.repeats import aligned_repeats
-from tactile_cube.measurement.noise import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import aligned_repeats, noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import table, write
 

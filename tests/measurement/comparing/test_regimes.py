@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from tactile_cube.measurement.comparing.error import summarise_errors
-from tactile_cube.measurement.comparing.in_words import where_it_fails
 from tactile_cube.measurement.comparing.noise_floor import noise_floor
-from tactile_cube.measurement.comparing.regimes import after_reversal, latest_direction, regimes
+from tactile_cube.measurement.comparing.regimes import after_reversal, latest_direction, regimes, where_it_fails
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tests.measurement.small_rig import write

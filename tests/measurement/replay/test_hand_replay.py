@@ -11,12 +11,12 @@ from tactile_cube.measurement.bench import has_free_motion, with_object, without
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, contact_of
+from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, contact_of
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.simulated_grasp import SimulatedGrasp
 
-TRUTH = Contact({"lateral_friction": {"coefficient": 0.5}})
+TRUTH = ContactModel({"lateral_friction": {"coefficient": 0.5}})
 NO_OFFSET = np.zeros(12)
 
 
@@ -49,7 +49,7 @@ def replay(recording: Recording) -> HandReplay:
     return HandReplay(recording, nominal_model(recording))
 
 
-def error(replay: HandReplay, recording: Recording, contact: Contact) -> float:
+def error(replay: HandReplay, recording: Recording, contact: ContactModel) -> float:
     trial = recording.trials[0]
     residual = trial.position - replay.simulate(trial, contact, NO_OFFSET).position
     return float(np.sqrt(np.mean(residual**2)))
@@ -58,14 +58,14 @@ def error(replay: HandReplay, recording: Recording, contact: Contact) -> float:
 def test_the_truth_leaves_little_and_other_friction_much_more(replay: HandReplay, recording: Recording) -> None:
     true = error(replay, recording, TRUTH)
     assert true < 1e-3
-    assert error(replay, recording, Contact({})) > 4 * true
+    assert error(replay, recording, ContactModel({})) > 4 * true
     assert error(replay, recording, TRUTH.changed("object_mass", excess=-0.1)) > 2 * true
 
 
 def test_the_load_slips_later_with_more_friction(replay: HandReplay, recording: Recording) -> None:
     trial = recording.trials[0]
     rough, smooth = (
-        replay.simulate(trial, Contact({"lateral_friction": {"coefficient": mu}}), NO_OFFSET).position
+        replay.simulate(trial, ContactModel({"lateral_friction": {"coefficient": mu}}), NO_OFFSET).position
         for mu in (0.9, 0.3)
     )
     assert trial.load is not None
@@ -109,7 +109,7 @@ def test_a_model_file_says_what_the_contact_is_like() -> None:
         EffectEstimate(effect="torque_bias@a", parameters={"bias": half}),
     ]
     assert contact_of(ModelFile(joints=["a"], effects=effects)) == TRUTH
-    assert contact_of(None) == Contact({})
+    assert contact_of(None) == ContactModel({})
 
 
 def test_an_unknown_kind_of_grasp_is_refused() -> None:

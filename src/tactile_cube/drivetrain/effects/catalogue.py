@@ -24,7 +24,12 @@ def catalogue() -> dict[str, EffectClass]:
     """Return all effects of this package by name, in the order in which they act."""
     package = __package__ or __name__.rpartition(".")[0]
     modules = (import_module(f"{package}.{name}") for name in CATALOGUE_MODULES)
-    found = (value for module in modules for value in vars(module).values() if _defines_effect(value, module.__name__))
+    found = (
+        value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module.__name__
+    )
     return {effect.name: effect for effect in found}
 
 
@@ -138,7 +143,3 @@ def _own_effect(path: str) -> EffectClass:
     if not (isinstance(found, type) and issubclass(found, Effect)):
         raise InputError(f"effect '{path}': '{module_name}' has no subclass of Effect named '{class_name}'")
     return found
-
-
-def _defines_effect(value: object, module: str) -> bool:
-    return isinstance(value, type) and issubclass(value, Effect) and value.__module__ == module

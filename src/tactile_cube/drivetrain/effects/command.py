@@ -42,10 +42,7 @@ class CommandDeadZone(Effect):
         others = [form for form in super().starts_at(scales) if "torque" not in form]
         return [*others, *({"torque": share * scales.torque} for share in DEAD)]
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 2: command in force, first-call flag."""
-        return 2
+    state_size = 2  # command in force, first-call flag
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
@@ -103,10 +100,7 @@ class RateLimit(Effect):
         """Return limits below the fastest command."""
         return [{"speed": share * scales.command_speed} for share in RATES]
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 2: limited command, first-call flag."""
-        return 2
+    state_size = 2  # limited command, first-call flag
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

@@ -45,10 +45,7 @@ class IntegralAction(Effect):
         plain, _ = cls.forms_at(scales)
         return [plain, *({**plain, "limit": share * scales.torque} for share in CLAMPS)]
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 4: 0 to begin in balance, 2 as it is, else 1; integral, last command and last reading."""
-        return 4
+    state_size = 4  # 0 to begin in balance, 2 as it is, else 1; integral, last command and last reading
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
@@ -114,10 +111,7 @@ class VelocityFeedforward(Effect):
     forms = ({"gain": 0.1},)
     details = ("smoothing",)
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 2: first-call flag and smoothed command."""
-        return 2
+    state_size = 2  # first-call flag and smoothed command
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

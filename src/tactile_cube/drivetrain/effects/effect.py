@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import isfinite, nan
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -123,6 +123,8 @@ class Effect:
     """Parameters that a search frees last, where a form fits the data already."""
     contains: ClassVar[tuple[str, ...]] = ()
     """Names of simpler effects that are special cases of this one."""
+    state_size: ClassVar[Any] = 0
+    """How many numbers the law keeps between steps, zero after a reset; a class method of the step [s] if it counts."""
     weighs: ClassVar[bool] = False
     """Whether the law reads WEIGHT, which makes a step several per cent slower."""
     constant_reading: ClassVar[str] = ""
@@ -221,9 +223,9 @@ class Effect:
         return None
 
     @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return how many numbers the law keeps between steps of `dt` [s]; they are zero after a reset."""
-        return 0
+    def kept(cls, dt: float) -> int:
+        """Return `state_size` for steps of `dt` [s]."""
+        return int(cls.state_size(dt) if callable(cls.state_size) else cls.state_size)
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

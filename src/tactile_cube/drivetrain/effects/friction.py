@@ -165,10 +165,7 @@ class PreslidingFriction(Effect):
         {"breakaway": 0.003, "excess": 0.02, "micro_damping": 0.1},
     )
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 1: the bristle deflection z, -1 to 1."""
-        return 1
+    state_size = 1  # the bristle deflection z, -1 to 1
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

@@ -213,10 +213,7 @@ class ActuatorLag(Effect):
         Parameter("time_constant", unit="s", neutral=0.0, low=0.0, high=0.3, typical=0.01, source="5-100 ms"),
     )
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 4: delivered torque, first-call flag, last torque asked for and its share in the delivered one."""
-        return 4
+    state_size = 4  # delivered torque, first-call flag, last torque asked for and its share in the delivered one
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

@@ -66,10 +66,7 @@ class ElasticJoint(Effect):
             found.append({"compliance": 1.0 / spring, "rotor": 0.5 * scales.inertia, "damping": damping})
         return found
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 6: th - q, th' - q', first-call flag, last q', rotor's mean speed at a resting link, its slope."""
-        return 6
+    state_size = 6  # th - q, th' - q', first-call flag, last q', rotor's mean speed at a resting link, its slope
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
@@ -141,10 +138,7 @@ class VelocityFilterLag(Effect):
     forms = ({"time_constant": 0.005},)
     details = ("second",)
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 6: first-call flag, last speed; for each filter its output and the share of its last input in that."""
-        return 6
+    state_size = 6  # first-call flag, last speed; for each filter its output and the share of its last input in that
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
@@ -362,10 +356,7 @@ class Backlash(Effect):
         """Return `crossing` where there is a gap to cross."""
         return cls.details if values["gap"] > 0.0 else ()
 
-    @classmethod
-    def state_size(cls, dt: float) -> int:
-        """Return 4: offset within the play, first-call flag, last reading, offset within the gap."""
-        return 4
+    state_size = 4  # offset within the play, first-call flag, last reading, offset within the gap
 
     @staticmethod
     def free_lead(lead: Array, p: Array, gain: Array) -> Array:

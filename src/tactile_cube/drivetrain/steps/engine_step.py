@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactile_cube.compiled import compiled
+from tactile_cube.drivetrain.control_law import limit_rate, limit_torque, low_pass
 from tactile_cube.drivetrain.coupled_joints import add_tendons, estimate_contact, link_torques
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
@@ -16,7 +17,6 @@ from tactile_cube.drivetrain.signals import (
     TIME,
     VELOCITY,
 )
-from tactile_cube.drivetrain.target_filter import limit_rate, limit_torque, low_pass
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, add_spin_inertia, add_weight
 
 from . import plant

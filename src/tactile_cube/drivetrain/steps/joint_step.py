@@ -4,9 +4,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tactile_cube.compiled import compiled, shaped_view
+from tactile_cube.drivetrain.control_law import impedance_torque
 from tactile_cube.drivetrain.coupled_joints import reduce_equations
 from tactile_cube.drivetrain.dry_friction import solve_speeds
-from tactile_cube.drivetrain.impedance import impedance_torque
 from tactile_cube.drivetrain.signals import (
     ANGLE,
     COMMAND,

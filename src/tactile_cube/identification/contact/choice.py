@@ -11,12 +11,18 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tactile_cube.identification.contact.fit import evenly, shown_by
-from tactile_cube.identification.contact.search import best_of, first_value, narrowed, pooled_cost, prior_penalties
-from tactile_cube.identification.contact.together import solved
+from tactile_cube.identification.contact.search import (
+    best_of,
+    contact_unknowns,
+    first_value,
+    narrowed,
+    pooled_cost,
+    prior_penalties,
+    solved,
+)
 from tactile_cube.identification.contact.trial import ContactTrial
-from tactile_cube.identification.contact.unknown import unknowns
 from tactile_cube.identification.in_words import GAIN_OF
-from tactile_cube.measurement.replay.hand_replay import Contact
+from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue
 
 Array = NDArray[np.float64]
@@ -45,7 +51,7 @@ class Tried:
     """
 
     effect: type[ContactEffect]
-    contact: Contact
+    contact: ContactModel
     error: float
     gain: float
     p_value: float
@@ -69,7 +75,7 @@ class ContactSearch:
         self.rivals: list[Tried] = []
         self.tried: list[list[Tried]] = []
 
-    def run(self, contact: Contact) -> None:
+    def run(self, contact: ContactModel) -> None:
         """Fill `found`, `rivals`, `tried` and `first`."""
         self.say(f"simulating {len(self.trials)} trials as stated, and {len(self.validation)} that validate")
         self.first = before = mean_squares(self.validation, contact)
@@ -88,7 +94,7 @@ class ContactSearch:
             self.rivals = [one for one in helps[1:] if one.error < (1 + AS_GOOD) * best.error]
             contact, before = best.contact, mean_squares(self.validation, best.contact)
 
-    def _try(self, effect: type[ContactEffect], contact: Contact, before: Array) -> Tried:
+    def _try(self, effect: type[ContactEffect], contact: ContactModel, before: Array) -> Tried:
         """The effect at the values that suit the trials best, coarse unless they promise something."""
         trials, stated = self._looked_at(effect), contact
         contact = _coarse(effect, trials, stated)
@@ -116,11 +122,11 @@ class ContactSearch:
         return trials if effect.shows_in == "offsets" else some_of_each_kind(trials, LOOKED)
 
 
-def _coarse(effect: type[ContactEffect], trials: Sequence[ContactTrial], contact: Contact) -> Contact:
+def _coarse(effect: type[ContactEffect], trials: Sequence[ContactTrial], contact: ContactModel) -> ContactModel:
     """The effect roughly at the values that suit the trials best."""
     if effect.shows_in == "load":
-        return solved(trials, contact, unknowns([effect]))[0]
-    for unknown in unknowns([effect]):
+        return solved(trials, contact, contact_unknowns([effect]))[0]
+    for unknown in contact_unknowns([effect]):
         value = first_value(trials if effect.shows_in == "offsets" else trials[:1], contact, unknown)
         if value is not None:
             contact = unknown.put(contact, value)
@@ -128,7 +134,7 @@ def _coarse(effect: type[ContactEffect], trials: Sequence[ContactTrial], contact
     return contact
 
 
-def offsets_gained(trials: Sequence[ContactTrial], before: Contact, after: Contact) -> tuple[float, float]:
+def offsets_gained(trials: Sequence[ContactTrial], before: ContactModel, after: ContactModel) -> tuple[float, float]:
     """Share by which an effect makes the joint offsets smaller that trials need, and the p-value that it does not.
 
     The F test of one more number, which holds whatever the spread of the offsets is. It has trials to fit and held-out
@@ -140,7 +146,7 @@ def offsets_gained(trials: Sequence[ContactTrial], before: Contact, after: Conta
     return 1 - float(np.sqrt(last / first)), float(stats.f.sf(ratio, 1, freedom))
 
 
-def mean_squares(trials: Sequence[ContactTrial], contact: Contact) -> Array:
+def mean_squares(trials: Sequence[ContactTrial], contact: ContactModel) -> Array:
     """Mean square of the residual (trials, 1, joints) [rad^2], offsets and the box's place fitted."""
     rows = []
     for one in trials:

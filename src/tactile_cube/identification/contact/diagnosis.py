@@ -12,9 +12,15 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
 from tactile_cube.identification.contact.choice import GOOD, ContactSearch, Tried, mean_squares, some_of_each_kind
 from tactile_cube.identification.contact.fit import fit_contact
-from tactile_cube.identification.contact.grasps import open_grasps
+from tactile_cube.identification.contact.trial import SIGMA, ContactTrial, open_grasps
+from tactile_cube.measurement.bench import with_object
+from tactile_cube.measurement.comparing.comparison import Comparison, describe_comparison
 from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_errors
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.hand_replay import HandReplay, contact_of
+from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.simulator import Simulated
 
 Array = NDArray[np.float64]
 Verdict = Literal["adequate", "missing_effect", "ambiguous", "unknown_effect"]
@@ -171,3 +177,32 @@ def _values(one: Tried) -> list[tuple[Any, float]]:
     values: Mapping[str, float] = one.contact.values.get(one.effect.name, {})
     pairs = [(p, values.get(p.name, p.neutral)) for p in one.effect.parameters]
     return [(p, float(np.clip(value, p.low, p.high))) for p, value in pairs]
+
+
+def compare_contact(
+    recording: Recording, model: ModelFile | None = None, step: float = 0.002, say: Callable[[str], None] = print
+) -> Comparison:
+    """Simulate every trial with an object in the world that training uses.
+
+    Each trial has the joint offsets and the place of the object that suit it.
+
+    Args:
+        recording: trials without an object are left aside.
+        model: of drivetrain, fingertips and object; None: as recording.yaml states them.
+        step: longest physics step [s].
+        say: takes progress lines.
+    """
+    held = with_object(recording)
+    if model is not None:
+        require_same_joints(held, model)
+    replay, contact = HandReplay(held, nominal_model(held, model), step), contact_of(model)
+    simulated = []
+    try:
+        for number, trial in enumerate(held.trials, start=1):
+            position = trial.position - ContactTrial(replay, trial).residual(contact)
+            simulated.append(Simulated(position, np.full_like(position, np.nan)))
+            say(f"{trial.name} simulated, {number} of {len(held.trials)}")
+    finally:
+        replay.close()
+    floor = NoiseFloor(SIGMA, dict.fromkeys(held.joints, SIGMA), "contact", 0, {})
+    return describe_comparison(held, model, simulated, floor, None, step)

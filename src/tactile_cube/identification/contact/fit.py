@@ -11,17 +11,18 @@ from scipy import stats
 from tactile_cube.drivetrain.model_file import Estimate
 from tactile_cube.identification.contact.search import (
     NARROWINGS,
+    ContactUnknown,
     Opinion,
     best_of,
+    contact_unknowns,
     first_value,
     narrowed,
     opinion,
     opinion_of,
+    solved,
 )
-from tactile_cube.identification.contact.together import solved
 from tactile_cube.identification.contact.trial import ContactTrial
-from tactile_cube.identification.contact.unknown import Unknown, unknowns
-from tactile_cube.measurement.replay.hand_replay import Contact
+from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import ContactEffect
 
 CONFIDENCE = 0.95
@@ -50,7 +51,7 @@ class ContactFit:
         opinions: (effect, parameter) -> what each initialisation said.
     """
 
-    contact: Contact
+    contact: ContactModel
     estimates: dict[tuple[str, str], Estimate]
     opinions: dict[tuple[str, str], list[Opinion]]
 
@@ -62,7 +63,7 @@ class ContactFit:
 def fit_contact(
     trials: Sequence[ContactTrial],
     effects: Sequence[type[ContactEffect]],
-    start: Contact,
+    start: ContactModel,
     say: Callable[[str], None] = print,
 ) -> ContactFit:
     """Fit the parameters of some effects: all of them coarsely, then each with the others as they were found.
@@ -73,7 +74,7 @@ def fit_contact(
         start: values of all other contact effects.
         say: takes progress lines.
     """
-    contact, wanted = start, unknowns(list(effects))
+    contact, wanted = start, contact_unknowns(list(effects))
     together = [effect for effect in effects if effect.shows_in == "load"]
     for unknown in wanted:
         if unknown.effect.shows_in == "load":
@@ -83,7 +84,7 @@ def fit_contact(
         contact = unknown.put(contact, _neutral(unknown) if value is None else value)
         say(f"{unknown.label}: about {contact.values[unknown.effect.name][unknown.parameter.name]:.2g}")
     for effect in together:
-        contact, _ = solved(evenly(shown_by(trials, effect), FEW), contact, unknowns([effect]))
+        contact, _ = solved(evenly(shown_by(trials, effect), FEW), contact, contact_unknowns([effect]))
     for unknown in _of_the_same_trials([one for one in wanted if one.effect not in together]):
         costs = narrowed(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown, _value(contact, unknown))
         contact = unknown.put(contact, best_of(costs))
@@ -91,8 +92,10 @@ def fit_contact(
     estimates: dict[tuple[str, str], Estimate] = {}
     for effect in effects:
         groups = [evenly(group, ASKED) for group in _initialisations(shown_by(trials, effect))]
-        at_once = [_opinions(group, contact, unknowns([effect])) for group in groups] if effect in together else []
-        for k, unknown in enumerate(unknowns([effect])):
+        at_once = (
+            [_opinions(group, contact, contact_unknowns([effect])) for group in groups] if effect in together else []
+        )
+        for k, unknown in enumerate(contact_unknowns([effect])):
             key = (effect.name, unknown.parameter.name)
             opinions[key] = []
             for g, group in enumerate(groups):
@@ -100,13 +103,13 @@ def fit_contact(
                 opinions[key].append(said)
                 telling = "" if said.telling else ", but does not show it"
                 say(f"{unknown.label}: initialisation {said.initialisation} says {said.value:.3g}{telling}")
-            estimates[key] = summarise(unknown, opinions[key])
+            estimates[key] = summarise_fit(unknown, opinions[key])
             contact = unknown.put(contact, estimates[key].value)
             say(f"{unknown.label}: {in_words(estimates[key])}")
     return ContactFit(contact, estimates, opinions)
 
 
-def _opinions(trials: Sequence[ContactTrial], contact: Contact, wanted: Sequence[Unknown]) -> list[Opinion]:
+def _opinions(trials: Sequence[ContactTrial], contact: ContactModel, wanted: Sequence[ContactUnknown]) -> list[Opinion]:
     """What the trials of one initialisation say of all parameters of an effect, found together."""
     found, known = solved(trials, contact, wanted)
     return [opinion_of(trials, found, _value(found, one), shows) for one, shows in zip(wanted, known, strict=True)]
@@ -118,7 +121,7 @@ def shown_by(trials: Sequence[ContactTrial], effect: type[ContactEffect]) -> lis
     return chosen or list(trials)
 
 
-def summarise(unknown: Unknown, opinions: Sequence[Opinion]) -> Estimate:
+def summarise_fit(unknown: ContactUnknown, opinions: Sequence[Opinion]) -> Estimate:
     """Mean of what the initialisations say, with Student's interval of their scatter, no narrower than the last grid.
 
     Where none knows anything the value is the neutral one and the interval the whole range.
@@ -145,7 +148,7 @@ def _initialisations(trials: Sequence[ContactTrial]) -> list[list[ContactTrial]]
     return list(groups.values())
 
 
-def _of_the_same_trials(wanted: Sequence[Unknown]) -> list[Unknown]:
+def _of_the_same_trials(wanted: Sequence[ContactUnknown]) -> list[ContactUnknown]:
     """Those of which others show in the same trials, so that one must be near before the next is judged."""
     kinds = [one.effect.shown_by for one in wanted]
     return [one for one in wanted if kinds.count(one.effect.shown_by) > 1]
@@ -157,11 +160,11 @@ def evenly(trials: Sequence[ContactTrial], count: int) -> list[ContactTrial]:
     return [trials[index] for index in chosen]
 
 
-def _value(contact: Contact, unknown: Unknown) -> float:
+def _value(contact: ContactModel, unknown: ContactUnknown) -> float:
     return contact.values[unknown.effect.name][unknown.parameter.name]
 
 
-def _neutral(unknown: Unknown) -> float:
+def _neutral(unknown: ContactUnknown) -> float:
     return float(np.clip(unknown.parameter.neutral, unknown.parameter.low, unknown.parameter.high))
 
 

@@ -13,13 +13,12 @@ import numpy as np
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.fit import ContactFit, fit_contact, shown_by
-from tactile_cube.identification.contact.grasps import open_grasps
-from tactile_cube.identification.contact.trial import ContactTrial
+from tactile_cube.identification.contact.trial import ContactTrial, open_grasps
 from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_errors
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.hand_replay import Contact
+from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
 
@@ -141,7 +140,7 @@ def identify_contact(
     return ContactIdentification(fit, errors, grasps.noise_floor, [one.trial.name for one in validation])
 
 
-def contact_error(trials: Sequence[ContactTrial], contact: Contact, joints: Sequence[str]) -> ErrorSummary:
+def contact_error(trials: Sequence[ContactTrial], contact: ContactModel, joints: Sequence[str]) -> ErrorSummary:
     """RMS error [rad], offsets and the box's place fitted in each trial."""
     residuals = []
     for one in trials:

@@ -8,13 +8,20 @@ what suits another value would pull the answer to where the search began.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.measurement.bench import with_object
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay
+from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, contact_of
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.split import held_out_split
 
 Array = NDArray[np.float64]
 OFFSET = 0.02  # [rad] standard deviation of a joint offset; the paper's initialisations differ by degrees
@@ -51,17 +58,17 @@ class ContactTrial:
         self._slopes: Array | None = None
         self._known: dict[frozenset[tuple[str, str, float]], tuple[Array, Array]] = {}
 
-    def cost(self, contact: Contact) -> float:
+    def cost(self, contact: ContactModel) -> float:
         """Mean square of the residual over SIGMA^2, plus what improbable offsets cost, the nuisance fitted."""
         nuisance, residual = self._fitted(contact)
         seen = residual[self.trial.valid][::EVERY] / SIGMA
         return float((np.sum(seen**2) + ALIKE * np.sum((nuisance / self._spread) ** 2)) / seen.size)
 
-    def residual(self, contact: Contact) -> Array:
+    def residual(self, contact: ContactModel) -> Array:
         """Measured minus simulated position (n, joints) [rad], the nuisance fitted."""
         return self._fitted(contact)[1]
 
-    def prior_penalty(self, contact: Contact) -> float:
+    def prior_penalty(self, contact: ContactModel) -> float:
         """Squared distance of joint offsets and the box's place from what is expected, in standard deviations."""
         return float(np.sum((self._fitted(contact)[0] / self._spread) ** 2))
 
@@ -70,11 +77,11 @@ class ContactTrial:
         """Numbers that nobody knows of it."""
         return len(self._free)
 
-    def nuisance(self, contact: Contact) -> Array:
+    def nuisance(self, contact: ContactModel) -> Array:
         """Joint offsets (joints,) [rad] and displacement of the box in the rig's frame (3,) [m] that suit a contact."""
         return self._fitted(contact)[0]
 
-    def _fitted(self, contact: Contact) -> tuple[Array, Array]:
+    def _fitted(self, contact: ContactModel) -> tuple[Array, Array]:
         """Nuisance and residual, simulated once for each contact."""
         key = contact.without_neutral()
         if key not in self._known:
@@ -83,7 +90,7 @@ class ContactTrial:
             self._known[key] = (nuisance, np.asarray(self.trial.position - position))
         return self._known[key]
 
-    def _fitted_nuisance(self, contact: Contact) -> Array:
+    def _fitted_nuisance(self, contact: ContactModel) -> Array:
         """From zero, on the time before the box has weight, when nothing can slip yet."""
         nuisance = np.zeros(len(self._spread))
         target = self._target(contact, nuisance)
@@ -95,7 +102,7 @@ class ContactTrial:
             nuisance, target = self._descended(contact, nuisance, target, slopes)
         return nuisance
 
-    def _descended(self, contact: Contact, nuisance: Array, target: Array, slopes: Array) -> tuple[Array, Array]:
+    def _descended(self, contact: ContactModel, nuisance: Array, target: Array, slopes: Array) -> tuple[Array, Array]:
         """Gauss-Newton steps; what each of them saw corrects the slopes.
 
         Source: C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, 1965.
@@ -122,16 +129,60 @@ class ContactTrial:
             tried[-3:] = np.clip(tried[-3:], -FARTHEST, FARTHEST)
             yield tried
 
-    def _target(self, contact: Contact, nuisance: Array) -> Array:
+    def _target(self, contact: ContactModel, nuisance: Array) -> Array:
         grip = self._simulate(contact, nuisance, self._grip) - self.trial.position[: self._grip]
         return np.concatenate([grip[::EVERY].ravel() / SIGMA, np.sqrt(ALIKE) * nuisance / self._spread])
 
-    def _gradients(self, contact: Contact, nuisance: Array, target: Array) -> Array:
+    def _gradients(self, contact: ContactModel, nuisance: Array, target: Array) -> Array:
         steps = np.diag(self._width)[self._free]
         columns = [(self._target(contact, nuisance + step) - target) / step.max() for step in steps]
         return np.stack(columns, axis=1)
 
-    def _simulate(self, contact: Contact, nuisance: Array, rows: int) -> Array:
+    def _simulate(self, contact: ContactModel, nuisance: Array, rows: int) -> Array:
         moved = replace(self._load, position=self._load.position + nuisance[-3:])
         trial = replace(self.trial, load=moved)
         return self._replay.simulate(trial, contact, nuisance[:-3], rows * self.trial.step).position
+
+
+@dataclass(frozen=True)
+class GraspTrials:
+    """What a contact is fitted to and judged by.
+
+    Attributes:
+        joints: of the rig.
+        fitted: trials that are fitted.
+        held_out: trials that judge.
+        start: the contact as the model has it.
+        noise_floor: noise of the position sensors, and what a world with the true effects leaves [rad].
+    """
+
+    joints: tuple[str, ...]
+    fitted: list[ContactTrial]
+    held_out: list[ContactTrial]
+    start: ContactModel
+    noise_floor: float
+
+
+@contextmanager
+def open_grasps(recording: Recording, model: ModelFile | None, step: float, seed: int) -> Iterator[GraspTrials]:
+    """Open the world that training uses for the trials with an object, and close it afterwards.
+
+    Args:
+        recording: trials without an object are left aside.
+        model: of the drivetrain, taken as known; None: as recording.yaml states it.
+        step: longest physics step [s].
+        seed: which trials are held out.
+    """
+    held = with_object(recording)
+    fitted, held_out = held_out_split(held, seed=seed)
+    replay = HandReplay(held, nominal_model(held, model), step)
+    try:
+        yield GraspTrials(
+            joints=tuple(held.joints),
+            fitted=[ContactTrial(replay, trial) for trial in fitted.trials],
+            held_out=[ContactTrial(replay, trial) for trial in held_out.trials],
+            start=contact_of(model),
+            noise_floor=float(np.hypot(np.sqrt(np.mean(sensor_noise(held) ** 2)), SIGMA)),
+        )
+    finally:
+        replay.close()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.identification.fitting.unknowns import Unknown
-from tactile_cube.measurement.comparing.joint_offsets import LARGEST_OFFSET
+from tactile_cube.measurement.comparing.error import LARGEST_OFFSET
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 

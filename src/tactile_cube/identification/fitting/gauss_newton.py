@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.unknowns import Unknown, put_all, read_all
-from tactile_cube.measurement.comparing.joint_offsets import CORRELATED
+from tactile_cube.measurement.comparing.error import CORRELATED
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]

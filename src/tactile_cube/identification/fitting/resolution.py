@@ -13,8 +13,8 @@ from tactile_cube.identification.fitting.base import base_unknowns, every_effect
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import finer, spread
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
-from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model

@@ -13,7 +13,7 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import fit
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.measurement.comparing.joint_offsets import CORRELATED
+from tactile_cube.measurement.comparing.error import CORRELATED
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 

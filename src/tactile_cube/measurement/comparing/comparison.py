@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.measurement.comparing.band import Band, simulate_band
 from tactile_cube.measurement.comparing.error import (
     ErrorSummary,
     FailingInterval,
@@ -17,19 +16,59 @@ from tactile_cube.measurement.comparing.error import (
     raw_residuals,
     residuals,
     summarise_errors,
+    with_fitted_offsets,
 )
-from tactile_cube.measurement.comparing.in_words import where_it_fails
-from tactile_cube.measurement.comparing.joint_offsets import with_fitted_offsets
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor
-from tactile_cube.measurement.comparing.regimes import Regime, regimes
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
+from tactile_cube.measurement.comparing.regimes import Regime, regimes, where_it_fails
 from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
-from tactile_cube.measurement.noise import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
+from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Engine, Simulated, Simulator, free_run
 
 Array = NDArray[np.float64]
+COVER = 0.95  # of the simulations lie in the band
+
+
+@dataclass(frozen=True)
+class Band:
+    """The middle 95 % of randomised simulations, widened by the sensor's noise.
+
+    Attributes:
+        simulations: how many.
+        low: (n, joints) of each trial [rad].
+        high: (n, joints) of each trial [rad].
+        inside: share of all measured samples in the band.
+        joints: the same by joint.
+    """
+
+    simulations: int
+    low: list[Array]
+    high: list[Array]
+    inside: float
+    joints: dict[str, float]
+
+
+def simulate_band(
+    recording: Recording, model: ModelFile | None, simulations: int, spread: Mapping[str, float], step: float, seed: int
+) -> Band:
+    """Draw `simulations` sets of constants and simulate every trial with each."""
+    rng = np.random.default_rng(seed)
+    draws = [draw_model(recording, model, spread, rng) for _ in range(simulations)]
+    simulator = Simulator(recording, [term.effect for term in draws[0].terms], step)
+    noise = 1.96 * sensor_noise(recording)
+    low, high, inside = [], [], []
+    for trial in recording.trials:
+        ensemble = np.stack([run[0].position for run in simulator.free_runs(draws, [trial])])
+        bottom, top = np.quantile(ensemble, [(1 - COVER) / 2, (1 + COVER) / 2], axis=0)
+        low.append(bottom - noise)
+        high.append(top + noise)
+        inside.append(((trial.position >= low[-1]) & (trial.position <= high[-1]))[trial.valid])
+    shares = np.concatenate(inside).mean(axis=0)
+    by_joint = dict(zip(recording.joints, map(float, shares), strict=True))
+    return Band(simulations, low, high, float(shares.mean()), by_joint)
+
+
 AT_THE_FLOOR = 1.3  # error over floor and time step up to which a model is as good as they can tell
 USUAL_STEP = 0.002  # [s] that of the world that training uses
 FINER = 8  # times smaller than the simulation's step, to see the error of the step itself
@@ -87,7 +126,7 @@ class Comparison:
         return self.errors.overall <= AT_THE_FLOOR * self.floor.reachable
 
 
-def compare(
+def compare_recording(
     recording: Recording,
     model: ModelFile | None = None,
     engine: Engine = "fast",

@@ -1,6 +1,8 @@
 """The columns of a trial's table, found, complete and free of holes."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,7 @@ SIGNALS = ("command", "position", "torque")
 
 
 @dataclass(frozen=True)
-class Columns:
+class TrialColumns:
     """A trial as written in its file: time (n,) and signals (n, joints); torque is None where it was not measured."""
 
     time: Array
@@ -25,7 +27,7 @@ class Columns:
     torque: Array | None
 
 
-def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Columns, list[str]]:
+def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[TrialColumns, list[str]]:
     """The named columns of a table, and warnings about what was left aside.
 
     Raises:
@@ -33,9 +35,14 @@ def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Col
     """
     warnings = _unknown_columns(table, joints, path)
     _require(table, ["time", *(f"{joint}.{signal}" for joint in joints for signal in SIGNALS[:2])], path)
-    _require_length(len(table["time"]), path)
+    samples = len(table["time"])
+    if samples < MINIMUM_SAMPLES:
+        raise InputError(
+            f"{path}: column 'time' has {samples} samples, last row {samples - 1}; a trial needs at least "
+            f"{MINIMUM_SAMPLES}: record it again or remove it from recording.yaml"
+        )
     torque, torque_warnings = _torque(table, joints, path)
-    columns = Columns(
+    columns = TrialColumns(
         _finite(table, "time", path),
         _stack(table, joints, "command", path),
         _stack(table, joints, "position", path),
@@ -48,14 +55,6 @@ def _require(table: Table, names: list[str], path: Path) -> None:
     missing = [name for name in names if name not in table]
     if missing:
         raise InputError(f"{path}: column '{missing[0]}' is missing (missing: {missing}; the file has: {list(table)})")
-
-
-def _require_length(samples: int, path: Path) -> None:
-    if samples < MINIMUM_SAMPLES:
-        raise InputError(
-            f"{path}: column 'time' has {samples} samples, last row {samples - 1}; a trial needs at least "
-            f"{MINIMUM_SAMPLES}: record it again or remove it from recording.yaml"
-        )
 
 
 def _torque(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Array | None, list[str]]:
@@ -88,3 +87,72 @@ def _unknown_columns(table: Table, joints: tuple[str, ...], path: Path) -> list[
     return [
         f"{path}: columns of '{joint}' are ignored: it is not among joints {list(joints)}" for joint in sorted(others)
     ]
+
+
+BEYOND = {0.9: 8.0, 0.99: 5.0}
+"""Quantile -> times the difference from the neighbours there; both are 13 sigma of white noise.
+
+Neighbours of outliers differ too, which the first quantile leaves out; it is zero where a coarse encoder rests.
+"""
+SPIKE = 0.5  # of the difference from the cubic that a spike differs from the median too
+MOST, MANY = 0.01, 1000  # share and number of the readings; more are no single ones, and looking for them takes hours
+NEAR = 2  # rows on either side
+
+
+def without_outliers(
+    columns: TrialColumns, joints: tuple[str, ...], path: Path
+) -> tuple[TrialColumns, NDArray[np.bool_], list[str]]:
+    """Return the columns with outlying positions bridged, the mask of their rows (n,), and a warning per joint.
+
+    A reading is an outlier if it differs far more than usual from the cubic through its neighbours, and by half of that
+    at least from their median: a quick turn of the motion is near the cubic, a step of it near the median.
+    """
+    position, rows, warnings = columns.position.copy(), np.zeros(len(columns.position), dtype=bool), []
+    for j, joint in enumerate(joints):
+        found, cleaned = _outliers(position[:, j])
+        if not len(found):
+            continue
+        worst = float(np.abs(position[found, j] - cleaned[found]).max())
+        warnings.append(
+            f"{path}: column '{joint}.position': {len(found)} single readings differ from their neighbours by up to "
+            f"{worst:.3g} (first in row {found[0]}: {position[found[0], j]:.4g}); "
+            "they are bridged, and errors leave them out"
+        )
+        position[found, j], rows[found] = cleaned[found], True
+    return replace(columns, position=position), rows, warnings
+
+
+def _outliers(values: Array) -> tuple[NDArray[np.int64], Array]:
+    """Rows of outliers, and the values with outliers replaced by the cubic through their neighbours."""
+    limit = _limit(np.abs(values - _beside(values)[1]))
+    cleaned, far, found = values.copy(), _far(values), set[int]()
+    while limit > 0.0 and len(found) <= min(MOST * len(values), MANY):
+        row = int(np.argmax(far))
+        if far[row] <= limit:
+            return np.array(sorted(found), dtype=np.int64), cleaned
+        first, end = max(0, row - 2 * NEAR), row + 2 * NEAR + 1
+        cleaned[row] = _beside(cleaned[first:end])[1][row - first]
+        changed = slice(max(0, row - NEAR), row + NEAR + 1)
+        far[changed] = _far(cleaned[first:end])[changed.start - first : changed.stop - first]
+        found.add(row)
+    return np.zeros(0, dtype=np.int64), values
+
+
+def _far(values: Array) -> Array:
+    """Difference of each reading from the cubic, 0 where it is near the median."""
+    median, cubic = _beside(values)
+    far = np.abs(values - cubic)
+    far[np.abs(values - median) < SPIKE * far] = 0.0
+    return far
+
+
+def _limit(differences: Array) -> float:
+    limits = [times * float(np.quantile(differences, quantile)) for quantile, times in BEYOND.items()]
+    return next((limit for limit in limits if limit > 0.0), 0.0)
+
+
+def _beside(values: Array) -> tuple[Array, Array]:
+    """Median of the five readings around each one, and the cubic through the other four."""
+    padded = np.pad(values, NEAR, mode="reflect", reflect_type="odd")
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEAR + 1)
+    return np.median(around, axis=1), around @ (np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0)

@@ -4,9 +4,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from tactile_cube import limits
+from tactile_cube.drivetrain.model_file import Strict
 
 Number = Annotated[float, Field(ge=-limits.NUMBER, le=limits.NUMBER, allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
@@ -19,11 +20,7 @@ Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 PerJoint = float | list[float] | dict[str, float]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class Coupling(_Strict):
+class Coupling(Strict):
     """A joint that follows another one: q = ratio * q_joint + offset."""
 
     joint: str
@@ -31,7 +28,7 @@ class Coupling(_Strict):
     offset: Number = 0.0
 
 
-class Controller(_Strict):
+class Controller(Strict):
     """The impedance controller: torque = kp (q_d - q_m) - kd dq, clipped to +-torque_limit.
 
     Attributes:
@@ -49,7 +46,7 @@ class Controller(_Strict):
     rate_hz: Rate | None = None
 
 
-class ControllerChange(_Strict):
+class ControllerChange(Strict):
     """What one trial's controller does differently from the recording's."""
 
     kp: PerJoint | None = None
@@ -57,7 +54,7 @@ class ControllerChange(_Strict):
     torque_limit: PerJoint | None = None
 
 
-class Sensors(_Strict):
+class Sensors(Strict):
     """What is known of the sensors: resolution and standard deviation of the position [rad], of the torque [N m].
 
     Attributes:
@@ -74,7 +71,7 @@ class Sensors(_Strict):
     torque_noise: NotNegative = 0.0
 
 
-class KnownForce(_Strict):
+class KnownForce(Strict):
     """A force of known size on a link, as a weight or a spring balance gives it.
 
     Attributes:
@@ -88,7 +85,7 @@ class KnownForce(_Strict):
     vector: Vector
 
 
-class Touch(_Strict):
+class Touch(Strict):
     """A link is moved until it touches something whose place is known.
 
     Attributes:
@@ -100,7 +97,7 @@ class Touch(_Strict):
     angle: Number
 
 
-class HeldObject(_Strict):
+class HeldObject(Strict):
     """The object that fingers hold: a box, with everything that is fixed to it.
 
     Attributes:
@@ -122,7 +119,7 @@ class HeldObject(_Strict):
         return data
 
 
-class Grasp(_Strict):
+class Grasp(Strict):
     """How a trial begins with the object, and what is different about the object in this trial.
 
     Attributes:
@@ -150,7 +147,7 @@ class Grasp(_Strict):
         return self
 
 
-class TrialEntry(_Strict):
+class TrialEntry(Strict):
     """One trial: its file, the robot initialisation it belongs to and the kind of excitation.
 
     Attributes:
@@ -179,7 +176,7 @@ class TrialEntry(_Strict):
     note: str = ""
 
 
-class Description(_Strict):
+class Description(Strict):
     """The content of recording.yaml.
 
     Attributes:

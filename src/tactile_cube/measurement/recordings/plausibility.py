@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.columns import Columns
+from tactile_cube.measurement.recordings.columns import TrialColumns
 from tactile_cube.measurement.recordings.rig import RigJoint
 from tactile_cube.measurement.recordings.trial import Gains
 
@@ -23,7 +23,7 @@ SMOOTH = 0.05  # of the command's scatter, below which a position is none that a
 MOVES = 0.02  # [rad] range below which a signal says nothing about its neighbours
 
 
-def check_units(columns: Columns, joints: list[RigJoint], gains: Gains, path: Path) -> list[str]:
+def check_units(columns: TrialColumns, joints: list[RigJoint], gains: Gains, path: Path) -> list[str]:
     """Warnings about angles outside the joints' limits.
 
     Raises:
@@ -68,7 +68,7 @@ def _check_one_in_degrees(joint: str, command: Array, position: Array, path: Pat
             )
 
 
-def _check_gain(joint: str, columns: Columns, index: int, gains: Gains, path: Path) -> list[str]:
+def _check_gain(joint: str, columns: TrialColumns, index: int, gains: Gains, path: Path) -> list[str]:
     """Torque against the impedance law: its slope is 1 in the right units, whatever friction does."""
     if columns.torque is None:
         return []
@@ -91,7 +91,7 @@ def _check_gain(joint: str, columns: Columns, index: int, gains: Gains, path: Pa
     return []
 
 
-def check_assignment(columns: Columns, joints: list[RigJoint], path: Path) -> list[str]:
+def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) -> list[str]:
     """Warnings about joints that do not answer to their commands.
 
     Raises:
@@ -126,7 +126,7 @@ def check_assignment(columns: Columns, joints: list[RigJoint], path: Path) -> li
     return warnings
 
 
-def check_roles(columns: Columns, joints: tuple[str, ...], path: Path) -> list[str]:
+def check_roles(columns: TrialColumns, joints: tuple[str, ...], path: Path) -> list[str]:
     """Warnings about a command that scatters as a sensor beside a position that does not: exchanged columns."""
     return [
         f"{path}: column '{joint}.command' scatters by {asked:.2g} from row to row and '{joint}.position' by "
@@ -137,7 +137,7 @@ def check_roles(columns: Columns, joints: tuple[str, ...], path: Path) -> list[s
     ]
 
 
-def without_wraps(columns: Columns, joints: list[RigJoint], path: Path) -> tuple[Columns, list[str]]:
+def without_wraps(columns: TrialColumns, joints: list[RigJoint], path: Path) -> tuple[TrialColumns, list[str]]:
     """Positions and commands [rad] without jumps by a whole turn from one row to the next, and warnings of them."""
     turning, warnings, unwrapped = [not joint.prismatic for joint in joints], [], {}
     for key in ("position", "command"):

@@ -9,8 +9,8 @@ import numpy as np
 from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
-from tactile_cube.hand.urdf_files import with_own_files
-from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, pick_columns
+from tactile_cube.hand.urdf_tree import with_own_files
+from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, pick_columns, without_outliers
 from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
     check_joints,
@@ -21,7 +21,6 @@ from tactile_cube.measurement.recordings.consistency import (
     swap_warning,
 )
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
-from tactile_cube.measurement.recordings.outliers import without_outliers
 from tactile_cube.measurement.recordings.plausibility import (
     check_assignment,
     check_roles,

@@ -113,7 +113,7 @@ class Recording:
         Raises:
             InputError: the URDF and the joints of recording.yaml make none.
         """
-        coupled = {name: rigid_body.Coupling(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
+        coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
         try:
             return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
         except InputError as error:

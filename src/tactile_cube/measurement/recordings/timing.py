@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.columns import Columns
+from tactile_cube.measurement.recordings.columns import TrialColumns
 
 Array = NDArray[np.float64]
 UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
@@ -18,7 +18,7 @@ TINY = 1e-12  # share of a period below which no rate fits
 ON_GRID = 0.02  # share of a period below which samples are taken as they are
 
 
-def check_time(columns: Columns, rate: float, path: Path) -> tuple[Columns, list[str]]:
+def check_time(columns: TrialColumns, rate: float, path: Path) -> tuple[TrialColumns, list[str]]:
     """Columns without repeated time stamps, and warnings about jitter and dropped samples.
 
     Raises:
@@ -59,7 +59,7 @@ def check_time(columns: Columns, rate: float, path: Path) -> tuple[Columns, list
     return columns, warnings
 
 
-def _without_repeats(columns: Columns, path: Path) -> tuple[Columns, list[str]]:
+def _without_repeats(columns: TrialColumns, path: Path) -> tuple[TrialColumns, list[str]]:
     steps = np.diff(columns.time)
     if (steps < 0).any():
         row = int(np.argmax(steps < 0)) + 1
@@ -72,7 +72,7 @@ def _without_repeats(columns: Columns, path: Path) -> tuple[Columns, list[str]]:
         return columns, []
     row = int(np.argmin(keep))
     torque = None if columns.torque is None else columns.torque[keep]
-    shorter = Columns(columns.time[keep], columns.command[keep], columns.position[keep], torque)
+    shorter = TrialColumns(columns.time[keep], columns.command[keep], columns.position[keep], torque)
     if len(shorter.time) < 2:
         raise InputError(f"{path}: column 'time', row {row}: all rows have the same time {columns.time[0]:.6g} s")
     return shorter, [
@@ -97,7 +97,7 @@ def _require_rate(gaps: Array, rate: float, path: Path) -> None:
     )
 
 
-def on_grid(columns: Columns, rate: float) -> tuple[Columns, NDArray[np.bool_]]:
+def on_grid(columns: TrialColumns, rate: float) -> tuple[TrialColumns, NDArray[np.bool_]]:
     """Columns at uniform time steps from 0, and which samples are not bridged over a gap.
 
     Positions and torques are interpolated; a command is held until the next one, as a controller does.
@@ -112,7 +112,7 @@ def on_grid(columns: Columns, rate: float) -> tuple[Columns, NDArray[np.bool_]]:
     valid |= np.minimum(np.abs(grid - time[after]), np.abs(grid - time[after - 1])) * rate < ON_GRID
     held = np.searchsorted(time, grid + ON_GRID / rate, side="right") - 1
     torque = None if columns.torque is None else _interpolated(grid, time, columns.torque)
-    return Columns(grid, columns.command[held], _interpolated(grid, time, columns.position), torque), valid
+    return TrialColumns(grid, columns.command[held], _interpolated(grid, time, columns.position), torque), valid
 
 
 def _interpolated(grid: Array, time: Array, values: Array) -> Array:

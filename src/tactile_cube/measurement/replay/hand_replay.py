@@ -30,7 +30,7 @@ START = 3  # first samples, whose mean is the start
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactModel:
     """Values of contact effects, effect -> parameter -> value; what is left out is neutral."""
 
     values: Mapping[str, Mapping[str, float]]
@@ -47,15 +47,15 @@ class Contact:
         every = [(name, key, value) for name, values in self.values.items() for key, value in values.items()]
         return frozenset(one for one in every if one[2] != neutral[one[:2]])
 
-    def changed(self, effect: str, **values: float) -> Contact:
+    def changed(self, effect: str, **values: float) -> ContactModel:
         """The same with other values of one effect."""
-        return Contact({**self.values, effect: {**self.values.get(effect, {}), **values}})
+        return ContactModel({**self.values, effect: {**self.values.get(effect, {}), **values}})
 
 
-def contact_of(model: ModelFile | None) -> Contact:
+def contact_of(model: ModelFile | None) -> ContactModel:
     """What a model file says about fingertips and object."""
     effects = model.object_effects if model is not None else []
-    return Contact({one.name: {key: e.value for key, e in one.parameters.items()} for one in effects})
+    return ContactModel({one.name: {key: e.value for key, e in one.parameters.items()} for one in effects})
 
 
 class HandReplay:
@@ -102,7 +102,7 @@ class HandReplay:
         """Ends the physics server."""
         self._world.close()
 
-    def simulate(self, trial: Trial, contact: Contact, offset: Array, until: float = np.inf) -> Simulated:
+    def simulate(self, trial: Trial, contact: ContactModel, offset: Array, until: float = np.inf) -> Simulated:
         """One trial from its measured start.
 
         Args:

@@ -66,15 +66,11 @@ def draw_model(
 def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:
     given = {name: estimate.value for name, estimate in one.parameters.items()}
     free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
-    expected = {name: (one.parameters[name].value, _half_width(one.parameters[name])) for name in free}
+    expected = {name: (e.value, 0.5 * (e.high - e.low)) for name, e in one.parameters.items() if name in free}
     return [
         Term(effect, joint, effect(joint, **given).values, free, expected)
         for effect, joint in resolve([one.effect], recording.joints)
     ]
-
-
-def _half_width(estimate: Estimate) -> float:
-    return 0.5 * (estimate.high - estimate.low)
 
 
 def _offset(recording: Recording, known: ModelFile | None, width: float, rng: np.random.Generator) -> Array:

@@ -21,10 +21,9 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.integrals import integrating_joints, wind_up
-from tactile_cube.measurement.replay.jump_ratio import free_way, gaps, jump_ratio
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.read_out import before_steps, read_out, simulated_jumps
+from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
 from tactile_cube.measurement.replay.windows import SMOOTHING, Windows, asks_for_much, whole_trials
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.sources.column_names import (
+from tactile_cube.measurement.sources.units import (
     Signal,
     joint_in,
     may_be_desired,

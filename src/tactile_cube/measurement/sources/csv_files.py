@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.comparing.repeats import lag_between
+from tactile_cube.measurement.comparing.noise_floor import lag_between
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.tables import Table, read_table
@@ -176,7 +176,7 @@ def kinds_of(names: Sequence[str], commands: Sequence[Array], step: float) -> li
         commands: as logged.
         step: time between samples [s].
     """
-    words = [_without_count(name) for name in names]
+    words = [COUNT.sub("", DATE.sub("_", name)).strip("_ .-") or NO_NAME for name in names]
     stride = max(1, round(COARSE / step))
     coarse = [command[::stride] for command in commands]
     kinds = [""] * len(names)
@@ -187,10 +187,6 @@ def kinds_of(names: Sequence[str], commands: Sequence[Array], step: float) -> li
             for k in group:
                 kinds[k] = word if len(groups) == 1 else names[group[0]]
     return kinds
-
-
-def _without_count(name: str) -> str:
-    return COUNT.sub("", DATE.sub("_", name)).strip("_ .-") or NO_NAME
 
 
 def _alike(members: Sequence[int], commands: Sequence[Array], step: float) -> list[list[int]]:

@@ -26,7 +26,7 @@ from tactile_cube.measurement.recordings.description import Coupling, Descriptio
 from tactile_cube.measurement.recordings.rig import parse_rig
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.replay.hand_replay import Contact, HandReplay, to_hand
+from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, to_hand
 from tactile_cube.measurement.replay.model import Model, terms_of
 from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.session import FreeSession, free_command, logged, true_constants, unmeasured
@@ -138,7 +138,7 @@ class SimulatedGrasp:
         constants = true_constants(stated, joints, self.true_spread, rng)
         hidden = [parse_effect(text, find_any_effect) for text in self.hidden]
         drive = terms_of([one for one in hidden if not is_contact_effect(one[0])], joints)
-        contact = Contact({name: values for name, values in hidden if is_contact_effect(name)})
+        contact = ContactModel({name: values for name, values in hidden if is_contact_effect(name)})
         recording = unmeasured(description, parse_rig(urdf, Path("hand.urdf")), constants)
         rig = Simulator(recording, [term.effect for term in drive], self.step)
         free = FreeSession(self, rig, constants, drive, rng)
@@ -152,7 +152,7 @@ class _Session:
 
     settings: SimulatedGrasp
     simulator: HandReplay
-    contact: Contact
+    contact: ContactModel
     free: FreeSession
     rng: np.random.Generator
 

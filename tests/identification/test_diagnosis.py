@@ -7,8 +7,8 @@ import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.effects.scales import FINGER
+from tactile_cube.identification.diagnosis import Unseen, unseen
 from tactile_cube.identification.in_words import unseen_effects
-from tactile_cube.identification.unseen import Unseen, unseen
 from tactile_cube.measurement.joint_scales import joint_scales
 from tests.identification.rigs_of_any_size import Size, simulated
 

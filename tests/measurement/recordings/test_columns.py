@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.recordings import outliers
+from tactile_cube.measurement.recordings import columns as outliers
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import write
 

@@ -3,8 +3,7 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, grasp_angles
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
-from tactile_cube.simulation import loop as loop_module
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, bullet_engine
 from tactile_cube.simulation.native_library import find_compiler
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -34,7 +33,7 @@ def test_compiled_and_python_loop_agree_to_the_bit(engine: str, trace: bool) -> 
 
 
 def test_auto_runs_without_a_compiler_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop_module, "find_compiler", lambda: None)
+    monkeypatch.setattr(bullet_engine, "find_compiler", lambda: None)
     world = World(options=SimulationOptions(loop="auto"))
     assert world.loop == "python"
     world.close()
