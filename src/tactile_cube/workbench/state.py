@@ -148,6 +148,10 @@ class Workbench:
         """Effects of the model in force, NAME@JOINT."""
         return [term.label for term in self.stage.model.terms]
 
+    def effect_names(self) -> list[str]:
+        """Return every effect that may be added, the user's own ones included."""
+        return [effect_path(effect) for effect in self.search.effects]
+
     @property
     def never_fitted(self) -> list[str]:
         """Names of the trials by which models are judged."""
