@@ -65,7 +65,7 @@ def test_a_value_is_tried_without_a_change_and_set_with_a_stage_that_undo_takes_
     bench.set_parameter("kd@a", 0.25)
     assert [stage.label for stage in bench.stages] == ["stated", "refitted", "by hand"]
     assert np.array_equal(bench.simulate(name).position, tried)
-    assert {one.key: one for one in bench.values("a")}["kd@a"].half_width == 0.0
+    assert {one.key: one for one in bench.values("a")}["kd@a"].interval is None
     assert bench.undo()
     assert bench.undo()
     assert not bench.undo()

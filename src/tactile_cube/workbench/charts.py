@@ -52,8 +52,12 @@ class TimeChart:
         self.failing = ColumnDataSource({"x0": [], "x1": []})
         for made in (self.angle, self.error):
             made.vstrip(x0="x0", x1="x1", source=self.failing, fill_color=FAILING, line_color=None, level="underlay")
-        lines = ((self.command, "command", FLOOR, "dotted"), (self.measured, "measured", MEASURED, "solid"))
-        lines += ((self.beside, "other model", BEFORE, "dashed"), (self.simulated, "model", SIMULATED, "solid"))
+        lines = (
+            (self.command, "command", FLOOR, "dotted"),
+            (self.measured, "measured", MEASURED, "solid"),
+            (self.beside, "other model", BEFORE, "dashed"),
+            (self.simulated, "model", SIMULATED, "solid"),
+        )
         for source, name, color, dash in lines:
             self.angle.line("t", "y", source=source, color=color, line_dash=dash, legend_label=name, line_width=1.5)
         for source, color, dash in ((self.beside, BEFORE, "dashed"), (self.simulated, ERROR, "solid")):

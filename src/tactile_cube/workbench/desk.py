@@ -141,11 +141,14 @@ class Desk:
         self.logs = [file for file in files if file not in rigs] or self.logs
         self.preview = preview(self.logs[0], self.urdf) if self.logs and self.urdf else None
 
-    def import_waiting(self, controller: dict[str, str], columns: dict[str, Any], settings: dict[str, str]) -> None:
+    def import_waiting(
+        self, controller: dict[str, str], nominal: dict[str, str], columns: dict[str, Any], settings: dict[str, str]
+    ) -> None:
         """Import the logs that wait and load what they make; they wait on where something is wrong.
 
         Args:
             controller: as typed: kp, kd, torque_limit, mode.
+            nominal: as typed: stiffness, static_friction, reflected_inertia, as far as known.
             columns: as `source.columns`.
             settings: others of `record source=csv`, as typed.
         """
@@ -153,11 +156,12 @@ class Desk:
 
         def run() -> None:
             given = {key: text if key == "mode" else _number(key, text) for key, text in controller.items()}
+            believed = {key: _number(key, text) for key, text in nominal.items()}
             more = {key: _number(key, text) if key == "length" else text for key, text in settings.items()}
             if not logs or urdf is None:
                 raise InputError("drop a log and the URDF of its rig first")
             out = self.folder / f"recording_{self.version}_{len(list(self.folder.glob('recording_*')))}"
-            recording, understood = import_logs(out, logs, urdf, given, columns=columns, **more)
+            recording, understood = import_logs(out, logs, urdf, given, nominal=believed, columns=columns, **more)
             self._load(recording.folder)
             self.notes = [*understood, *self.notes]
             self.logs, self.preview = [], None

@@ -27,7 +27,7 @@ from tactile_cube.measurement.comparing.error import FailingInterval
 from tactile_cube.measurement.replay.model import effect_path
 from tactile_cube.measurement.sources.units import ANGLE_UNITS, TIME_UNITS, TORQUE_UNITS
 from tactile_cube.measurement.units import milli
-from tactile_cube.visualization.charts import SIMULATED
+from tactile_cube.visualization.charts import FLOOR, SIMULATED
 from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, signals
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import RIGS, TABLES
@@ -35,6 +35,12 @@ from tactile_cube.workbench.state import Stage, Value, Workbench
 
 RANKED = 8
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
+GAINS = {"kp": "K_P [N m/rad]", "kd": "K_D [N m s/rad]", "torque_limit": "torque limit [N m]"}
+NOMINAL = {
+    "stiffness": "stiffness, if known",
+    "static_friction": "friction [N m]",
+    "reflected_inertia": "rotor inertia [kg m^2]",
+}
 AUTO, NONE = "by name and values", "-"
 SAVE_CSV = """
 const link = document.createElement("a");
@@ -113,16 +119,16 @@ class Page:
 
     def _import_part(self) -> LayoutDOM:
         self.waiting, self.columns, self.table = _text(), Column(), _text()
-        self.gains = {name: TextInput(title=title, width=150) for name, title in (
-            ("kp", "K_P [N m/rad]"), ("kd", "K_D [N m s/rad]"), ("torque_limit", "torque limit [N m]"))}  # fmt: skip
+        self.gains = {name: TextInput(title=title, width=150) for name, title in GAINS.items()}
+        self.nominal = {name: TextInput(title=title, width=150) for name, title in NOMINAL.items()}
         self.mode = Select(title="commands are", options=["position", "torque"], value="position", width=110)
         self.length = TextInput(title="cut into trials of [s]", width=150)
         self.units = {
             f"{name}_unit": Select(title=f"{name} in", options=[AUTO, *units], value=AUTO, width=150)
             for name, units in (("time", TIME_UNITS), ("angle", ANGLE_UNITS), ("torque", TORQUE_UNITS))
         }
-        words = (*self.gains.values(), self.mode, self.length, *self.units.values())
-        button = self._button("Import", self._import)
+        words = (*self.gains.values(), self.mode, *self.nominal.values(), self.length, *self.units.values())
+        button = _row(self._button("Import", self._import, "primary"))
         self.importing = Column(
             self.waiting, self.table, self.columns, _row(*words), button, visible=False, sizing_mode="stretch_width"
         )
@@ -150,7 +156,7 @@ class Page:
     def _stages_part(self) -> LayoutDOM:
         self.stairs = _text()
         undo = self._button("Undo", lambda: self.desk.change("undo", lambda bench: bench.undo()))
-        return Column(self.stairs, undo, sizing_mode="stretch_width")
+        return Column(self.stairs, _row(undo), sizing_mode="stretch_width")
 
     def _candidates_part(self) -> LayoutDOM:
         self.ranked = RadioGroup(labels=[], sizing_mode="stretch_width")
@@ -207,8 +213,11 @@ class Page:
                 columns |= entry
             elif entry:
                 columns[row.name] = entry
-        given = {name: text.value.strip() for name, text in self.gains.items() if text.value.strip()}
-        self.desk.import_waiting(given | {"mode": self.mode.value}, columns, units | length)
+        gains, nominal = (
+            {name: text.value.strip() for name, text in texts.items() if text.value.strip()}
+            for texts in (self.gains, self.nominal)
+        )
+        self.desk.import_waiting(gains | {"mode": self.mode.value}, nominal, columns, units | length)
 
     def _again(self) -> None:
         if not self.showing:
@@ -284,7 +293,8 @@ class Page:
         self._show_status()
         self._show_import()
         self.start.label = "Diagnose" if desk.diagnosing is None else "Stop"
-        self.accept.disabled = not (desk.found and desk.found.effects)
+        known = bench.effects if bench else []
+        self.accept.disabled = not (desk.found and set(desk.found.effects) - set(known))
         answer = f'<pre style="white-space:pre-wrap">{escape(desk.found.text)}</pre>' if desk.found else ""
         self.progress.text = answer or _list(desk.progress)
         if bench is None:
@@ -369,7 +379,8 @@ class Page:
         lines = "".join(f"<div>{escape(one.effect)}: {escape(one.why)}</div>" for one in unseen)
         self.unseen.text = (
             "First look: the part of the squared error on the fitted trials that each would take away."
-            f'<details style="color:#57606a"><summary>{len(unseen)} cannot be seen in these trials</summary>{lines}</details>'
+            f'<details style="color:{FLOOR}"><summary>{len(unseen)} cannot be seen in these trials</summary>'
+            f"{lines}</details>"
         )
 
     def _show_experiment(self, bench: Workbench) -> None:
@@ -384,9 +395,7 @@ class Page:
         worth = f"evidence expected: {proposed.told:.3g} times what decides" if proposed.decides else "decides nothing"
         pair = " and ".join(proposed.predictions) or "the models"
         self.proposal.text = _list(
-            [
-                f"{proposed.name}, {proposed.time[-1]:.1f} s, to tell {pair} apart: {worth}; {safety} (dashed, less margin)"
-            ]
+            [f"{proposed.name}, {proposed.time[-1]:.1f} s, to tell {pair} apart: {worth}; {safety} (dashed)"]
         )
         if self.experiment.figure.tags != [self.desk.version, id(proposed)]:
             self.experiment.figure.tags = [self.desk.version, id(proposed)]
@@ -402,13 +411,18 @@ class Page:
                 self._show_trial(bench, joint)
                 self._show_sliders(bench, joint)
                 self._show_candidates(bench)
-            missing = bench.missing(joint)
-            _choose(self.signal, signals(missing))
-            law = self.desk.signature
-            law = law if law is not None and law.joint == joint else None
-            self.missing.show(missing, self.signal.value, law, bench.recording.units[joint])
+            tag = [self.desk.version, joint, self.signal.value, self.desk.signature_of]
+            if self.signal.tags != tag:
+                self._show_missing(bench, joint)
+                self.signal.tags = [*tag[:2], self.signal.value, tag[3]]
         finally:
             self.showing = before
+
+    def _show_missing(self, bench: Workbench, joint: str) -> None:
+        missing, law = bench.missing(joint), self.desk.signature
+        _choose(self.signal, signals(missing))
+        law = law if law is not None and law.joint == joint else None
+        self.missing.show(missing, self.signal.value, law, bench.recording.units[joint])
 
     def _show_trial(self, bench: Workbench, joint: str) -> None:
         place = bench.recording.joints.index(joint)
@@ -434,11 +448,12 @@ class Page:
             self.sliders.children = [self._slider(one) for one in values[-SLIDERS:]]
 
     def _slider(self, one: Value) -> Slider:
-        name = one.key.rpartition("@")[0] if "." not in one.key.rpartition("@")[2] else one.key
-        sure = f" ± {one.half_width:.2g}" if one.half_width else ""
+        name = one.key.replace(f"@{self.joint.value}", "")
+        found = "" if one.interval is None else f" in [{one.interval[0]:.4g}, {one.interval[1]:.4g}]"
+        low, high = one.unknown.low, one.unknown.high
         slider = Slider(
-            start=one.low, end=one.high, value=one.value, step=(one.high - one.low) / 1000, sizing_mode="stretch_width",
-            title=f"{name}, found {one.value:.4g}{sure} {one.unit}; now", format=PrintfTickFormatter(format="%.4g"),
+            start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
+            title=f"{name} [{one.unit}]: {one.value:.4g}{found}; now", format=PrintfTickFormatter(format="%.4g"),
         )  # fmt: skip
         slider.on_change("value", lambda attr, old, new: self._move(one, new))
         slider.on_change("value_throttled", lambda attr, old, new: self._set(one, new))

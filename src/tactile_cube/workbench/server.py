@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import secrets
 import webbrowser
 from importlib import resources
@@ -60,6 +61,7 @@ def serve(job: Job) -> None:
     """Serve until Ctrl-C."""
     from tactile_cube.workbench.desk import Desk
 
+    logging.getLogger("bokeh").setLevel(logging.WARNING)
     config = job.config
     desk = Desk(job.folder, config.own_effects or (), config.seed, config.model)
     server, address = start(desk, config.port)

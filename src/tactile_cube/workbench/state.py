@@ -43,6 +43,8 @@ from tactile_cube.workbench.background import Diagnosing
 
 Array = NDArray[np.float64]
 BY_HAND = "by hand"
+MOST = 50
+"""Changes that can be undone; each keeps a fit and a judgement, some MB."""
 COMMAND = "python -m tactile_cube.workbench recording={}"
 
 
@@ -71,13 +73,19 @@ class Stage:
 
 @dataclass(frozen=True)
 class Value:
-    """A number of the model that a fit may change, `NAME@JOINT.PARAMETER` or `CONSTANT@JOINT`."""
+    """A number of the model that a fit may change.
+
+    Attributes:
+        key: `CONSTANT@JOINT` or `NAME@JOINT.PARAMETER`.
+        value: in the model in force.
+        interval: its 95 % interval within the bounds; None where it was set by hand or not fitted.
+        unit: SI unit.
+        unknown: its bounds, and where it stands in the model.
+    """
 
     key: str
     value: float
-    half_width: float
-    low: float
-    high: float
+    interval: tuple[float, float] | None
     unit: str
     unknown: Unknown
 
@@ -131,7 +139,8 @@ class Workbench:
         self.recording = self.search.fitted.with_trials([known[trial.name] for trial in moving.trials])
         base = self.search.fit_base()
         stated = replace(base.fit, model=self.search.start)
-        self.history = [(self._stage("stated", stated, fitted=False), self._stage("refitted", base.fit))]
+        first: tuple[Stage, ...] = (self._stage("stated", stated, fitted=False), self._stage("refitted", base.fit))
+        self.history = [first]
 
     @property
     def stages(self) -> tuple[Stage, ...]:
@@ -221,8 +230,7 @@ class Workbench:
                 self.say(f"refitting with {label}")
                 fitted = with_effect(self.search, stages[-1].fit, effect, joint)
                 stages = (*stages, self._stage(f"+ {label}", fitted))
-        self.history.append(stages)
-        return self.stage
+        return self._push(stages)
 
     def remove(self, label: str) -> Stage:
         """Take an effect out and refit everything that is left.
@@ -234,7 +242,7 @@ class Workbench:
             raise InputError(f"{label}: the model has only {', '.join(self.effects) or 'its constants'}")
         model = self.stage.fit.model
         less = replace(model, terms=tuple(term for term in model.terms if term.label != label))
-        return self._push(self._stage(f"- {label}", self.search.refitted(less)))
+        return self._push((*self.stages, self._stage(f"- {label}", self.search.refitted(less))))
 
     def undo(self) -> bool:
         """Take the last change back; False where there is none."""
@@ -256,8 +264,9 @@ class Workbench:
                 key = f"{term.label}.{unknown.key}"
             else:
                 continue
-            value, width = unknown.of(stage.model), float(half_width)
-            found.append(Value(key, value, width, unknown.low, unknown.high, of_joint(unit, units), unknown))
+            value, low, high = unknown.of(stage.model), unknown.low, unknown.high
+            interval = (max(value - half_width, low), min(value + half_width, high)) if half_width else None
+            found.append(Value(key, value, interval, of_joint(unit, units), unknown))
         return found
 
     def with_value(self, key: str, value: float) -> Model:
@@ -273,8 +282,7 @@ class Workbench:
         model = self._unknown(key).put(self.stage.fit.model, value)
         stage = self._stage(BY_HAND, replace(self.stage.fit, model=model), fitted=False)
         stages = self.stages[:-1] if self.stage.label == BY_HAND else self.stages
-        self.history.append((*stages, stage))
-        return stage
+        return self._push((*stages, stage))
 
     def propose(self) -> Experiment:
         """Return the commands that would show whether the last effect is there, within the machine's limits.
@@ -361,6 +369,6 @@ class Workbench:
             raise InputError(f"{key}: no number of the model; it has {', '.join(known)}")
         return known[key]
 
-    def _push(self, stage: Stage) -> Stage:
-        self.history.append((*self.stages, stage))
-        return stage
+    def _push(self, stages: tuple[Stage, ...]) -> Stage:
+        self.history = [*self.history[-MOST:], stages]
+        return self.stage
