@@ -154,13 +154,16 @@ class ExperimentChart:
     """A proposed command beside the limits of the machine."""
 
     def __init__(self) -> None:
-        self.figure = _figure(220, "time [s]", "command")
+        self.range = Range1d()
+        self.figure = _figure(220, "time [s]", "command", y_range=self.range)
 
     def show(self, experiment: Experiment, units: Sequence[str]) -> None:
         """Draw the commands of all joints, and what the limits less the margin allow as dashed lines."""
         self.figure.renderers, self.figure.center = [], [one for one in self.figure.center if not isinstance(one, Span)]
         self.figure.yaxis.axis_label = f"command [{' or '.join(dict.fromkeys(units))}]"
         allowed = experiment.safety.allowed
+        low, high = float(allowed.low.min()), float(allowed.high.max())
+        self.range.update(start=low - 0.1 * (high - low), end=high + 0.1 * (high - low))
         for j, joint in enumerate(experiment.joints):
             color = PALETTE[j % len(PALETTE)]
             self.figure.line(experiment.time, experiment.commands[:, j], color=color, legend_label=joint)

@@ -103,6 +103,7 @@ class Desk:
     def _renewed(self) -> None:
         found, progress = self.found, self.progress
         self._forget()
+        self.notes = []
         self.found, self.progress = found, progress
         self.version += 1
 
@@ -164,16 +165,15 @@ class Desk:
             recording, understood = import_logs(out, logs, urdf, given, nominal=believed, columns=columns, **more)
             self._load(recording.folder)
             self.notes = [*understood, *self.notes]
-            self.logs, self.preview = [], None
 
         self.do("importing", run)
 
     def _load(self, folder: Path) -> None:
         self.stop()
         self.bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
-        self.notes = [f"warning: {line}" for line in self.bench.opened.warnings]
         self._renewed()
-        self.found, self.progress = None, []
+        self.notes = [f"warning: {line}" for line in self.bench.opened.warnings]
+        self.found, self.progress, self.logs, self.preview = None, [], [], None
 
     def look(self, joint: str) -> None:
         """Take a first look at the candidates of a joint, unless it was taken."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 from collections.abc import Callable, Iterable
 from html import escape
 from typing import Any
@@ -22,6 +23,7 @@ from bokeh.models import (
     Slider,
     TextInput,
 )
+from tornado.ioloop import IOLoop
 
 from tactile_cube.measurement.comparing.error import FailingInterval
 from tactile_cube.measurement.replay.model import effect_path
@@ -49,6 +51,7 @@ link.download = "next_experiment.csv";
 link.click();
 """
 WRAP = {"flex-wrap": "wrap"}
+LINE = {"border-top": "1px solid #d0d7de"}
 YELLOW, RED = "background:#fff4ce;padding:4px 8px", "background:#ffe3dc;padding:4px 8px;border-left:5px solid #d55e00"
 
 
@@ -81,36 +84,45 @@ class Page:
         self.version = -1
         self.showing = False  # while the desk's state is put into widgets, their callbacks are ours
         self.time, self.missing, self.experiment = TimeChart(), MissingChart(), ExperimentChart()
-        for name, root in self._roots().items():
-            root.name = name
-            document.add_root(root)
-        listener = self._soon
+        for name, part in (
+            ("open", self._open_part()),
+            ("status", self._status_part()),
+            ("importing", self._import_part()),
+        ):
+            part.name = name
+            document.add_root(part)
+        self.parts = [self._section(*one) for one in self._sections()]
+        for part in self.parts:
+            document.add_root(part)
+        self._pending, self._loop, listener = False, IOLoop.current(), self._soon
         desk.listeners.append(listener)
         document.on_session_destroyed(lambda context: desk.listeners.remove(listener))
-        self._pending = False
         self.refresh()
 
     # What stands where
 
-    def _roots(self) -> dict[str, LayoutDOM]:
-        return {
-            "open": self._open_part(),
-            "status": self._status_part(),
-            "importing": self._import_part(),
-            "compare": self._compare_part(),
-            "missing": self._missing_part(),
-            "stages": self._stages_part(),
-            "candidates": self._candidates_part(),
-            "diagnosis": self._diagnosis_part(),
-            "values": self._values_part(),
-            "next": self._next_part(),
-            "save": self._save_part(),
-        }
+    def _sections(self) -> list[tuple[str, str, LayoutDOM]]:
+        return [
+            ("compare", "Compare", self._compare_part()),
+            ("missing", "Missing torque", self._missing_part()),
+            ("stages", "Error by stage", self._stages_part()),
+            ("candidates", "What may be missing", self._candidates_part()),
+            ("diagnosis", "Diagnosis", self._diagnosis_part()),
+            ("values", "Numbers of the model", self._values_part()),
+            ("next", "Next experiment", self._next_part()),
+            ("save", "Save", self._save_part()),
+        ]
+
+    def _section(self, name: str, title: str, part: LayoutDOM) -> LayoutDOM:
+        head = _text(text=f'<h2 style="font-size:16px;margin:8px 0 0">{title}</h2>', styles=LINE)
+        return Column(head, part, name=name, sizing_mode="stretch_width", visible=False)
 
     def _open_part(self) -> LayoutDOM:
         self.path = TextInput(title="Folder of a recording, logs (*.csv), URDF or model.yaml", width=460)
         files = FileInput(accept=",".join((*TABLES, *RIGS)), multiple=True, title="or drop files anywhere")
-        files.on_change("value", lambda attr, old, new: self._take(files))
+        # names come after contents
+        take = functools.partial(self._take, files)
+        files.on_change("value", lambda attr, old, new: self.document.add_next_tick_callback(take))
         return _row(self.path, self._button("Open", lambda: self.desk.open(self.path.value)), files)
 
     def _status_part(self) -> LayoutDOM:
@@ -277,6 +289,10 @@ class Page:
         """Show the desk as it will be when the window's turn comes; called from any thread."""
         if not self._pending:
             self._pending = True
+            self._loop.add_callback(self._next)
+
+    def _next(self) -> None:
+        if self._soon in self.desk.listeners:  # else the window was closed in the meantime
             self.document.add_next_tick_callback(self.refresh)
 
     def refresh(self) -> None:
@@ -299,6 +315,8 @@ class Page:
         self.progress.text = answer or _list(desk.progress)
         if bench is None:
             return
+        for part in self.parts:
+            part.visible = True
         renewed = self.version != desk.version
         if renewed:
             self.version = desk.version
@@ -391,7 +409,7 @@ class Page:
         if proposed is None:
             self.proposal.text = ""
             return
-        safety = "keeps to the limits" if proposed.safety.safe else "would LEAVE the limits: do not play it"
+        safety = "keeps to the limits" if proposed.safety.safe else "would LEAVE the limits, do not play it"
         worth = f"evidence expected: {proposed.told:.3g} times what decides" if proposed.decides else "decides nothing"
         pair = " and ".join(proposed.predictions) or "the models"
         self.proposal.text = _list(

@@ -29,8 +29,11 @@ def start(desk: Desk, port: int = 0) -> tuple[Server, str]:
         InputError: a port that is taken, or Bokeh is not installed.
     """
     try:
+        from bokeh.application import Application
+        from bokeh.application.handlers.document_lifecycle import DocumentLifecycleHandler
+        from bokeh.application.handlers.function import FunctionHandler
         from bokeh.server.server import Server
-    except ImportError:
+    except ModuleNotFoundError:
         raise InputError("the workbench needs Bokeh: pip install 'tactile-cube[workbench]'") from None
     from jinja2 import Template
 
@@ -48,7 +51,8 @@ def start(desk: Desk, port: int = 0) -> tuple[Server, str]:
             Page(document, desk)
 
     try:
-        server = Server({"/": window}, address=HOST, port=port, websocket_max_message_size=MESSAGE)
+        application = Application(FunctionHandler(window), DocumentLifecycleHandler())
+        server = Server(application, address=HOST, port=port, websocket_max_message_size=MESSAGE)
     except OSError as error:
         raise InputError(
             f"port={port}: {error.strerror or error}; choose another one, or 0 for any that is free"
