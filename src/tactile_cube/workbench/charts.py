@@ -20,7 +20,7 @@ from tactile_cube.visualization.charts import BEFORE, ERROR, FAILING, FLOOR, GRI
 
 Array = NDArray[np.float64]
 TOOLS = "xpan,xwheel_zoom,box_zoom,reset,save"
-POINTS = 3000  # of the missing torque
+POINTS, DRAWN = 3000, 20_000  # samples of the missing torque, and of a trial, that are drawn at most
 CONTEXT = 0.5  # [s] shown on either side of a failing interval
 
 
@@ -47,8 +47,8 @@ class TimeChart:
         self.x = Range1d(0.0, 1.0)
         self.angle = _figure(260, "", "position", x_range=self.x)
         self.error = _figure(190, "time [s]", "error", x_range=self.x)
-        self.measured, self.simulated, self.beside = (ColumnDataSource({"t": [], "y": [], "e": []}) for _ in range(3))
-        self.command = ColumnDataSource({"t": [], "y": []})
+        self.simulated, self.beside = (ColumnDataSource({"t": [], "y": [], "e": []}) for _ in range(2))
+        self.command, self.measured = (ColumnDataSource({"t": [], "y": []}) for _ in range(2))
         self.failing = ColumnDataSource({"x0": [], "x1": []})
         for made in (self.angle, self.error):
             made.vstrip(x0="x0", x1="x1", source=self.failing, fill_color=FAILING, line_color=None, level="underlay")
@@ -79,9 +79,12 @@ class TimeChart:
         self._trial, self._joint = trial, joint
         self.angle.yaxis.axis_label = f"position [{unit}]"
         self.error.yaxis.axis_label = f"error [{THOUSANDTHS[unit]}]"
-        command = np.zeros(0) if recording.torque_controlled else trial.command[:, joint]
-        self.command.data = {"t": trial.time[: len(command)], "y": command}
-        self.measured.data = {"t": trial.time, "y": trial.position[:, joint], "e": trial.time}
+        rows = self._rows()
+        command = (
+            trial.command[rows, joint] if not recording.torque_controlled else np.full(len(trial.time[rows]), np.nan)
+        )
+        self.command.data = {"t": trial.time[rows], "y": command}
+        self.measured.data = {"t": trial.time[rows], "y": trial.position[rows, joint]}
         floor = 1e3 * compared.floor.joints[recording.joints[joint]]
         self.band.update(top=2.0 * floor, bottom=-2.0 * floor)
         failing = [one for one in compared.failing_intervals if one.joint == recording.joints[joint]]
@@ -102,8 +105,12 @@ class TimeChart:
 
     def _draw(self, source: ColumnDataSource, position: Array) -> None:
         assert self._trial is not None
-        error = residuals([self._trial], [position])[0][:, self._joint]
-        source.data = {"t": self._trial.time, "y": position[:, self._joint], "e": 1e3 * error}
+        error, rows = residuals([self._trial], [position])[0], self._rows()
+        y, e = position[rows, self._joint], 1e3 * error[rows, self._joint]
+        source.data = {"t": self._trial.time[rows], "y": y, "e": e}
+
+    def _rows(self) -> slice:
+        return slice(None, None, 1 + (0 if self._trial is None else len(self._trial.time) // DRAWN))
 
     def _zoom_into(self, event: Tap) -> None:
         for start, end in zip(self.failing.data["x0"], self.failing.data["x1"], strict=True):

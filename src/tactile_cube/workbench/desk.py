@@ -93,19 +93,18 @@ class Desk:
 
         def run() -> None:
             if self.bench is not None:
-                try:
-                    work(self.bench)
-                finally:
-                    self._renewed()
+                work(self.bench)
+                self._renewed(self.bench)
 
         self.do(words, run)
 
-    def _renewed(self) -> None:
+    def _renewed(self, bench: Workbench) -> None:
         found, progress = self.found, self.progress
         self._forget()
         self.notes = []
-        self.found, self.progress = found, progress
-        self.version += 1
+        if bench is self.bench:
+            self.found, self.progress = found, progress
+        self.bench, self.version = bench, self.version + 1
 
     def open(self, text: str) -> None:
         """Take what somebody named: a recording's folder, a model.yaml, logs (a pattern too) or a URDF."""
@@ -170,10 +169,10 @@ class Desk:
 
     def _load(self, folder: Path) -> None:
         self.stop()
-        self.bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
-        self._renewed()
-        self.notes = [f"warning: {line}" for line in self.bench.opened.warnings]
-        self.found, self.progress, self.logs, self.preview = None, [], [], None
+        bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
+        self._renewed(bench)
+        self.notes = [f"warning: {line}" for line in bench.opened.warnings]
+        self.logs, self.preview = [], None
 
     def look(self, joint: str) -> None:
         """Take a first look at the candidates of a joint, unless it was taken."""
