@@ -65,7 +65,7 @@ def serve(job: Job) -> None:
     """Serve until Ctrl-C."""
     from tactile_cube.workbench.desk import Desk
 
-    logging.getLogger("bokeh").setLevel(logging.WARNING)
+    logging.getLogger("bokeh").setLevel(logging.ERROR)
     config = job.config
     desk = Desk(job.folder, config.own_effects or (), config.seed, config.model)
     server, address = start(desk, config.port)
