@@ -148,9 +148,9 @@ class Page:
 
     def _compare_part(self) -> LayoutDOM:
         self.trial = Select(title="trial", width=190)
-        self.joint = Select(title="joint", width=120)
-        self.other = Select(title="beside", options=[NONE], value=NONE, width=220)
-        self.where = Select(title="where it fails", options=[NONE], value=NONE, width=220)
+        self.joint = Select(title="joint", width=90)
+        self.other = Select(title="beside", options=[NONE], value=NONE, width=190)
+        self.where = Select(title="where it fails", options=[NONE], value=NONE, width=190)
         for select in (self.trial, self.joint, self.other):
             select.on_change("value", lambda attr, old, new: self._again())
         self.where.on_change("value", lambda attr, old, new: self._zoom())
