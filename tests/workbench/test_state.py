@@ -7,7 +7,7 @@ import pytest
 
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
-from tactile_cube.identification.identification import identify
+from tactile_cube.identification.identification import identify_effects
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.workbench.state import Workbench
 from tests.workbench.small_bench import HIDDEN, OWN, STRIBECK, stribeck_recording
@@ -43,7 +43,7 @@ def test_ten_lines_lead_from_a_recording_to_a_model_at_the_noise(bench: Workbenc
 
 def test_the_staircase_is_that_of_identify(bench: Workbench, measured: Recording) -> None:
     bench.add(STRIBECK)
-    stages = identify(measured, [STRIBECK], "fast", say=lambda line: None).stages
+    stages = identify_effects(measured, [STRIBECK], "fast", say=lambda line: None).stages
     mine = {stage.label: stage.errors.overall for stage in bench.stages}
     assert mine["stated"] == stages["nominal"].overall
     assert mine["refitted"] == pytest.approx(stages["refitted"].overall, rel=1e-6)

@@ -17,6 +17,7 @@ from tactile_cube.api.job import PathLike, as_input_errors
 from tactile_cube.drivetrain.effects import catalogue, find_effect, import_own_effects, resolve
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile, write_model
 from tactile_cube.errors import InputError
+from tactile_cube.identification.diagnosis import Unseen, unseen
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, final_fit, standard_errors
 from tactile_cube.identification.fitting.problem import Problem
@@ -30,9 +31,8 @@ from tactile_cube.identification.search.residual_shape import Missing, missing_t
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.shortlist import resized
 from tactile_cube.identification.simulations import with_offsets
-from tactile_cube.identification.unseen import Unseen, unseen
 from tactile_cube.measurement.bench import without_touches
-from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare, describe_comparison
+from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error, raw_residuals, summarise_errors
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -314,7 +314,7 @@ class Workbench:
         model = self.model_file()
         folder.mkdir(parents=True, exist_ok=True)
         write_model(model, folder / "model.yaml")
-        after = compare(without_touches(self.opened), model, "fast", USUAL_STEP, floor=self.floor)
+        after = compare_recording(without_touches(self.opened), model, "fast", USUAL_STEP, floor=self.floor)
         stages = {one.label: one.errors.overall for one in self.stages} | {"noise_floor": self.floor.overall}
         joints = {one.label: one.errors.joints for one in self.stages}
         page = identification_report(after, stages, joints, model.provenance.command, str(folder / "model.yaml"))
