@@ -4,6 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from tensordict import TensorDict
 from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import Compose
 from torchrl.envs.utils import check_env_specs, step_mdp
@@ -73,6 +74,16 @@ def test_observation_is_the_last_readings_oldest_first_and_a_reset_fills_it(
     assert torch.equal(after["observation"][1], kept)
     going_on = env.step(after.set("action", torch.zeros(2, 12)))["next", "observation"][1]
     assert torch.equal(going_on[:-24], kept[24:])
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_critics_see_the_object_in_numbers_of_the_size_of_one_if_at_all(visible: bool) -> None:
+    usual = [0.01] * 3 + [1.0] * 2 + [0.1] * 2 + [0.05] * 3 + [1.0] * 15  # [m], [1], [rad], [m/s], [rad/s], q_f [rad]
+    data = TensorDict({"object_state": torch.tensor([usual] * 2)}, [2])
+    for transform in transforms(EnvConfig(Task("full"), privileged=visible), explore=False)[4:6]:
+        data = transform._call(data)
+    torch.testing.assert_close(data["privileged"], torch.full((2, 25), float(visible)))
+    assert "object_state" not in data
 
 
 def test_policy_cannot_see_the_object() -> None:

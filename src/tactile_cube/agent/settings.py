@@ -32,7 +32,7 @@ class AgentSettings(BaseModel):
             own (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone.
         batch_size: replayed transitions an update.
         precision: arithmetic of the matrix products: fp32, bf16, or auto: bf16 where the processor multiplies it
-            (AVX-512 and newer), else fp32. More than fp32 is for `sac_fast` only.
+            (AVX-512 and newer), else fp32.
         device: "cpu", "cuda" or "cuda:0"; collection stays on the CPU.
 
     Source: website table of the paper.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from torchrl.envs import TransformedEnv
-from torchrl.envs.transforms import CatFrames, CatTensors, Compose, Transform
+from torchrl.envs.transforms import CatFrames, CatTensors, Compose, ObservationNorm, RenameTransform, Transform
 
 from tactile_cube.drivetrain.effects import Effect, parse_effect, resolve
 from tactile_cube.drivetrain.model_file import as_model
@@ -23,7 +23,6 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.health import unresolved
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
 from tactile_cube.transforms.joint_offset import JointOffset
-from tactile_cube.transforms.privileged_state import PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
 
@@ -39,6 +38,9 @@ PARTS: Mapping[str, tuple[type, ...]] = {
     "simulation": (SimulationOptions,),
     "hand": (Hand,),
 }
+OBJECT_SCALE = (1.0 / 0.01,) * 3 + (1.0,) * 2 + (1.0 / 0.1,) * 2 + (1.0 / 0.05,) * 3 + (1.0,) * 3
+"""Brings the object's state to the size of one: it moves by centimetres, tilts by 0.1 rad, has 0.05 m/s. The critics,
+whose weights decay, could hardly use numbers a hundred times smaller than the joint angles beside them."""
 GAITS = 64  # that demonstrations choose from
 
 
@@ -158,13 +160,16 @@ def transforms(config: EnvConfig, explore: bool, teacher: Teacher | None = None)
     """The transforms, from the world to the policy: readings pass them downwards, actions upwards."""
     disturbances, hand = config.randomization, config.hand
     half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)
+    scale = torch.tensor(OBJECT_SCALE + (1.0,) * hand.joints)
     chain: list[Transform] = [
         JointOffset(disturbances.joint_offset, half_range),
         SensorNoise(disturbances.sensor_noise),
         # the policy sees the two joint signals and nothing else; the first reading of an episode fills the whole stack
         CatTensors(["joint_position", "control_error"], "observation", sort=False),
         CatFrames(config.stack, -1, ["observation"]),
-        PrivilegedState(hand.joints, config.privileged),
+        # only the critics see the object
+        RenameTransform(["object_state"], ["privileged"]),
+        ObservationNorm(0.0, scale * float(config.privileged), ["privileged"]),
         StickyAction(disturbances.sticky_probability),
     ]
     if explore and config.exploration.extra > 0.0:
