@@ -18,7 +18,7 @@ help: ## print these targets
 	@echo "installing into .venv: 0.8 GB to download, 3 GB on disk; a few minutes, the first time only"
 	@test -x $(BIN)/pip || $(PYTHON) -m venv .venv
 	@$(MAKE) --silent torch
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.txt --editable '.[dev,ros,onnx]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --constraint requirements.txt --editable '.[dev,ros,onnx,workbench]'
 	@touch $@
 
 # Without a GPU torch comes from TORCH_INDEX, if that answers within 5 s; else pip takes what its own index has.

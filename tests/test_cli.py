@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 from hydra.utils import instantiate
+from torchrl.objectives import SACLoss, TD3Loss
 
 from tactile_cube import cli
-from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import Sac
 from tactile_cube.api.environment import env_config
 from tactile_cube.composition import composed
@@ -27,8 +28,12 @@ from tactile_cube.training.settings import CollectorSettings, RunSettings, Train
         (lambda: RunSettings(name="a", seed=-1), "seed=-1: Input should be greater than or equal to 0"),
         (lambda: Sac(Sizes(3, 2, 1), gamma=2.0), "agent.gamma=2.0: Input should be less than 1"),
         (
-            lambda: Sac(Sizes(3, 2, 1), precision="bf16"),
-            "agent.precision=bf16: agent=sac knows fp32 only; use agent=sac_fast",
+            lambda: Sac(Sizes(3, 2, 1), SACLoss, demonstration_weight=2.0),
+            "agent.demonstration_weight=2: SACLoss does not imitate; set it to 0",
+        ),
+        (
+            lambda: Sac(Sizes(3, 2, 1), TD3Loss),
+            "agent.loss: TD3Loss.__init__() got an unexpected keyword argument 'alpha_init'; give a soft actor-critic",
         ),
         (
             lambda: instantiate({"_target_": "tactile_cube.env.Task", "name": "full", "filter_time": -1.0}),

@@ -16,8 +16,7 @@ from omegaconf import DictConfig, OmegaConf
 from safetensors.numpy import load
 
 from benchmarks.faults.mutations import VALUES, damaged
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy, sealed
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.composition import composed

@@ -30,6 +30,7 @@ SECTIONS: dict[str, Callable[[int, bool], Section]] = {
     "end_to_end": lambda rounds, peers: _function("end_to_end")(min(rounds, 5), peers),
     "identification": lambda rounds, peers: _function("identification")(rounds, peers),
     "startup": lambda rounds, peers: _function("startup")(rounds),
+    "workbench": lambda rounds, peers: _function("workbench")(rounds),
 }
 
 

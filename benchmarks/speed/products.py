@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import torch
 from torch import Tensor
 
-from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Sizes
 
 Shape = tuple[int, int, int]
 """Rows, inner width and columns of a product."""

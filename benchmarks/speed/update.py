@@ -14,8 +14,8 @@ from benchmarks.speed.products import multiplying, update_products
 from benchmarks.speed.report import Growth, Section, durations, rates
 from benchmarks.speed.sb3_sac import filled_sac
 from benchmarks.speed.timing import in_turns
-from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import Sac
 from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.training.heap import keep_freed_memory
@@ -48,6 +48,7 @@ def update(rounds: int, peers: bool = True, calls: int = CALLS, hidden: int = 51
         "tactile_cube sac_fast, bf16": _updating(FastSac(SIZES, precision="bf16", hidden=(hidden, hidden))),
         "tactile_cube sac_fast, fp32": _updating(FastSac(SIZES, precision="fp32", hidden=(hidden, hidden))),
         "TorchRL SACLoss (agent=sac)": _updating(Sac(SIZES, hidden=(hidden, hidden))),
+        "TorchRL SACLoss (agent=sac), bf16": _updating(Sac(SIZES, precision="bf16", hidden=(hidden, hidden))),
     }
     sb3 = find_peer("stable_baselines3", section.missing) if peers else None
     if sb3 is not None:
@@ -84,10 +85,10 @@ def _updating(agent: Agent, batch: int = 256) -> Callable[[], object]:
 def filled_replay(capacity: int) -> Replay:
     """A full replay of made-up transitions."""
     replay = Replay(capacity, SIZES, REWARD_TERMS, seed=0)
-    replay.rows.uniform_(-1.0, 1.0)
-    terminated, steps = -2, -1
-    replay.rows[:, terminated], replay.rows[:, steps] = 0.0, 1.0
-    replay.written = capacity
+    rows = torch.rand(capacity, sum(replay.widths.values())) * 2.0 - 1.0
+    terminated, steps = -3, -2
+    rows[:, terminated], rows[:, steps] = 0.0, 1.0
+    replay.buffer.extend(rows)
     return replay
 
 
@@ -116,6 +117,6 @@ def _curve(name: str, x_name: str, cases: dict[str, Callable[[], object]], round
 
 
 def _replay_memory() -> Growth:
-    row = Replay(1, SIZES, REWARD_TERMS, seed=0).rows
-    memory = [n * row.element_size() * row.numel() / MEGABYTE for n in REPLAY_SIZES]
+    width = sum(Replay(1, SIZES, REWARD_TERMS, seed=0).widths.values())
+    memory = [4 * n * width / MEGABYTE for n in REPLAY_SIZES]
     return Growth("memory against replay size", "transitions", [float(n) for n in REPLAY_SIZES], "replay [MiB]", memory)

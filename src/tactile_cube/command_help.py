@@ -37,11 +37,14 @@ def help_text(name: str) -> str:
 def commands() -> dict[str, str]:
     """Commands of the package and the first line of what they say about themselves, without importing them."""
     result = {}
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    package = Path(__file__).parent
+    modules = {path.stem: path for path in package.glob("*.py")}
+    modules |= {path.parent.name: path for path in package.glob("*/__init__.py")}
+    for name, path in sorted(modules.items()):
         text = path.read_text()
-        if f'@command("{path.stem}"' in text:
+        if f'@command("{name}"' in text:
             docstring = ast.get_docstring(ast.parse(text)) or ""
-            result[path.stem] = docstring.partition("\n")[0]
+            result[name] = docstring.partition("\n")[0]
     return result
 
 

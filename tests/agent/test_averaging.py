@@ -6,8 +6,7 @@ import pytest
 import torch
 
 from tactile_cube.agent.averaging import averaged, kept_policies
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
 from tactile_cube.errors import InputError
 

@@ -7,9 +7,8 @@ import torch
 from tensordict import TensorDict
 from torchrl.modules import TanhNormal
 
-from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.behaviour import Behaviour
-from tactile_cube.agent.networks import Actor, Critic, squashed_log_prob
+from tactile_cube.agent.networks import Actor, Critic, Sizes, squashed_log_prob
 from tactile_cube.agent.sac import stochastic_actor
 
 SIZES = Sizes(observation=10, privileged=4, action=3)

@@ -9,8 +9,7 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, read_policy, require_sizes, save_policy, sealed
 from tactile_cube.deployment.controller import read_network
 from tactile_cube.errors import InputError

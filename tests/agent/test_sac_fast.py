@@ -4,10 +4,11 @@ from typing import Any
 
 import pytest
 import torch
+from tensordict import TensorDict
 from torchrl.objectives import SACLoss
 
-from tactile_cube.agent.batch import Batch, Sizes
 from tactile_cube.agent.flat_perceptron import FlatPerceptron, parameter_count, rectify_gradient_
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import ImitatingLoss, Sac
 from tactile_cube.agent.sac_fast import FastSac
 
@@ -15,23 +16,29 @@ SIZES = Sizes(observation=30, privileged=7, action=4)
 SETTINGS: dict[str, Any] = {"hidden": (64, 48), "batch_size": 32, "learning_rate": 1e-3}
 
 
-def random_batch(rows: int = 32, seed: int = 1) -> Batch:
+def random_batch(rows: int = 32, seed: int = 1) -> TensorDict:
     generator = torch.Generator().manual_seed(seed)
 
     def normal(width: int) -> torch.Tensor:
         return torch.randn(rows, width, generator=generator)
 
-    return Batch(
-        observation=normal(SIZES.observation),
-        privileged=normal(SIZES.privileged),
-        action=torch.tanh(normal(SIZES.action)),
-        reward=normal(1),
-        next_observation=normal(SIZES.observation),
-        next_privileged=normal(SIZES.privileged),
-        terminated=(normal(1) > 1.0).float(),
-        steps=torch.randint(1, 4, (rows, 1), generator=generator).float(),
-        demonstrated=(normal(1) > 0.0).float(),
-    )
+    terminated = normal(1) > 1.0
+    following = {
+        "observation": normal(SIZES.observation),
+        "privileged": normal(SIZES.privileged),
+        "reward": normal(1),
+        "done": terminated,
+        "terminated": terminated,
+    }
+    batch = {
+        "observation": normal(SIZES.observation),
+        "privileged": normal(SIZES.privileged),
+        "action": torch.tanh(normal(SIZES.action)),
+        "steps_to_next_obs": torch.randint(1, 4, (rows, 1), generator=generator).float(),
+        "demonstrated": normal(1) > 0.0,
+        "next": following,
+    }
+    return TensorDict(batch, [rows])
 
 
 def pair(**settings: Any) -> tuple[Sac, FastSac]:
@@ -48,7 +55,7 @@ def gradients_of_fast(fast: FastSac) -> list[torch.Tensor]:
     return [tensor for view in views for weight, bias in view.gradients for tensor in (weight.t(), bias)]
 
 
-def gradients_of_sac(plain: Sac, batch: Batch) -> list[torch.Tensor]:
+def gradients_of_sac(plain: Sac, batch: TensorDict) -> list[torch.Tensor]:
     losses = plain.losses(batch)
     (losses["loss_qvalue"] + losses["loss_actor"] + losses["loss_alpha"]).backward()
     by_name = {name: p.grad for name, p in plain.loss.named_parameters()}
@@ -99,7 +106,7 @@ def test_without_demonstrations_the_loss_is_torchrls_own() -> None:
     own = SACLoss.actor_loss
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            ImitatingLoss, "actor_loss", lambda self, data: own(self, data.set("value", data["demonstrated"]))
+            ImitatingLoss, "actor_loss", lambda self, data: own(self, data.set("value", data["demonstrated"].float()))
         )
         torch.manual_seed(7)
         expected = plain.losses(random_batch())
@@ -123,18 +130,18 @@ def test_imitation_adds_the_gradient_of_better_demonstrated_actions_alone() -> N
 
     actor = fast.policy().requires_grad_(True)
     torch.manual_seed(7)
-    torch.randn(len(batch.action), SIZES.action)  # of the next actions
-    mean, scale = actor(batch.observation)
+    torch.randn(len(batch["action"]), SIZES.action)  # of the next actions
+    mean, scale = actor(batch["observation"])
     proposed = torch.tanh(mean + scale * torch.randn(mean.shape)).detach()
-    state = torch.cat((batch.observation, batch.privileged), -1)
+    state = torch.cat((batch["observation"], batch["privileged"]), -1)
 
     def value(action: torch.Tensor) -> torch.Tensor:
         x = torch.cat((state, action), -1)
         return torch.minimum(*(critic.forward(x)[0] for critic in fast.networks.critics))
 
-    better = (value(batch.action) > value(proposed)).float() * batch.demonstrated
-    assert 0 < better.sum() < batch.demonstrated.sum() < len(better)
-    loss = weight * (better * (torch.tanh(mean) - batch.action).square()).sum() / len(better)
+    better = (value(batch["action"]) > value(proposed)).float() * batch["demonstrated"]
+    assert 0 < better.sum() < batch["demonstrated"].sum() < len(better)
+    loss = weight * (better * (torch.tanh(mean) - batch["action"]).square()).sum() / len(better)
     expected = torch.autograd.grad(loss, list(actor.body.parameters()))
     for index, gradient in enumerate(expected):
         torch.testing.assert_close(after[index] - before[index], gradient, rtol=1e-4, atol=1e-6)
@@ -216,9 +223,9 @@ def test_cuda_gives_the_gradients_of_the_cpu() -> None:
     cpu = FastSac(SIZES, **SETTINGS)
     gpu = FastSac(SIZES, **(SETTINGS | {"device": "cuda"}))
     gpu.load_networks(cpu.state_dict())
-    target = cpu._target(random_batch(), random_batch().action, torch.zeros(32, 1))
+    target = cpu._target(random_batch(), random_batch()["action"], torch.zeros(32, 1))
     batch = random_batch().to(torch.device("cuda"))
-    on_gpu = gpu._target(batch, batch.action, torch.zeros(32, 1, device="cuda"))
+    on_gpu = gpu._target(batch, batch["action"], torch.zeros(32, 1, device="cuda"))
     torch.testing.assert_close(on_gpu.cpu(), target, rtol=1e-3, atol=1e-4)
     assert torch.isfinite(gpu.update(random_batch())["critic_loss"])
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,19 @@ def test_a_package_imports_only_packages_above_it(layer: str) -> None:
     for file in (SOURCE / layer).rglob("*.py"):
         wrong = imported_packages(file) & (below | commands)
         assert not wrong, f"{file.relative_to(ROOT)} imports {', '.join(sorted(wrong))}"
+
+
+def imported_modules(file: Path) -> set[str]:
+    """Modules of the package that a file takes names from, wherever in it."""
+    found = [node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom)]
+    return {f"{node.module}.{alias.name}" for node in found for alias in node.names} | {str(n.module) for n in found}
+
+
+@pytest.mark.parametrize("layer", sorted(set(LAYERS) - {"api", "identification"}))  # these two have one each
+def test_no_modules_of_a_package_import_each_other_in_a_circle(layer: str) -> None:
+    files = {".".join(path.relative_to(SOURCE.parent).with_suffix("").parts): path for path in SOURCE.rglob("*.py")}
+    own = {name: file for name, file in files.items() if layer in name.split(".")[1:2] and file.name != "__init__.py"}
+    TopologicalSorter({name: imported_modules(file) & own.keys() for name, file in own.items()}).prepare()
 
 
 def test_an_import_within_a_function_counts_too(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from tactile_cube.agent.policy_file import load_policy
 from tactile_cube.cli import with_recipe
 from tactile_cube.evaluation.policy_path import SHIPPED
+from tactile_cube.training.checkpoint import load_checkpoint
 
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
 
@@ -150,6 +151,21 @@ def test_smoke_run_trains_resumes_and_leaves_its_files(tmp_path: Path) -> None:
     assert any((folder / "tensorboard").iterdir())
     steps = [int(line.split(",")[0]) for line in (folder / "metrics.csv").read_text().splitlines()[1:]]
     assert steps == list(range(40, 401, 40))
+
+
+def test_another_loss_of_torchrl_is_a_file_of_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "my_conf/agent/mine.yaml"
+    file.parent.mkdir(parents=True)
+    loss = "{_target_: torchrl.objectives.TQCLoss, _partial_: true, top_quantiles_to_drop_per_net: 1}"
+    file.write_text(f"defaults: [sac, _self_]\ncritics: 3\nquantiles: 7\nloss: {loss}\n")
+    short = ["+experiment=smoke", "collector=single", "collector.worlds=4", "training.learning_starts=100"]
+    for steps in (160, 200):  # the second goes on
+        run = train("--config-dir", "my_conf", "agent=mine", *short, f"training.steps={steps}", folder=tmp_path)
+        assert run.returncode == 0, run.stderr
+        assert f"all {steps} steps done" in run.stdout
+    learned = load_checkpoint(tmp_path / "outputs/train/smoke-seed0/checkpoint.pt")["learner"]
+    assert learned["counters"]["updates"] > 0
+    assert (3, 7) in [tuple(value.shape) for value in learned["agent"]["loss"].values()]  # biases of the last layers
 
 
 def test_a_sweep_keeps_its_record_in_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

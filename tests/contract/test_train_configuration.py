@@ -7,7 +7,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from tactile_cube import composition
-from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.command_help import CONFIG
 from tactile_cube.env import Conditions
 from tactile_cube.training.environment import as_environment

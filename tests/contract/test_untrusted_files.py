@@ -16,8 +16,7 @@ import torch
 from omegaconf import OmegaConf
 
 import tactile_cube
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
 from tactile_cube.composition import composed
 from tactile_cube.deployment.training_setting import training_setting

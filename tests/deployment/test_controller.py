@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
 from tactile_cube.deployment.controller import Network, PolicyController, TargetFilter, read_network
 from tactile_cube.env import Task

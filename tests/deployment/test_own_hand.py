@@ -10,8 +10,7 @@ import pytest
 import torch
 
 import tactile_cube
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
 from tactile_cube.api.deployment import robot_limits
 from tactile_cube.deployment.training_setting import training_setting

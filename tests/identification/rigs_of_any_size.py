@@ -1,6 +1,6 @@
 """Simulated recordings of one joint, turning or sliding, with every mass, length and time multiplied at will."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,9 +54,12 @@ class Size:
 
 
 def simulated(
-    folder: Path, size: Size, effect: type[Effect], values: dict[str, float], noise: float = 2e-4
+    folder: Path, size: Size, effect: type[Effect], values: dict[str, float], wound: float = 0.0
 ) -> Recording:
-    """Four trials, two of each of two kinds, of a rig with a hidden effect (its values at the size wanted)."""
+    """Four trials, two of each of two kinds, of a rig with a hidden effect (its values at the size wanted).
+
+    An integral of its controller begins `wound` [N m] beyond balance.
+    """
     stated = _stated(size)
     trials = [{"file": f"{kind}{n}.parquet", "initialisation": 0, "kind": kind} for kind in COMMANDS for n in (0, 1)]
     described: dict[str, Any] = {
@@ -81,6 +84,7 @@ def simulated(
     planned = read_recording(folder)
     shooting = Shooting(planned, EFFECTS)
     windows = cut(planned, np.ones(1), segment=SAMPLES, time=shooting.time)
+    windows = replace(windows, wound=np.full_like(windows.wound, wound))
     plain = nominal_model(planned)
     known = effect("a", **values)
     model = Model(plain.constants, (Term(effect, "a", known.values, ()),), plain.offsets)

@@ -28,6 +28,12 @@ def test_an_unknown_effect_is_claimed_only_where_signals_show_one(share: float, 
     assert headline(result("unknown_effect", black_box=share)) == said
 
 
+def test_several_effects_are_told_as_several() -> None:
+    one, other = ({"name": name, "joints": ["q1"]} for name in ("backlash", "payload"))
+    assert "it is this one" in headline(result("missing_effect") | {"effects": [one, one]}), "one law at two joints"
+    assert "they are these" in headline(result("missing_effect") | {"effects": [one, other]})
+
+
 def test_what_follows_no_model_is_told_with_the_line_that_leaves_it_out() -> None:
     one = {"trial": "holds_0", "start": 0.8, "end": 2.8, "joint": "q1", "error": 111.2, "usual": 1.62, "repeats": 2}
     (left_out,) = disturbed({"left_out": [one]})

@@ -5,6 +5,7 @@ import numpy as np
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.late_commands import in_time
+from tactile_cube.measurement.recordings.reading import read_recording
 from tests.identification.rigs_of_any_size import EFFECTS, SAMPLES, STEP, Size, simulated
 
 LATE = 3  # rows
@@ -22,4 +23,15 @@ def test_commands_logged_late_are_taken_earlier_and_said(tmp_path: Path) -> None
     for trial, true in zip(found.trials, clean.trials, strict=True):
         assert np.array_equal(trial.command[: SAMPLES - LATE], true.command[: SAMPLES - LATE])
         assert np.flatnonzero(~trial.valid).tolist() == list(range(SAMPLES - LATE, SAMPLES))
+    assert f"commands_late: {LATE}" in said[0]
     assert f"{LATE} rows ({1e3 * LATE * STEP:.3g} ms) before its commands" in said[0]
+
+
+def test_what_was_found_is_written_once_and_read_by_every_command(tmp_path: Path) -> None:
+    clean = simulated(tmp_path, Size(), find_effect("viscous_friction"), {"damping": 0.01})
+    file = tmp_path / "recording.yaml"
+    file.write_text(file.read_text() + f"sensors: {{commands_late: {LATE}}}\n")
+    for trial, logged in zip(read_recording(tmp_path).trials, clean.trials, strict=True):
+        assert np.array_equal(trial.command[:-LATE], logged.command[LATE:])
+        assert np.flatnonzero(~trial.valid).tolist() == list(range(SAMPLES - LATE, SAMPLES))
+        assert np.array_equal(trial.position, logged.position)

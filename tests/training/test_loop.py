@@ -95,7 +95,7 @@ def test_learner_uses_the_replay_of_the_iteration_before(tmp_path: Path) -> None
     sample = run.learner.replay.sample
 
     def watched(*args: Any) -> Any:
-        seen.append(run.learner.replay.written)
+        seen.append(run.learner.replay.buffer.write_count)
         return sample(*args)
 
     run.learner.replay.sample = watched  # type: ignore[method-assign]
@@ -184,7 +184,7 @@ def test_faulty_transitions_never_reach_the_replay(tmp_path: Path) -> None:
     finish(run)
     assert run.learner.episodes.faulty > 0
     assert torch.isfinite(run.learner.replay.rows).all()
-    assert run.learner.replay.written + run.learner.episodes.faulty == run.learner.steps
+    assert run.learner.replay.buffer.write_count + run.learner.episodes.faulty == run.learner.steps
 
 
 def test_barriers_have_seeds_of_their_own() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 import torch
-from tensordict import TensorDict
+from tensordict import TensorDict, TensorDictBase
 
 from tactile_cube.training.transitions import TransitionAssembler
 
@@ -29,17 +29,19 @@ def stream(length: int, done: dict[int, str] | None = None, faulty: int | None =
     return TensorDict({"observation": t, "privileged": t, "action": t, "next": following}, batch_size=[1, length])
 
 
-def table(transitions: dict[str, torch.Tensor]) -> list[tuple[float, float, float, float, float]]:
+def table(transitions: TensorDictBase) -> list[tuple[float, float, float, float, float]]:
     """Rows (state, return, next state, terminated, steps)."""
-    names = ("observation", "reward_terms", "next_observation", "terminated", "steps")
-    return [tuple(row) for row in torch.cat([transitions[n].float() for n in names], -1).tolist()]
+    following = transitions["next"]
+    parts = [transitions["observation"], following["reward_terms"], following["observation"], following["terminated"]]
+    columns = torch.cat([part.float() for part in (*parts, transitions["steps_to_next_obs"])], -1)
+    return [tuple(row) for row in columns.tolist()]
 
 
 def test_one_step_transitions_are_the_block_itself() -> None:
     assembler = TransitionAssembler(1, 0.5)
     got = table(assembler.add(stream(3, {1: "truncated"})))
     assert got == [(0, 1, 1, 0, 1), (1, 2, 2, 0, 1), (2, 3, 3, 0, 1)]
-    assert assembler.flush() == {}
+    assert len(assembler.flush()) == 0
 
 
 def test_three_steps_are_summed_with_discount_across_blocks() -> None:

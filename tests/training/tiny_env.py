@@ -8,7 +8,7 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.env import Conditions
 from tactile_cube.training.environment import Environment
 

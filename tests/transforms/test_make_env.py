@@ -1,8 +1,11 @@
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from torchrl.envs import TransformedEnv
+from torchrl.envs.transforms import Compose
 from torchrl.envs.utils import check_env_specs, step_mdp
 
 from tactile_cube.env import Task
@@ -10,7 +13,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.simulation import SimulationOptions
 from tactile_cube.transforms import EnvConfig, Exploration, make_env
-from tactile_cube.transforms.make_env import rotation_env
+from tactile_cube.transforms.make_env import rotation_env, transforms
 
 DISTURBED = Randomization(
     start_angles=Uniform(-0.03, 0.03),
@@ -46,6 +49,30 @@ def test_seed_determines_everything() -> None:
         assert torch.equal(first[key], third[key])
     env.set_seed(4)
     assert not torch.equal(first["observation"], env.rollout(6, break_when_any_done=False)["observation"])
+
+
+def reading(env: TransformedEnv, world: int) -> torch.Tensor:
+    moment = env.base_env._moments[world]
+    return torch.cat([torch.tensor(moment.joint_position), torch.tensor(moment.control_error)]).float()
+
+
+def test_observation_is_the_last_readings_oldest_first_and_a_reset_fills_it(
+    transformed: Callable[..., TransformedEnv],
+) -> None:
+    env = transformed(Compose(*transforms(EnvConfig(Task("full"), stack=3), explore=False)))
+    data = env.reset()
+    assert "joint_position" not in data
+    seen = [reading(env, 1)] * 3
+    for step in range(5):
+        data = step_mdp(env.step(data.set("action", torch.full((2, 12), 0.1 * step))))
+        seen.append(reading(env, 1))
+        assert torch.equal(data["observation"][1], torch.cat(seen[-3:]))
+    kept = data["observation"][1].clone()
+    after = env.reset(data.set("_reset", torch.tensor([[True], [False]])))
+    assert torch.equal(after["observation"][0], reading(env, 0).repeat(3))
+    assert torch.equal(after["observation"][1], kept)
+    going_on = env.step(after.set("action", torch.zeros(2, 12)))["next", "observation"][1]
+    assert torch.equal(going_on[:-24], kept[24:])
 
 
 def test_policy_cannot_see_the_object() -> None:

@@ -2,10 +2,10 @@
 
 from typing import Any, Protocol
 
+from tensordict import TensorDictBase
 from torch import Tensor
 
-from tactile_cube.agent.batch import Batch, Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.settings import AgentSettings
 
 
@@ -18,8 +18,12 @@ class Agent(Protocol):
     sizes: Sizes
     settings: AgentSettings
 
-    def update(self, batch: Batch) -> dict[str, Tensor]:
+    def update(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """One gradient step of critics, actor and temperature, then of the target critics.
+
+        Args:
+            batch: replayed transitions (size,), as TorchRL's losses read them. The reward sums "steps_to_next_obs"
+                discounted ones, "terminated" leaves out time limits, "demonstrated" marks those of a gait or a teacher.
 
         Returns:
             Scalars on the agent's device: critic_loss, actor_loss, alpha, entropy, value (mean Q of the batch).

@@ -3,15 +3,27 @@
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.settings import AgentSettings
-
 LOG_SCALE_LOW, LOG_SCALE_HIGH = -5.0, 2.0
 """Bounds of log sigma; an untrained actor starts in the middle with sigma = 0.22."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Widths of the signals: observation (actor), privileged (critics only), action."""
+
+    observation: int
+    privileged: int
+    action: int
+
+    @property
+    def critic(self) -> int:
+        """Width of a critic's input: observation, privileged state and action side by side."""
+        return self.observation + self.privileged + self.action
 
 
 def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:
@@ -61,20 +73,20 @@ class Actor(nn.Module):
 
 
 class Critic(nn.Module):
-    """Q(observation, privileged, action) -> (batch, 1)."""
+    """Q(observation, privileged, action) -> (batch, outputs)."""
 
-    def __init__(self, sizes: Sizes, hidden: Sequence[int], layer_norm: bool = False):
+    def __init__(self, sizes: Sizes, hidden: Sequence[int], layer_norm: bool = False, outputs: int = 1):
         super().__init__()
-        self.body = perceptron((sizes.critic, *hidden, 1), layer_norm)
+        self.body = perceptron((sizes.critic, *hidden, outputs), layer_norm)
 
     def forward(self, observation: Tensor, privileged: Tensor, action: Tensor) -> Tensor:
-        """State-action value (batch, 1)."""
+        """State-action value (batch, outputs); several outputs are its quantiles."""
         value: Tensor = self.body(torch.cat((observation, privileged, action), -1))
         return value
 
 
-def build_networks(sizes: Sizes, settings: AgentSettings) -> tuple[Actor, Critic, Critic]:
-    """Actor and twin critics with torch's default initialisation, drawn in this order from torch's generator."""
-    actor = Actor(sizes, settings.hidden)
-    critics = [Critic(sizes, settings.hidden, settings.layer_norm) for _ in range(2)]
-    return actor, critics[0], critics[1]
+def build_networks(
+    sizes: Sizes, hidden: Sequence[int], layer_norm: bool, critics: int = 2, outputs: int = 1
+) -> tuple[Actor, list[Critic]]:
+    """Actor and critics with torch's default initialisation, drawn in this order from torch's generator."""
+    return Actor(sizes, hidden), [Critic(sizes, hidden, layer_norm, outputs) for _ in range(critics)]

@@ -132,8 +132,7 @@ def load_policy(path: Path | str) -> tuple[Actor, PolicyInfo]:
     """Read a policy file as torch's network; raises what `read_policy` does."""
     import torch  # imports slowly, and the robot's computer does without it
 
-    from tactile_cube.agent.batch import Sizes
-    from tactile_cube.agent.networks import Actor
+    from tactile_cube.agent.networks import Actor, Sizes
 
     info, layers = read_policy(Path(path))
     actor = Actor(Sizes(info.observation_size, 0, info.action_size), info.hidden).requires_grad_(False)

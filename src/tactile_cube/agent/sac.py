@@ -1,18 +1,20 @@
-"""The readable composition: TorchRL's SACLoss with imitation, one fused AdamW, soft target updates."""
+"""The readable composition: a loss of TorchRL, its SACLoss with imitation or another, AdamW and soft target updates."""
 
 import copy
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from tensordict import TensorDict
+import torch
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule
 from torch import Tensor
 from torchrl.data import Bounded
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.modules import ProbabilisticActor, TanhNormal, ValueOperator
-from torchrl.objectives import SACLoss, SoftUpdate
+from torchrl.objectives import LossModule, SACLoss, SoftUpdate
 
-from tactile_cube.agent.batch import Batch, Sizes
-from tactile_cube.agent.networks import Actor, build_networks
+from tactile_cube.agent.networks import Actor, Critic, Sizes, build_networks
 from tactile_cube.agent.optimizer import build_optimizer
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.errors import InputError
@@ -42,19 +44,21 @@ class ImitatingLoss(SACLoss):  # type: ignore[misc]
 
     demonstration_weight: float = 0.0
 
-    def actor_loss(self, tensordict: TensorDict) -> tuple[Tensor, dict[str, Tensor]]:
+    def actor_loss(self, tensordict: TensorDictBase) -> tuple[Tensor, dict[str, Tensor]]:
         """The loss above, averaged over the batch; writes Q(s, a') to the key "value"."""
         with set_exploration_type(ExplorationType.RANDOM), self.actor_network_params.to_module(self.actor_network):
             policy = self.actor_network.get_dist(tensordict)
         own, replayed = policy.rsample(), tensordict["action"]
         log_prob, value = policy.log_prob(own), self.lower_value(tensordict, own)
-        better = self.lower_value(tensordict, replayed) > value
-        distance = (policy.deterministic_sample - replayed).square().sum(-1)
-        imitation = self.demonstration_weight * tensordict["demonstrated"].squeeze(-1) * better * distance
         tensordict.set("value", value.detach())
-        return (self._alpha * log_prob - value + imitation).mean(), {"log_prob": log_prob.detach()}
+        loss = self._alpha * log_prob - value
+        if self.demonstration_weight:
+            better = self.lower_value(tensordict, replayed) > value
+            distance = (policy.deterministic_sample - replayed).square().sum(-1)
+            loss += self.demonstration_weight * tensordict["demonstrated"].squeeze(-1) * better * distance
+        return loss.mean(), {"log_prob": log_prob.detach()}
 
-    def lower_value(self, tensordict: TensorDict, action: Tensor) -> Tensor:
+    def lower_value(self, tensordict: TensorDictBase, action: Tensor) -> Tensor:
         """The lower of both critics' values of an action (batch,), whose gradient is by the action alone."""
         judged = tensordict.select(*CRITIC_KEYS).set("action", action)
         values = self._vmap_qnetworkN0(judged, self._cached_detached_qvalue_params)["state_action_value"]
@@ -62,42 +66,73 @@ class ImitatingLoss(SACLoss):  # type: ignore[misc]
         return lower
 
 
-class Sac:
-    """Soft actor-critic from TorchRL's parts."""
+IMITATING = partial(ImitatingLoss, loss_function="l2")
 
-    def __init__(self, sizes: Sizes, **settings: Any):
+
+class Sac:
+    """Soft actor-critic from TorchRL's parts.
+
+    Args:
+        sizes: widths of the signals.
+        loss: makes a loss of TorchRL from a stochastic `actor_network` and a list `qvalue_network`.
+        critics: how many of them.
+        quantiles: outputs of each, for losses that learn the distribution of the return.
+        settings: see `AgentSettings`.
+
+    Raises:
+        InputError: a loss that takes other networks, or cannot imitate and shall.
+    """
+
+    def __init__(
+        self,
+        sizes: Sizes,
+        loss: Callable[..., LossModule] = IMITATING,
+        critics: int = 2,
+        quantiles: int = 1,
+        **settings: Any,
+    ):
         self.sizes = sizes
         self.settings = AgentSettings(**settings)
-        if self.settings.precision != "fp32":
-            raise InputError(
-                f"agent.precision={self.settings.precision}: agent=sac knows fp32 only; use agent=sac_fast"
-            )
         self.device = self.settings.torch_device()
-        self.actor, *critics = build_networks(sizes, self.settings)
-        self.loss = self._build_loss(critics).to(self.device)
-        self.targets = SoftUpdate(self.loss, tau=self.settings.tau)
-        networks = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
-        self.optimizer = build_optimizer(networks, self.loss.log_alpha, self.settings)
+        self.actor, networks = build_networks(sizes, self.settings.hidden, self.settings.layer_norm, critics, quantiles)
+        try:
+            self.loss = self._build_loss(loss, networks).to(self.device)
+            self.targets = SoftUpdate(self.loss, tau=self.settings.tau)
+        except (TypeError, RuntimeError) as error:
+            raise InputError(
+                f"agent.loss: {error}; give a soft actor-critic loss of TorchRL, as conf/agent/tqc.yaml does"
+            ) from error
+        parameters = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
+        self.optimizer = build_optimizer(parameters, self.loss.log_alpha, self.settings)
 
-    def _build_loss(self, critics: list[Any]) -> ImitatingLoss:
-        loss = ImitatingLoss(
+    def _build_loss(self, make: Callable[..., LossModule], critics: list[Critic]) -> LossModule:
+        loss = make(
             actor_network=stochastic_actor(self.actor, self.sizes.action),
             qvalue_network=[ValueOperator(critic, in_keys=CRITIC_KEYS) for critic in critics],
-            loss_function="l2",
+            num_qvalue_nets=len(critics),
             alpha_init=self.settings.alpha_init,
             target_entropy=self.settings.target_entropy,
-            deactivate_vmap=True,  # a plain loop over two critics is faster than vmap on a CPU
+            deactivate_vmap=True,  # a plain loop over critics is faster than vmap on a CPU
         )
-        loss.demonstration_weight = self.settings.demonstration_weight
+        if isinstance(loss, ImitatingLoss):
+            loss.demonstration_weight = self.settings.demonstration_weight
+        elif self.settings.demonstration_weight:
+            raise InputError(
+                f"agent.demonstration_weight={self.settings.demonstration_weight:g}: {type(loss).__name__} does not "
+                "imitate; set it to 0"
+            )
         loss.make_value_estimator(gamma=self.settings.gamma)
         return loss
 
-    def losses(self, batch: Batch) -> TensorDict:
+    def losses(self, batch: TensorDictBase) -> TensorDictBase:
         """The loss of a batch: loss_qvalue, loss_actor, loss_alpha, alpha, entropy, value of the actor's actions."""
-        data = self._tensordict(batch.to(self.device))
-        return self.loss(data).set("value", data["value"].mean())
+        data, rough = batch.to(self.device), self.settings.product_dtype == torch.bfloat16
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=rough):
+            losses: TensorDictBase = self.loss(data)
+        value = data.get("value", -losses["alpha"] * losses["entropy"] - losses["loss_actor"])
+        return losses.set("value", value.detach().mean())
 
-    def update(self, batch: Batch) -> dict[str, Tensor]:
+    def update(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """One step of critics, actor and temperature, then of the target critics."""
         losses = self.losses(batch)
         (losses["loss_qvalue"] + losses["loss_actor"] + losses["loss_alpha"]).backward()
@@ -111,20 +146,6 @@ class Sac:
             "entropy": losses["entropy"],
             "value": losses["value"],
         }
-
-    def _tensordict(self, batch: Batch) -> TensorDict:
-        terminated = batch.terminated > 0.5
-        following = {
-            "observation": batch.next_observation,
-            "privileged": batch.next_privileged,
-            "reward": batch.reward,
-            "done": terminated,
-            "terminated": terminated,
-        }
-        current = {key: getattr(batch, key) for key in (*CRITIC_KEYS, "demonstrated")}
-        return TensorDict(
-            {**current, "steps_to_next_obs": batch.steps, "next": following}, batch_size=batch.reward.shape[:1]
-        )
 
     def policy(self) -> Actor:
         """A copy of the actor on the CPU, detached from the learner."""
@@ -149,5 +170,6 @@ class Sac:
         self.actor.load_state_dict(actor.state_dict())
 
     def approximations(self) -> list[str]:
-        """None: float32 throughout."""
-        return []
+        """What departs from exact float32."""
+        rough = self.settings.product_dtype == torch.bfloat16
+        return [f"agent.precision={self.settings.precision}: autocast to bfloat16"] if rough else []

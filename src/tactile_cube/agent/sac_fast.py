@@ -7,14 +7,15 @@ import copy
 from typing import Any
 
 import torch
+from tensordict import TensorDictBase
 from torch import Tensor
 
-from tactile_cube.agent.batch import Batch, Sizes
 from tactile_cube.agent.flat_perceptron import Activation, FlatPerceptron, parameter_count
 from tactile_cube.agent.networks import (
     LOG_SCALE_HIGH,
     LOG_SCALE_LOW,
     Actor,
+    Sizes,
     build_networks,
     log_scale,
     squashed_log_prob,
@@ -65,7 +66,7 @@ class FastSac:
         self.settings = AgentSettings(**settings)
         self.device = self.settings.torch_device()
         self.networks = FlatNetworks(sizes, self.settings, self.device)
-        actor, *critics = build_networks(sizes, self.settings)
+        actor, critics = build_networks(sizes, self.settings.hidden, self.settings.layer_norm)
         for flat, body in zip(self.networks.masters, [actor.body, *(critic.body for critic in critics)], strict=True):
             flat.copy_from(body)
         self.networks.target_master.copy_(self.networks.critic_part)
@@ -91,7 +92,7 @@ class FastSac:
         return SinglePass(self.optimizer, *vectors, networks.target_working, self.settings.tau)
 
     @torch.no_grad()
-    def update(self, batch: Batch) -> dict[str, Tensor]:
+    def update(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """One step of critics, actor and temperature, then of the target critics."""
         metrics = self.compute_gradients(batch.to(self.device))
         self.step()
@@ -112,17 +113,17 @@ class FastSac:
         networks.refresh()
 
     @torch.no_grad()
-    def compute_gradients(self, batch: Batch) -> dict[str, Tensor]:
+    def compute_gradients(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """Losses of the batch, and their gradients written into the flat gradient and log_alpha.grad.
 
         The actor is evaluated once on next and current observations together, the critics once on replayed and proposed
         actions together: all of them see the parameters before the step, as in SACLoss.
         """
-        size = batch.reward.shape[0]
+        size = batch["next", "reward"].shape[0]
         first, second = slice(0, size), slice(size, 2 * size)
         alpha = self.log_alpha.exp()
 
-        observations = self._cast(torch.cat((batch.next_observation, batch.observation)))
+        observations = self._cast(torch.cat((batch["next", "observation"], batch["observation"])))
         output, actor_kept = self.networks.actor.forward(observations)
         mean, raw = output.float().chunk(2, -1)
         noise = torch.cat([torch.randn_like(mean[first]), torch.randn_like(mean[second])])
@@ -154,25 +155,29 @@ class FastSac:
             "value": values.mean(),
         }
 
-    def _imitation_gradient(self, batch: Batch, likeliest: Tensor, better: Tensor) -> Tensor | float:
+    def _imitation_gradient(self, batch: TensorDictBase, likeliest: Tensor, better: Tensor) -> Tensor | float:
         """Gradient by the actor's mean of weight * |tanh(mean) - a|^2 over demonstrated actions a that are better."""
         weight = self.settings.demonstration_weight
         if not weight:
             return 0.0
-        share = weight / len(better) * batch.demonstrated * better
-        return 2.0 * share * (likeliest - batch.action) * (1.0 - likeliest.square())
+        action: Tensor = batch["action"]
+        share: Tensor = weight / len(better) * batch["demonstrated"] * better
+        return 2.0 * share * (likeliest - action) * (1.0 - likeliest.square())
 
     def _cast(self, x: Tensor) -> Tensor:
         return x.to(self.networks.working.dtype)
 
-    def _target(self, batch: Batch, action: Tensor, entropy_cost: Tensor) -> Tensor:
+    def _target(self, batch: TensorDictBase, action: Tensor, entropy_cost: Tensor) -> Tensor:
         """Soft bootstrapped return (batch, 1)."""
-        x = self._cast(torch.cat((batch.next_observation, batch.next_privileged, action), -1))
+        x = self._cast(torch.cat((batch["next", "observation"], batch["next", "privileged"], action), -1))
         lowest = torch.minimum(*(critic.forward(x)[0].float() for critic in self.networks.targets))
-        discount = self.settings.gamma**batch.steps * (1.0 - batch.terminated)
-        return batch.reward + discount * (lowest - entropy_cost)
+        discount: Tensor = self.settings.gamma ** batch["steps_to_next_obs"] * ~batch["next", "terminated"]
+        reward: Tensor = batch["next", "reward"]
+        return reward + discount * (lowest - entropy_cost)
 
-    def _critics(self, batch: Batch, proposed: Tensor, target: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def _critics(
+        self, batch: TensorDictBase, proposed: Tensor, target: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Critic loss, the lower of the two values of the proposed actions, and minus its gradient by the action.
 
         Last, 1 where the replayed action is worth more than the proposed one.
@@ -181,8 +186,8 @@ class FastSac:
         """
         size = target.shape[0]
         first, second = slice(0, size), slice(size, 2 * size)
-        state = torch.cat((batch.observation, batch.privileged), -1)
-        x = self._cast(torch.cat((torch.cat((state, batch.action), -1), torch.cat((state, proposed), -1))))
+        state = torch.cat((batch["observation"], batch["privileged"]), -1)
+        x = self._cast(torch.cat((torch.cat((state, batch["action"]), -1), torch.cat((state, proposed), -1))))
         passes = [critic.forward(x) for critic in self.networks.critics]
         q1, q2 = (output.float() for output, _ in passes)
         use_first = (q1[second] <= q2[second]).float()

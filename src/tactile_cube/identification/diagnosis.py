@@ -170,7 +170,7 @@ def in_long_steps_first(asked: Inquiry) -> Inquiry:
     asked.say(f"{_steps(quick)} steps of simulation a sample, {_steps(fine)} where the noise is reached")
     first = replace(asked, recording=quick)
     verdict = first.first.verdict
-    needed = resolved(recording, effects, said.append, known, verdict.chosen.error)
+    needed = resolved(recording, effects, said.append, known, verdict.chosen.error / FAR_OFF)
     if _steps(needed) == _steps(quick):
         return first
     asked.say(f"{_steps(needed)} steps of simulation a sample")

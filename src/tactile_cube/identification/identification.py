@@ -88,12 +88,12 @@ def identify_effects(
     for effect, joint, parameters in wanted:
         _check_parameters(effect, joint, parameters)
     classes = tuple(dict.fromkeys(effect for effect, *_ in wanted))
-    search, floor = _divided(recording, classes, seed, say)
+    search, floor = divided(recording, classes, seed, say)
     held_out, base = search.held_out, search.fit_base()
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
     current, judgement = base.fit, base.judgement
     for effect, joint, parameters in wanted:
-        current = _with_effect(search, current, effect, joint, parameters)
+        current = with_effect(search, current, effect, joint, parameters)
         label = current.model.terms[-1].label
         judgement = search.judged(current.model)
         stages[f"+ {label}"] = judgement.model
@@ -116,17 +116,24 @@ def judge_known(recording: Recording, model: ModelFile, seed: int = 0) -> Judgem
     """
     effects = resolve([one.effect for one in model.drive_effects], recording.joints)
     classes = tuple(dict.fromkeys(effect for effect, _ in effects))
-    search, _ = _divided(recording, classes, seed, lambda line: None)
+    search, _ = divided(recording, classes, seed, lambda line: None)
     return search.judged(nominal_model(search.held_out, model))
 
 
-def _divided(
-    recording: Recording, effects: Sequence[type[Effect]], seed: int, say: Callable[[str], None]
+def divided(
+    recording: Recording,
+    effects: Sequence[type[Effect]],
+    seed: int,
+    say: Callable[[str], None],
+    known: ModelFile | None = None,
 ) -> tuple[Search, NoiseFloor]:
-    """The trials to fit and those to judge by, with the effects compiled in."""
-    recording = in_time(resolved(recording, effects, say), effects, say)
+    """Return the trials to fit and those to judge by, with the effects compiled in, and the noise floor.
+
+    `known` is the model to begin with; None: what the recording's owner states.
+    """
+    recording = in_time(resolved(recording, effects, say, known), effects, say, known)
     fitted, held_out = held_out_split(recording, seed=seed)
-    return Search(fitted, held_out, sensor_noise(recording), effects, say), noise_floor(recording)
+    return Search(fitted, held_out, sensor_noise(recording), effects, say, known), noise_floor(recording)
 
 
 def _with_parameters(text: str) -> tuple[str, tuple[str, ...]]:
@@ -147,8 +154,8 @@ def _check_parameters(effect: type[Effect], joint: str, parameters: Sequence[str
             )
 
 
-def _with_effect(search: Search, current: Fit, effect: type[Effect], joint: str, parameters: Sequence[str] = ()) -> Fit:
-    """The fit with one more effect, in whichever of its forms and from whichever start it does best.
+def with_effect(search: Search, current: Fit, effect: type[Effect], joint: str, parameters: Sequence[str] = ()) -> Fit:
+    """Return the fit with one more effect, in whichever of its forms and from whichever start it does best.
 
     With `parameters`, those of a form are fitted that has them, or beside a form's own.
     """

@@ -17,6 +17,7 @@ OPENING = {
     "partly_explained": "Most of what is missing was found, but not all of it. Found:",
     "unknown_effect": "Something is missing that no effect of the catalogue explains.",
 }
+SEVERAL = "Effects are missing, and they are these:"
 UNRELATED = "The error is above the noise, but it follows none of the logged signals."
 NO_LAW, LEFT = 0.05, 2.0  # share that a black box explains of what follows no law; noise floors worth a word
 PARTIAL = "Some effects reduce the error, but more is missing."
@@ -74,6 +75,8 @@ def headline(result: Mapping[str, Any]) -> str:
     shares = [one.get("black_box", 1.0) for one in result.get("unexplained", [])]
     if result["verdict"] == "unknown_effect" and shares and max(shares) < NO_LAW:
         return UNRELATED
+    if result["verdict"] == "missing_effect" and len({entry["name"] for entry in result["effects"]}) > 1:
+        return SEVERAL
     return OPENING[result["verdict"]]
 
 

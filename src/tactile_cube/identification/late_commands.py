@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-
-import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.division import Division
 from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.recordings.description import MOST_LATE
+from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 
-MOST = 64  # rows looked at
 SEGMENTS = 32  # that tell them apart
 NEARER = -0.5  # rows: a reading that is as early comes nearer to its stamp with commands a row earlier
 
@@ -39,16 +37,18 @@ def in_time(
         return recording
 
     rows, (error, reading) = 0, _fitted(recording, effects, known)
-    while reading < NEARER and rows < MOST:
+    while reading < NEARER and rows < MOST_LATE:
         further, later = _fitted(_earlier(recording, rows + 1), effects, known)
         if further > error:
             break
         rows, error, reading = rows + 1, further, later
     if not rows:
         return recording
+    stated = recording.description.sensors.commands_late
     say(
         f"the machine moves {rows} rows ({1e3 * rows * recording.step:.3g} ms) before its commands, which were logged "
-        "late: they are taken that much earlier"
+        f"late: they are taken that much earlier. Write `commands_late: {stated + rows}` below `sensors:` in "
+        f"{recording.folder / DESCRIPTION}, so that every command does"
     )
     return _earlier(recording, rows)
 
@@ -61,10 +61,4 @@ def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelF
 
 
 def _earlier(recording: Recording, rows: int) -> Recording:
-    """The recording with commands so many rows earlier; of its last rows nothing is known."""
-    trials = []
-    for trial in recording.trials:
-        command = np.concatenate([trial.command[rows:], np.repeat(trial.command[-1:], rows, axis=0)])
-        valid = trial.valid & (np.arange(len(trial.valid)) < len(trial.valid) - rows)
-        trials.append(replace(trial, command=command, valid=valid))
-    return recording.with_trials(trials)
+    return recording.with_trials([trial.with_earlier_commands(rows) for trial in recording.trials])

@@ -66,7 +66,7 @@ def decide(findings: Findings, questions: Questions | None = None, criteria: Cri
     chosen = next((one for one in plausible if contains(chosen, one) and ask.alike(chosen, one)), chosen)
     whole = _explains(chosen, base, ask, criteria) and not ask.follows_signals(chosen)
     if not whole and chosen.explained(base) < criteria.most and not ask.as_repeats(chosen):
-        return Verdict("unknown_effect", chosen)
+        return Verdict("unknown_effect", closest(plausible))
     rivals = find_rivals(chosen, plausible, ask, criteria)
     if not whole:
         return Verdict("partly_explained", chosen, rivals)
@@ -78,7 +78,16 @@ def _but_for_the_implausible(
 ) -> Verdict:
     """What is left to say where the best explanation stands in for another law: its plausible part, if that is most."""
     part = [one for one in plausible if named(one) < named(chosen) and one.explained(base) > criteria.most]
-    return Verdict("partly_explained", simplest(part, criteria)) if part else Verdict("unknown_effect", chosen)
+    return (
+        Verdict("partly_explained", simplest(part, criteria))
+        if part
+        else Verdict("unknown_effect", closest(plausible or [chosen]))
+    )
+
+
+def closest(found: Sequence[Explanation]) -> Explanation:
+    """The explanation that follows the held-out trials best: where none is claimed, a model is there to predict."""
+    return min(found, key=lambda one: one.judgement.costs.sum())
 
 
 def _explains(chosen: Explanation, base: Explanation, ask: Questions, criteria: Criteria) -> bool:

@@ -8,9 +8,8 @@ from typing import Any
 
 import torch
 
-from tactile_cube.agent.batch import Sizes
 from tactile_cube.agent.interface import Agent
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings

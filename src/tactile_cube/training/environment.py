@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 
-from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.env import OUTCOMES, Conditions
 from tactile_cube.env.rotation import OBJECT

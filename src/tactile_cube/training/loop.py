@@ -67,7 +67,7 @@ class Learner:
         for _ in range(self.settings.barrier_iterations):
             self.iterate()
             after_iteration()
-        self._store(self.assembler.flush())
+        self.replay.extend(self.assembler.flush())
 
     def iterate(self) -> None:
         """Collect a block and, meanwhile, learn from what was there before."""
@@ -77,7 +77,7 @@ class Learner:
             self._learn(self.reward_weights(self.conditions))
         block = self.collection.take()
         _require_finite(block)
-        self._store(self.assembler.add(block))
+        self.replay.extend(self.assembler.add(block))
         self.episodes.add(block)
         self.steps += block.numel()
         self.iteration += 1
@@ -89,10 +89,6 @@ class Learner:
             if frozen is not None:
                 self.agent.load_actor(frozen)
         self.updates += self.settings.updates_per_iteration
-
-    def _store(self, transitions: dict[str, Tensor]) -> None:
-        if transitions:
-            self.replay.extend(transitions)
 
     def _progress(self) -> Progress:
         worlds = self.episodes.worlds

@@ -1,14 +1,18 @@
-"""A ring of transitions in one preallocated matrix: one row a transition, sampled by one gather."""
+"""Experience replay: TorchRL's buffer over rows, one float32 row a transition, which is what a checkpoint appends."""
 
+import logging
 import os
-from collections.abc import Mapping
 from typing import Any
 
 import torch
+from tensordict import NestedKey, TensorDict, TensorDictBase
 from torch import Tensor
+from torchrl.data import LazyTensorStorage, ReplayBuffer
 
-from tactile_cube.agent.batch import Batch, Sizes
+from tactile_cube.agent.networks import Sizes
 from tactile_cube.errors import InputError
+
+logging.getLogger("torchrl").setLevel(logging.WARNING)  # it announces each storage
 
 
 class Replay:
@@ -28,64 +32,67 @@ class Replay:
     """
 
     def __init__(self, capacity: int, sizes: Sizes, reward_terms: int, seed: int):
-        widths = {
+        self.widths: dict[NestedKey, int] = {
             "observation": sizes.observation,
             "privileged": sizes.privileged,
             "action": sizes.action,
-            "reward_terms": reward_terms,
-            "next_observation": sizes.observation,
-            "next_privileged": sizes.privileged,
-            "terminated": 1,
-            "steps": 1,
+            ("next", "reward_terms"): reward_terms,
+            ("next", "observation"): sizes.observation,
+            ("next", "privileged"): sizes.privileged,
+            ("next", "terminated"): 1,
+            "steps_to_next_obs": 1,
             "demonstrated": 1,
         }
-        self.widths = widths
         self.capacity = capacity
-        _require_memory(4 * capacity * sum(widths.values()), capacity)
-        self.rows = torch.zeros(capacity, sum(widths.values()))
-        self.written = 0
+        _require_memory(4 * capacity * sum(self.widths.values()), capacity)
         self.generator = torch.Generator().manual_seed(seed)
+        self.buffer = ReplayBuffer(storage=LazyTensorStorage(capacity), generator=self.generator)
 
     def __len__(self) -> int:
         """Transitions held now."""
-        return min(self.written, self.capacity)
+        return len(self.buffer)
 
-    def extend(self, transitions: Mapping[str, Tensor]) -> None:
-        """Append transitions: tensors (rows, width) under the names of `widths`."""
-        block = torch.cat([transitions[name].float() for name in self.widths], -1)[-self.capacity :]
-        start = self.written % self.capacity
-        first = min(len(block), self.capacity - start)
-        self.rows[start : start + first] = block[:first]
-        self.rows[: len(block) - first] = block[first:]
-        # keeps `written % capacity` the next row to write even after a block larger than the ring
-        self.written += len(block)
+    @property
+    def rows(self) -> Tensor:
+        """The filled part of the ring, (len, width)."""
+        return self.buffer[:] if len(self) else torch.zeros(0, sum(self.widths.values()))
 
-    def sample(self, size: int, weights: Tensor) -> Batch:
-        """Draw `size` transitions with replacement; reward = reward_terms @ weights."""
-        index = torch.randint(len(self), (size,), generator=self.generator)
-        parts = dict(zip(self.widths, torch.split(self.rows[index], list(self.widths.values()), -1), strict=True))
-        reward = (parts.pop("reward_terms") @ weights).unsqueeze(-1)
-        return Batch(reward=reward, **parts)
+    def extend(self, transitions: TensorDictBase) -> None:
+        """Append transitions (rows,) with the keys of `widths`."""
+        if len(transitions):
+            rows = torch.cat([transitions[key].float() for key in self.widths], -1)
+            self.buffer.extend(rows[-self.capacity :])
+
+    def sample(self, size: int, weights: Tensor) -> TensorDict:
+        """Draw `size` transitions with replacement, as TorchRL's losses read them; reward = reward_terms @ weights."""
+        rows = torch.split(self.buffer.sample(size), list(self.widths.values()), -1)
+        parts = dict(zip(self.widths, rows, strict=True))
+        parts["demonstrated"] = parts["demonstrated"].bool()
+        parts["next", "reward"] = (parts.pop(("next", "reward_terms")) @ weights).unsqueeze(-1)
+        # a time limit ends no episode for good: the value of its last state still counts
+        parts["next", "done"] = parts["next", "terminated"] = parts["next", "terminated"].bool()
+        return TensorDict(parts, [size])
 
     def state_dict(self) -> dict[str, Any]:
         """The filled part of the ring, where to write next, and the generator."""
         return {
-            "rows": self.rows[: len(self)],
-            "written": self.written,
+            "rows": self.rows,
+            "written": self.buffer.write_count,
             "capacity": self.capacity,
             "generator": self.generator.get_state(),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Inverse of `state_dict`, for a ring of the same capacity and widths."""
-        rows = state["rows"]
-        if rows.shape[1] != self.rows.shape[1] or len(rows) != min(state["written"], self.capacity):
+        rows, width, written = state["rows"], sum(self.widths.values()), state["written"]
+        if rows.shape[1] != width or len(rows) != min(written, self.capacity):
             raise InputError(
                 f"replay in the checkpoint holds {len(rows)} rows of width {rows.shape[1]}, this run's up to "
-                f"{self.capacity} of width {self.rows.shape[1]}; keep training.replay_size and the observation"
+                f"{self.capacity} of width {width}; keep training.replay_size and the observation"
             )
-        self.rows[: len(rows)] = rows
-        self.written = state["written"]
+        if len(rows):
+            self.buffer.extend(rows)
+        self.buffer.writer.load_state_dict({"_cursor": written % self.capacity, "_write_count": written})
         self.generator.set_state(state["generator"])
 
 

@@ -1,12 +1,15 @@
-"""From a collected block to rows for the replay: executed actions, n-step sums, faulty episodes left out."""
+"""From a collected block to transitions for the replay: executed actions, n-step sums, faulty episodes left out."""
 
 import torch
-from tensordict import TensorDictBase
-from torch import Tensor
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import MultiStep
 
 
 class TransitionAssembler:
     """Turn blocks (worlds, time) into flat transitions, the last n - 1 steps waiting for their future.
+
+    Sums are TorchRL's `MultiStep`. Its sibling for replay buffers, `MultiStepTransform`, would hold back one step more
+    and could not give the waiting ones out before the worlds are reset, the only place where a run can be resumed.
 
     Args:
         n_step: rewards summed before bootstrapping; fewer where an episode or the stream ends first.
@@ -14,62 +17,47 @@ class TransitionAssembler:
     """
 
     def __init__(self, n_step: int, gamma: float):
-        self.n_step = n_step
-        self.gamma = gamma
-        self.pending: dict[str, Tensor] | None = None
+        self.sums = MultiStep(gamma, n_step)
+        self.sums.reward_keys = ("reward_terms",)
+        self.sums.done_keys = ()  # how the last step of a sum ended is how the sum ended
+        self.pending: TensorDictBase | None = None
 
-    def add(self, block: TensorDictBase) -> dict[str, Tensor]:
-        """Transitions that the block completes, tensors (rows, width)."""
+    def add(self, block: TensorDictBase) -> TensorDictBase:
+        """Transitions (rows,) that the block completes."""
         stream = _fields(block)
         if self.pending is not None:
-            stream = {key: torch.cat((self.pending[key], value), 1) for key, value in stream.items()}
-        ready = max(stream["steps"].shape[1] - (self.n_step - 1), 0)
-        self.pending = {key: value[:, ready:] for key, value in stream.items()} if self.n_step > 1 else None
+            stream = torch.cat((self.pending, stream), 1)
+        ready = max(stream.shape[1] - (self.sums.n_steps - 1), 0)
+        self.pending = stream[:, ready:]
         return self._sum(stream, ready)
 
-    def flush(self) -> dict[str, Tensor]:
+    def flush(self) -> TensorDictBase:
         """The waiting steps, bootstrapped from the last state seen; call before the worlds are reset."""
         stream, self.pending = self.pending, None
-        return self._sum(stream, stream["steps"].shape[1]) if stream is not None else {}
+        assert stream is not None, "add a block first"
+        return self._sum(stream, stream.shape[1])
 
-    def _sum(self, stream: dict[str, Tensor], count: int) -> dict[str, Tensor]:
+    def _sum(self, stream: TensorDictBase, count: int) -> TensorDictBase:
         """n-step transitions that start at the first `count` times of the stream."""
-        result = {key: value[:, :count].clone() for key, value in stream.items()}
-        length = stream["steps"].shape[1]
-        going = ~result["done"]
-        for ahead in range(1, self.n_step):
-            reach = min(count, length - ahead)
-            later = {key: value[:, ahead : ahead + reach] for key, value in stream.items()}
-            # a faulty step may hold NaN: stop before it
-            use = going[:, :reach] & ~later["faulty"]
-            result["reward_terms"][:, :reach] += self.gamma**ahead * torch.where(use, later["reward_terms"], 0.0)
-            for key in ("next_observation", "next_privileged", "terminated"):
-                result[key][:, :reach] = torch.where(use, later[key], result[key][:, :reach])
-            result["steps"][:, :reach] += use
-            going[:, :reach] &= use & ~later["done"]
-            going[:, reach:] = False
-        kept = ~result["faulty"].squeeze(-1)
-        return {key: value[kept] for key, value in result.items() if key not in ("done", "faulty")}
+        if not count:
+            return stream[:, :0].flatten()
+        stream, faulty = stream.clone(), stream["next", "faulty"]
+        # a faulty step may hold NaN: sums stop before it
+        stream["next", "done"][:, :-1] |= faulty[:, 1:]
+        stream["next", "reward_terms"].masked_fill_(faulty, 0.0)
+        summed = self.sums(stream)[:, :count][~faulty[:, :count].squeeze(-1)]
+        return summed.set("steps_to_next_obs", summed["steps_to_next_obs"].unsqueeze(-1))
 
 
-def _fields(block: TensorDictBase) -> dict[str, Tensor]:
+def _fields(block: TensorDictBase) -> TensorDict:
     following = block["next"]
-    taken = following.get("action_taken", None)
-    return {
+    never = torch.zeros_like(following["terminated"])
+    keys = ("observation", "privileged", "reward_terms", "terminated", "done", "faulty")
+    current = {
         "observation": block["observation"],
         "privileged": block["privileged"],
-        "action": block["action"] if taken is None else taken,
-        "reward_terms": following["reward_terms"],
-        "next_observation": following["observation"],
-        "next_privileged": following["privileged"],
-        "terminated": following["terminated"].float(),
-        "steps": torch.ones_like(following["terminated"], dtype=torch.float32),
-        "demonstrated": _demonstrated(following),
-        "done": following["done"],
-        "faulty": following["faulty"],
+        # both are missing where no extra exploration is configured
+        "action": following.get("action_taken", block["action"]),
+        "demonstrated": following.get("demonstrated", never),
     }
-
-
-def _demonstrated(following: TensorDictBase) -> Tensor:
-    flag = following.get("demonstrated", None)  # missing where no extra exploration is configured
-    return torch.zeros_like(following["terminated"], dtype=torch.float32) if flag is None else flag.float()
+    return TensorDict({**current, "next": following.select(*keys)}, block.batch_size)

@@ -3,7 +3,6 @@
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
 from tactile_cube.transforms.joint_offset import JointOffset
 from tactile_cube.transforms.make_env import EnvConfig, make_env, rotation_env
-from tactile_cube.transforms.observation_stack import ObservationStack
 from tactile_cube.transforms.privileged_state import PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
@@ -13,7 +12,6 @@ __all__ = [
     "Exploration",
     "FingerExploration",
     "JointOffset",
-    "ObservationStack",
     "PrivilegedState",
     "SensorNoise",
     "StickyAction",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 from torchrl.envs import TransformedEnv
-from torchrl.envs.transforms import Compose, Transform
+from torchrl.envs.transforms import CatFrames, CatTensors, Compose, Transform
 
 from tactile_cube.drivetrain.effects import Effect, parse_effect, resolve
 from tactile_cube.drivetrain.model_file import as_model
@@ -23,7 +23,6 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.health import unresolved
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
 from tactile_cube.transforms.joint_offset import JointOffset
-from tactile_cube.transforms.observation_stack import ObservationStack
 from tactile_cube.transforms.privileged_state import PrivilegedState
 from tactile_cube.transforms.sensor_noise import SensorNoise
 from tactile_cube.transforms.sticky_action import StickyAction
@@ -162,7 +161,9 @@ def transforms(config: EnvConfig, explore: bool, teacher: Teacher | None = None)
     chain: list[Transform] = [
         JointOffset(disturbances.joint_offset, half_range),
         SensorNoise(disturbances.sensor_noise),
-        ObservationStack(config.stack),
+        # the policy sees the two joint signals and nothing else; the first reading of an episode fills the whole stack
+        CatTensors(["joint_position", "control_error"], "observation", sort=False),
+        CatFrames(config.stack, -1, ["observation"]),
         PrivilegedState(hand.joints, config.privileged),
         StickyAction(disturbances.sticky_probability),
     ]

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 import tactile_cube
 from benchmarks.faults.fuzz import strike
 from benchmarks.faults.readers import GAINS, READERS, Reader, state
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model

@@ -6,8 +6,7 @@ import pytest
 
 from benchmarks.paper.ancestry import Ancestor, ancestry_table, in_words, read_ancestry, read_table, total
 from benchmarks.paper.model_card import model_card, read_card
-from tactile_cube.agent.batch import Sizes
-from tactile_cube.agent.networks import Actor
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import SHIPPED

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from benchmarks.speed.products import multiplying, update_products
-from tactile_cube.agent.batch import Sizes
+from tactile_cube.agent.networks import Sizes
 
 
 def test_an_update_of_the_paper_takes_two_point_six_giga_operations() -> None:

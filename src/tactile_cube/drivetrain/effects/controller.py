@@ -45,11 +45,11 @@ class IntegralAction(Effect):
         plain, _ = cls.forms_at(scales)
         return [plain, *({**plain, "limit": share * scales.torque} for share in CLAMPS)]
 
-    state_size = 4  # first-call flag, integral, last command and last reading
+    state_size = 4  # 0 to begin in balance, 2 as it is, else 1; integral, last command and last reading
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]; the command counts as held over a step, the reading as linear."""
+        """Return the motor torque [N m]; the error counts as linear over a step."""
         if p[0] <= 0.0:
             return x[TORQUE, j]
         reading = x[MOTOR_POSITION, j] + x[DEFLECTION, j]
@@ -57,9 +57,11 @@ class IntegralAction(Effect):
             s[0] = 1.0
             braked = x[DAMPING, j] * x[VELOCITY, j]
             rubbed = x[FRICTION, j] * braked / (abs(braked) + x[FRICTION, j]) if x[FRICTION, j] > 0.0 else 0.0
-            s[1] = x[LOAD, j] + rubbed - x[TORQUE, j]
+            s[1] += x[LOAD, j] + rubbed - x[TORQUE, j]
+        elif s[0] == 2.0:
+            s[0] = 1.0
         else:
-            s[1] += p[0] * dt * (s[2] - 0.5 * (s[3] + reading))
+            s[1] += 0.5 * p[0] * dt * (s[2] + x[COMMAND, j] - s[3] - reading)
         if p[1] > 0.0:
             s[1] = min(max(s[1], -p[1]), p[1])
         s[2], s[3] = x[COMMAND, j], reading

@@ -370,7 +370,8 @@ class Backlash(Effect):
         half, softness = 0.5 * p[..., 2], np.where(p[..., 3] > 0.0, p[..., 3], 1.0)
         edge = np.where(p[..., 4] > 0.0, 0.0, 0.5 * p[..., 1])
         first = np.clip(lead, -edge, edge)
-        torque = torque_behind_play(gain * (lead - first), gain * half, softness)
+        with np.errstate(invalid="ignore"):  # of a simulation that ran away
+            torque = torque_behind_play(gain * (lead - first), gain * half, softness)
         return np.asarray(first + smooth_lead(torque, p[..., 2], softness))
 
     @staticmethod

@@ -57,7 +57,9 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)
-    inverse = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)))
+    sizes, directions = np.linalg.eigh(fitted.information + np.diag(precision(fitted.unknowns)))
+    sure = np.maximum(sizes, np.finfo(float).eps * sizes.max())  # what the data say nothing of may round to below zero
+    inverse = (directions / sure) @ directions.T
     segments, unknowns = scores.shape
     correction = segments / max(segments - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ Array = NDArray[np.float64]
 START_POSITION = 1e-3  # [rad] of a finger, as all sizes here: how well a segment's start is known beforehand
 START_SPEED_PER_ACCELERATION = 0.01  # [s]
 RUN_AWAY = 1.0  # [rad] as far off as this counts a simulation that ran away
+WOUND, REWOUND = 0.1, 2  # [N m] what an integral may hold beyond balance; Gauss-Newton steps that find it
 STEP = 0.2  # finite differences, in units of an unknown's scale
 
 
@@ -41,6 +43,32 @@ class Problem:
     def linearise_starts(self, model: Model) -> None:
         """Take the initial states of trials and the sensitivity to segment starts from this model from now on."""
         self.windows = with_initial_states(self.shooting, model, self.windows)
+        self._linearise_segments(model)
+        for _ in range(REWOUND if (joints := self.shooting.integrating(model)) else 0):
+            wound = self.windows.wound.copy()
+            wound[:, joints] += self._more_wound(model, joints)
+            self.windows = replace(self.windows, wound=wound)
+
+    def _more_wound(self, model: Model, joints: list[int]) -> Array:
+        """By how much more (S, joints) integrals are wound up as each trial begins, which no log shows [N m]."""
+        prior = WOUND * self.shooting.per_joint("N m")[joints]
+        moved = [
+            self.windows.wound + prior[k] * STEP * np.eye(self.windows.wound.shape[1])[j] for k, j in enumerate(joints)
+        ]
+        begun = [self.windows, *(replace(self.windows, wound=one) for one in moved)]
+        base, *others = (self.windows.by_segment(p[0]) for p in self.shooting.simulate([model] * len(begun), begun))
+        left = self.free(self.residual(base))
+        columns = np.stack([self.limited(other - base) / STEP * self.weight for other in others], axis=-1)
+        freed = self.free(columns)
+        more = np.zeros((len(self.windows), len(joints)))
+        for trial in np.unique(self.windows.trial):
+            own = self.segment_trial == trial
+            part = columns[own].reshape(-1, len(joints))
+            gram = part.T @ freed[own].reshape(part.shape) + np.eye(len(joints))
+            more[self.windows.trial == trial] = prior * np.linalg.solve(gram, part.T @ left[own].ravel())
+        return more
+
+    def _linearise_segments(self, model: Model) -> None:
         raw = self.shooting.start_sensitivity(model, self.windows)
         columns = np.stack([self.windows.by_segment(column) for column in raw], axis=-1)
         acceleration = np.abs(self.windows.acceleration).reshape(len(self.weight), -1)
@@ -56,6 +84,7 @@ class Problem:
         """How many numbers (G,) of each segment's start were chosen by the segment itself: see `initial_states`."""
         first = np.zeros((len(self.windows), self.windows.segments), dtype=np.int64)
         first[self.windows.time == 0.0, 0] = 2 * np.count_nonzero(self.shooting.gaps(model))
+        first[np.unique(self.windows.trial, return_index=True)[1], 0] += len(self.shooting.integrating(model))
         return np.asarray(first.ravel())
 
     def free(self, x: Array) -> Array:

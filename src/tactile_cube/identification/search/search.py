@@ -194,15 +194,19 @@ class Search(Division):
     def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
         frozen = self.frozen(parent.fit)
-        wanted = self.new([*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)])
-        self.last_scores = screen(self.problem, frozen, wanted)
+        self.last_scores = self.screened(frozen)
         chosen = with_groups(self.last_scores, least_gain(parent, base, self.criteria) * frozen.cost)[:REFITTED]
-        self.say(f"screened {len(wanted)} candidates, refitting {len(chosen)}")
+        self.say(f"screened {len(self.last_scores)} candidates, refitting {len(chosen)}")
         raced = of_each(self.race(frozen, self.brief(frozen, chosen)), FINALISTS)
         raced = [*(self.restarted(frozen, *pair) for pair in raced[:RESTARTED]), *raced[RESTARTED:]]
         special = [one for pair in raced for one in self.special(frozen, *pair)]
         judged = (*raced, *special)
         return [self.finish(parent, candidate, fitted, len(judged)) for candidate, fitted in judged]
+
+    def screened(self, frozen: Fit, joint: str | None = None) -> list[Score]:
+        """A first look at every candidate, or at those of one joint, beside a fit, best first."""
+        wanted = self.new([*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)])
+        return screen(self.problem, frozen, [one for one in wanted if joint is None or one.joints == (joint,)])
 
     def new(self, wanted: Sequence[Candidate]) -> list[Candidate]:
         """Without effects that the model to begin with has at that joint already."""

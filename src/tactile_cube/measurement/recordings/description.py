@@ -14,6 +14,8 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Mass = Annotated[Positive, Field(le=limits.MASS)]
 Rate = Annotated[Positive, Field(le=limits.RATE)]
+MOST_LATE = 64
+"""Rows by which commands may be logged late."""
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 PerJoint = float | list[float] | dict[str, float]
 
@@ -58,9 +60,11 @@ class Sensors(Strict):
     Attributes:
         read: a row shows position and torque at the end of the control period in which its command acted (`after`), or
             at its beginning, before the command was sent (`before`).
+        commands_late: rows by which commands were logged after they acted, as `diagnose` finds them.
     """
 
     read: Literal["after", "before"] = "after"
+    commands_late: Annotated[int, Field(ge=0, le=MOST_LATE)] = 0
     position_resolution: NotNegative = 0.0
     position_noise: NotNegative = 0.0
     torque_resolution: NotNegative = 0.0

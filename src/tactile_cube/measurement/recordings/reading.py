@@ -80,6 +80,7 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
         path = below(folder, entry.file, f"{folder / DESCRIPTION}: key 'trials.{index}.file'")
         trial = _trial(path, left, entry, description, rig, f"trials.{index}.controller")
         left -= trial.time.size + 3 * trial.position.size
+        trial = trial.with_earlier_commands(description.sensors.commands_late)
         trials += without_excluded(trial, entry.exclude, f"{folder / DESCRIPTION}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
     if not trials:

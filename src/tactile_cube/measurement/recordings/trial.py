@@ -1,6 +1,7 @@
 """One trial on a uniform time grid: what was commanded and what was measured."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,3 +115,9 @@ class Trial:
         lever = np.arange(-half, half + 1) / self.step / np.sum(np.arange(-half, half + 1) ** 2)
         padded = np.pad(self.position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
         return np.stack([np.convolve(column, lever[::-1], mode="valid") for column in padded.T], axis=1)
+
+    def with_earlier_commands(self, rows: int) -> Self:
+        """The trial with its commands so many rows earlier; of its last rows nothing is known then."""
+        command = np.concatenate([self.command[rows:], np.repeat(self.command[-1:], rows, axis=0)])[: len(self.valid)]
+        known = np.arange(len(self.valid)) < len(self.valid) - rows
+        return replace(self, command=command, valid=self.valid & known)

@@ -20,6 +20,7 @@ from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSI
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.replay.integrals import integrating_joints, wind_up
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
@@ -147,6 +148,10 @@ class Simulator:
         """Width of the gap in each joint's transmission (n,) [rad]."""
         return gaps(self.plant, self.memory(model))
 
+    def integrating(self, model: Model) -> list[int]:
+        """Joints whose controller integrates its error."""
+        return integrating_joints(model, self.plant.joint_names)
+
     def memory(self, model: Model) -> Array:
         """Memory (size,) of the plant with a model's constants and effects."""
         known = model.constants
@@ -262,6 +267,7 @@ class Simulator:
             if force is not None:
                 resting = np.average(windows.measured[k], axis=0, weights=windows.weight[k, :, 0])
                 self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
+        wind_up(self.plant, model, windows, memory)
         return memory
 
     def _jump_ratios(self, memory: Array, windows: Windows) -> tuple[Array, Array]:

@@ -40,6 +40,8 @@ ROWS = (
     "time",
     "clamped",
     "initial_state",
+    "trial_start",
+    "wound",
 )
 """Arrays with one row a window."""
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
@@ -70,6 +72,9 @@ class Windows:
         clamped: (S,) the links were held still.
         initial_state: (S, 2 n) how far links stand from where their sensors put them as the window begins [rad], and
             how much faster they are [rad/s]; see `initial_states`.
+        trial_start: (S, 3, n) position, command [rad] and speed [rad/s] of the trial's first step.
+        wound: (S, n) what the integral of a controller holds beyond balance as the trial begins [N m].
+        errors: of each window, (rows before it, n) errors of the trial's position times the sampling step [rad s].
         forces: known forces on a link, or None.
         history: H.
         segment: rows of a segment.
@@ -90,6 +95,9 @@ class Windows:
     time: Array
     clamped: NDArray[np.bool_]
     initial_state: Array
+    trial_start: Array
+    wound: Array
+    errors: tuple[Array, ...]
     forces: tuple[KnownForce | None, ...]
     history: int
     segment: int
@@ -107,8 +115,9 @@ class Windows:
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
         """Some of the windows."""
         picked = {key: getattr(self, key)[chosen] for key in ROWS}
-        forces = tuple(self.forces[int(k)] for k in np.arange(len(self))[chosen])
-        return replace(self, **picked, forces=forces)
+        places = [int(k) for k in np.arange(len(self))[chosen]]
+        forces, errors = tuple(self.forces[k] for k in places), tuple(self.errors[k] for k in places)
+        return replace(self, **picked, forces=forces, errors=errors)
 
     def first_segments(self) -> Windows:
         """The first segment of each window alone."""
@@ -178,10 +187,11 @@ def whole_trials(recording: Recording, trials: Sequence[Trial], substeps: int, t
 
 def _stacked(pieces: Sequence[Mapping[str, object]], history: int, segment: int, substeps: int) -> Windows:
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
-    forces = tuple(piece["force"] for piece in pieces)
+    forces, errors = (tuple(piece[key] for piece in pieces) for key in ("force", "errors"))
     return Windows(
         **columns,
         forces=forces,  # type: ignore[arg-type]
+        errors=errors,  # type: ignore[arg-type]
         history=history,
         segment=segment,
         substeps=substeps,
@@ -202,7 +212,8 @@ def _pieces(
     substeps: int,
 ) -> Iterator[dict[str, object]]:
     fine, jump = _as_simulated(recording, trial, substeps)
-    command, _ = _around(_as_positions(recording, trial), recording.read)
+    command, after = _around(_as_positions(recording, trial), recording.read)
+    errors = trial.step * (after[:-1] - 0.5 * (trial.position[:-1] + trial.position[1:]))
     drive = _drive(recording, trial)
     half = _half_width(trial.step, noise, speed_known, time)
     kinks = np.flatnonzero(asks_for_much(jump, drive.kp, drive.limit).any(axis=1))
@@ -216,6 +227,8 @@ def _pieces(
         if first > 0 and np.count_nonzero(present) < FEWEST:
             continue
         position, speed, acceleration, spread = _states(trial, command, jump, drive, kinks, starts, half)
+        if first == 0:
+            trial_start = np.stack([position[0], fine[0, 0], speed[0]])
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
             "measured": trial.position[usable],
@@ -231,6 +244,9 @@ def _pieces(
             "time": first * trial.step,
             "clamped": trial.clamped,
             "initial_state": np.zeros(2 * position.shape[1]),
+            "trial_start": trial_start,
+            "wound": np.zeros(position.shape[1]),
+            "errors": errors[:first],
             "force": trial.force,
         }
 

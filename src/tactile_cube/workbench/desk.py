@@ -1,0 +1,258 @@
+"""What all windows of a workbench share: the state, the logs that wait to be imported, and what is running."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from glob import glob
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from tactile_cube.drivetrain.model_file import read_model
+from tactile_cube.errors import InputError
+from tactile_cube.identification.next_experiment import Experiment
+from tactile_cube.identification.search.residual_shape import Missing
+from tactile_cube.identification.search.screening import Score
+from tactile_cube.measurement.recordings.reading import DESCRIPTION
+from tactile_cube.workbench.background import Diagnosing, Found
+from tactile_cube.workbench.importing import RIGS, Preview, import_logs, kept, preview
+from tactile_cube.workbench.state import Workbench
+
+PROGRESS = 12  # lines of a diagnosis that are kept
+
+
+class Desk:
+    """One state and one worker for all windows.
+
+    Attributes:
+        bench: the state; None until a recording is loaded.
+        version: grows with every change of the model or the recording.
+        busy: what is being done, in words.
+        problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
+        logs: files that wait to be imported; `urdf`: of their rig; `preview`: what is in the first.
+        scores: a first look at the candidates, joint -> best first, of this version.
+        signature: the torque that the candidate looked at would supply.
+        progress: of the diagnosis that runs or ran last; `found`: its answer.
+        experiment: proposed; `commands`: its file as text.
+    """
+
+    def __init__(self, folder: Path, own_effects: Sequence[str] = (), seed: int = 0, model: str | None = None) -> None:
+        self.folder, self.own_effects, self.seed, self.model = folder, tuple(own_effects), seed, model
+        self.bench: Workbench | None = None
+        self.version = 0
+        self.busy = self.problem = self.commands = ""
+        self.notes: list[str] = []
+        self.logs: list[Path] = []
+        self.urdf: Path | None = None
+        self.preview: Preview | None = None
+        self.diagnosing: Diagnosing | None = None
+        self.listeners: list[Callable[[], None]] = []
+        self._worker = ThreadPoolExecutor(1)
+        self._forget()
+
+    def _forget(self) -> None:
+        self.scores: dict[str, list[Score]] = {}
+        self.signature: Missing | None = None
+        self.signature_of: str = ""
+        self.progress: list[str] = []
+        self.found: Found | None = None
+        self.experiment: Experiment | None = None
+
+    def changed(self) -> None:
+        """Tell every window."""
+        for listener in list(self.listeners):
+            listener()
+
+    def say(self, words: str) -> None:
+        """Show what is being done."""
+        self.busy = words
+        self.changed()
+
+    def do(self, words: str, work: Callable[[], None]) -> None:
+        """Work while the windows stay usable, one thing after another; what goes wrong is shown."""
+
+        def run() -> None:
+            self.problem = ""
+            self.say(words)
+            try:
+                work()
+            except InputError as error:
+                self.problem = str(error).replace(f"{self.folder}/", "")
+            except Exception as error:
+                traceback.print_exc(file=sys.stderr)
+                self.problem = f"{type(error).__name__}: {error}; that is a defect of the workbench, see the terminal"
+            self.say("")
+
+        self._worker.submit(run)
+
+    def change(self, words: str, work: Callable[[Workbench], object]) -> None:
+        """Change the model; afterwards everything that was seen beside the old one is forgotten."""
+
+        def run() -> None:
+            if self.bench is not None:
+                work(self.bench)
+                self._renewed(self.bench)
+
+        self.do(words, run)
+
+    def _renewed(self, bench: Workbench) -> None:
+        found, progress = self.found, self.progress
+        self._forget()
+        self.notes = []
+        if bench is self.bench:
+            self.found, self.progress = found, progress
+        self.bench, self.version = bench, self.version + 1
+
+    def open(self, text: str) -> None:
+        """Take what somebody named: a recording's folder, a model.yaml, logs (a pattern too) or a URDF."""
+
+        def run() -> None:
+            path = Path(text.strip()).expanduser()
+            if (path / DESCRIPTION).is_file():
+                self._load(path)
+            elif path.name.endswith((".yaml", ".yml")):
+                read_model(path)
+                self.model = str(path)
+                if self.bench is not None:
+                    self._load(self.bench.opened.folder)
+            else:
+                files = [Path(name) for name in sorted(glob(str(path)))]
+                if not files:
+                    raise InputError(f"{path}: no recording's folder (with {DESCRIPTION}) and no file")
+                self._wait_for_import(files)
+
+        self.do(f"opening {text}", run)
+
+    def take(self, names: Sequence[str], contents: Sequence[bytes]) -> None:
+        """Take files that were dropped onto the page."""
+        place = self.folder / "dropped"
+
+        def run() -> None:
+            self._wait_for_import([kept(place, *one) for one in zip(names, contents, strict=True)])
+
+        self.do(f"reading {', '.join(names)}", run)
+
+    def _wait_for_import(self, files: Sequence[Path]) -> None:
+        rigs = [file for file in files if file.suffix.lower() in RIGS]
+        self.urdf = rigs[-1] if rigs else self.urdf
+        self.logs = [file for file in files if file not in rigs] or self.logs
+        self.preview = preview(self.logs[0], self.urdf) if self.logs and self.urdf else None
+
+    def import_waiting(
+        self, controller: dict[str, str], nominal: dict[str, str], columns: dict[str, Any], settings: dict[str, str]
+    ) -> None:
+        """Import the logs that wait and load what they make; they wait on where something is wrong.
+
+        Args:
+            controller: as typed: kp, kd, torque_limit, mode.
+            nominal: as typed: stiffness, static_friction, reflected_inertia, as far as known.
+            columns: as `source.columns`.
+            settings: others of `record source=csv`, as typed.
+        """
+        logs, urdf = self.logs, self.urdf
+
+        def run() -> None:
+            given = {key: text if key == "mode" else _number(key, text) for key, text in controller.items()}
+            believed = {key: _number(key, text) for key, text in nominal.items()}
+            more = {key: _number(key, text) if key == "length" else text for key, text in settings.items()}
+            if not logs or urdf is None:
+                raise InputError("drop a log and the URDF of its rig first")
+            out = self.folder / f"recording_{self.version}_{len(list(self.folder.glob('recording_*')))}"
+            recording, understood = import_logs(out, logs, urdf, given, nominal=believed, columns=columns, **more)
+            self._load(recording.folder)
+            self.notes = [*understood, *self.notes]
+
+        self.do("importing", run)
+
+    def _load(self, folder: Path) -> None:
+        self.stop()
+        bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
+        self._renewed(bench)
+        self.notes = [f"warning: {line}" for line in bench.opened.warnings]
+        self.logs, self.preview = [], None
+
+    def look(self, joint: str) -> None:
+        """Take a first look at the candidates of a joint, unless it was taken."""
+
+        def run() -> None:
+            if self.bench is not None and joint not in self.scores:
+                self.scores[joint] = self.bench.candidates(joint)
+
+        self.do(f"a first look at what may be missing at {joint}", run)
+
+    def draw(self, score: Score, label: str, joint: str) -> None:
+        """Find the torque that a candidate would supply."""
+        bench, version = self.bench, self.version
+
+        def run() -> None:
+            if bench is not None and version == self.version:
+                self.signature, self.signature_of = bench.signature(score, joint), label
+
+        self.do(f"what {label} would supply", run)
+
+    def diagnose(self) -> None:
+        """Start a diagnosis beside the model in force."""
+
+        def run() -> None:
+            if self.bench is None or self.diagnosing is not None:
+                return
+            self.found, self.progress = None, ["starting"]
+            folder = self.folder / f"diagnosis_{self.version}_{len(list(self.folder.glob('diagnosis_*')))}"
+            folder.mkdir(parents=True)
+            self.diagnosing = self.bench.diagnose(folder)
+            Thread(target=self._watch, args=(self.diagnosing,), daemon=True).start()
+
+        self.do("starting a diagnosis", run)
+
+    def _watch(self, running: Diagnosing) -> None:
+        end = "stopped"
+        try:
+            for line in running.lines():
+                self.progress = [*self.progress[1 - PROGRESS :], line]
+                self.changed()
+            end = "stopped" if running.found is None else "done"
+        except InputError as error:
+            end = str(error)
+        self.progress = [*self.progress[1 - PROGRESS :], end]
+        self.found, self.diagnosing = running.found, None
+        self.changed()
+
+    def stop(self) -> None:
+        """Stop the diagnosis that runs."""
+        if self.diagnosing is not None:
+            self.diagnosing.stop()
+
+    def propose(self) -> None:
+        """Find the commands that would show whether the last effect is there."""
+
+        def run() -> None:
+            if self.bench is not None:
+                self.experiment = self.bench.propose()
+                self.folder.mkdir(parents=True, exist_ok=True)
+                self.commands = self.experiment.write(self.folder).read_text(encoding="utf-8")
+
+        self.do("looking for commands that decide, within the limits", run)
+
+    def save(self, folder: str) -> None:
+        """Write model.yaml and report.html."""
+
+        def run() -> None:
+            if self.bench is not None:
+                self.bench.save(folder)
+                model = Path(folder) / "model.yaml"
+                self.notes = [
+                    f"saved {model} and report.html",
+                    f"train in it: python -m tactile_cube.train +experiment=adapt model={model}",
+                ]
+
+        self.do("saving", run)
+
+
+def _number(key: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{key}: '{text}' is no number") from None

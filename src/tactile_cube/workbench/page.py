@@ -1,0 +1,509 @@
+"""One window of a workbench: it shows the desk and hands on what is clicked, and computes nothing."""
+
+from __future__ import annotations
+
+import base64
+import functools
+from collections.abc import Callable, Iterable
+from html import escape
+from typing import Any
+
+from bokeh.document import Document
+from bokeh.models import (
+    Button,
+    Column,
+    CustomJS,
+    Div,
+    FileInput,
+    LayoutDOM,
+    PrintfTickFormatter,
+    RadioGroup,
+    Row,
+    Select,
+    Slider,
+    TextInput,
+)
+from tornado.ioloop import IOLoop
+
+from tactile_cube.measurement.comparing.error import FailingInterval
+from tactile_cube.measurement.replay.model import effect_path
+from tactile_cube.measurement.sources.units import ANGLE_UNITS, TIME_UNITS, TORQUE_UNITS
+from tactile_cube.measurement.units import milli
+from tactile_cube.visualization.charts import FLOOR, SIMULATED
+from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, signals
+from tactile_cube.workbench.desk import Desk
+from tactile_cube.workbench.importing import RIGS, TABLES
+from tactile_cube.workbench.state import Stage, Value, Workbench
+
+RANKED = 8
+SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
+GAINS = {"kp": "K_P [N m/rad]", "kd": "K_D [N m s/rad]", "torque_limit": "torque limit [N m]"}
+NOMINAL = {
+    "stiffness": "stiffness, if known",
+    "static_friction": "friction [N m]",
+    "reflected_inertia": "rotor inertia [kg m^2]",
+}
+AUTO, NONE = "by name and values", "-"
+SAVE_CSV = """
+const link = document.createElement("a");
+link.href = URL.createObjectURL(new Blob([text.text], {type: "text/csv"}));
+link.download = "next_experiment.csv";
+link.click();
+"""
+WRAP = {"flex-wrap": "wrap"}
+LINE = {"border-top": "1px solid #d0d7de"}
+YELLOW, RED = "background:#fff4ce;padding:4px 8px", "background:#ffe3dc;padding:4px 8px;border-left:5px solid #d55e00"
+
+
+def _row(*parts: LayoutDOM, **more: Any) -> Row:
+    return Row(*parts, sizing_mode="stretch_width", styles=WRAP, **more)
+
+
+def _text(**more: Any) -> Div:
+    return Div(sizing_mode="stretch_width", disable_math=True, **more)
+
+
+def _list(lines: Iterable[str], style: str = "") -> str:
+    return "".join(f'<div style="{style}">{escape(line)}</div>' for line in lines)
+
+
+def _choose(select: Select, options: list[Any], keep: str = "") -> None:
+    """Give a select other options; it keeps its value where that is still one of them."""
+    values = [one if isinstance(one, str) else one[0] for one in options]
+    wanted = keep or select.value
+    if select.options != options:
+        select.options = options
+    select.value = wanted if wanted in values else (values[0] if values else "")
+
+
+class Page:
+    """The widgets of one window."""
+
+    def __init__(self, document: Document, desk: Desk) -> None:
+        self.document, self.desk = document, desk
+        self.version = -1
+        self.showing = False  # while the desk's state is put into widgets, their callbacks are ours
+        self.time, self.missing, self.experiment = TimeChart(), MissingChart(), ExperimentChart()
+        for name, part in (
+            ("open", self._open_part()),
+            ("status", self._status_part()),
+            ("importing", self._import_part()),
+        ):
+            part.name = name
+            document.add_root(part)
+        self.parts = [self._section(*one) for one in self._sections()]
+        for part in self.parts:
+            document.add_root(part)
+        self._pending, self._loop, listener = False, IOLoop.current(), self._soon
+        desk.listeners.append(listener)
+        document.on_session_destroyed(lambda context: desk.listeners.remove(listener))
+        self.refresh()
+
+    # What stands where
+
+    def _sections(self) -> list[tuple[str, str, LayoutDOM]]:
+        return [
+            ("compare", "Compare", self._compare_part()),
+            ("missing", "Missing torque", self._missing_part()),
+            ("stages", "Error by stage", self._stages_part()),
+            ("candidates", "What may be missing", self._candidates_part()),
+            ("diagnosis", "Diagnosis", self._diagnosis_part()),
+            ("values", "Numbers of the model", self._values_part()),
+            ("next", "Next experiment", self._next_part()),
+            ("save", "Save", self._save_part()),
+        ]
+
+    def _section(self, name: str, title: str, part: LayoutDOM) -> LayoutDOM:
+        head = _text(text=f'<h2 style="font-size:16px;margin:8px 0 0">{title}</h2>', styles=LINE)
+        return Column(head, part, name=name, sizing_mode="stretch_width", visible=False)
+
+    def _open_part(self) -> LayoutDOM:
+        self.path = TextInput(title="Folder of a recording, logs (*.csv), URDF or model.yaml", width=460)
+        files = FileInput(accept=",".join((*TABLES, *RIGS)), multiple=True, title="or drop files anywhere")
+        # names come after contents
+        take = functools.partial(self._take, files)
+        files.on_change("value", lambda attr, old, new: self.document.add_next_tick_callback(take))
+        return _row(self.path, self._button("Open", lambda: self.desk.open(self.path.value)), files)
+
+    def _status_part(self) -> LayoutDOM:
+        self.status = _text(text="")
+        return self.status
+
+    def _import_part(self) -> LayoutDOM:
+        self.waiting, self.columns, self.table = _text(), Column(), _text()
+        self.gains = {name: TextInput(title=title, width=150) for name, title in GAINS.items()}
+        self.nominal = {name: TextInput(title=title, width=150) for name, title in NOMINAL.items()}
+        self.mode = Select(title="commands are", options=["position", "torque"], value="position", width=110)
+        self.length = TextInput(title="cut into trials of [s]", width=150)
+        self.units = {
+            f"{name}_unit": Select(title=f"{name} in", options=[AUTO, *units], value=AUTO, width=150)
+            for name, units in (("time", TIME_UNITS), ("angle", ANGLE_UNITS), ("torque", TORQUE_UNITS))
+        }
+        words = (*self.gains.values(), self.mode, *self.nominal.values(), self.length, *self.units.values())
+        button = _row(self._button("Import", self._import, "primary"))
+        self.importing = Column(
+            self.waiting, self.table, self.columns, _row(*words), button, visible=False, sizing_mode="stretch_width"
+        )
+        return self.importing
+
+    def _compare_part(self) -> LayoutDOM:
+        self.trial = Select(title="trial", width=190)
+        self.joint = Select(title="joint", width=90)
+        self.other = Select(title="beside", options=[NONE], value=NONE, width=190)
+        self.where = Select(title="where it fails", options=[NONE], value=NONE, width=190)
+        for select in (self.trial, self.joint, self.other):
+            select.on_change("value", lambda attr, old, new: self._again())
+        self.where.on_change("value", lambda attr, old, new: self._zoom())
+        self.sentences = _text()
+        chart = Column(self.time.angle, self.time.error, sizing_mode="stretch_width")
+        return Column(
+            _row(self.trial, self.joint, self.other, self.where), chart, self.sentences, sizing_mode="stretch_width"
+        )
+
+    def _missing_part(self) -> LayoutDOM:
+        self.signal = Select(title="over", width=300)
+        self.signal.on_change("value", lambda attr, old, new: self._again())
+        return Column(self.signal, self.missing.figure, sizing_mode="stretch_width")
+
+    def _stages_part(self) -> LayoutDOM:
+        self.stairs = _text()
+        undo = self._button("Undo", lambda: self.desk.change("undo", lambda bench: bench.undo()))
+        return Column(self.stairs, _row(undo), sizing_mode="stretch_width")
+
+    def _candidates_part(self) -> LayoutDOM:
+        self.ranked = RadioGroup(labels=[], sizing_mode="stretch_width")
+        self.ranked.on_change("active", lambda attr, old, new: self._look_closer())
+        self.another = Select(title="another effect", width=260)
+        self.another.on_change("value", lambda attr, old, new: self._another())
+        self.unseen = _text()
+        add = self._button("Add and refit", self._add, "primary")
+        return Column(self.ranked, _row(self.another, add), self.unseen, sizing_mode="stretch_width")
+
+    def _diagnosis_part(self) -> LayoutDOM:
+        self.start = self._button("Diagnose", self._start_or_stop)
+        self.accept = self._button("Add what it found", self._accept, "primary")
+        self.progress = _text()
+        return Column(_row(self.start, self.accept), self.progress, sizing_mode="stretch_width")
+
+    def _values_part(self) -> LayoutDOM:
+        self.sliders = Column(sizing_mode="stretch_width")
+        self.present = Select(title="effects of the model", width=260)
+        self.remove = self._button("Remove and refit", self._remove)
+        return Column(self.sliders, _row(self.present, self.remove), sizing_mode="stretch_width")
+
+    def _next_part(self) -> LayoutDOM:
+        self.csv, self.proposal = Div(visible=False), _text()
+        self.download = Button(label="Download CSV", width=140)
+        self.download.js_on_event("button_click", CustomJS(args={"text": self.csv}, code=SAVE_CSV))
+        self.experiment.figure.visible = False
+        buttons = _row(self._button("Propose", self.desk.propose), self.download, self.csv)
+        return Column(buttons, self.proposal, self.experiment.figure, sizing_mode="stretch_width")
+
+    def _save_part(self) -> LayoutDOM:
+        self.folder = TextInput(title="folder", value=str(self.desk.folder / "model"), width=300)
+        return _row(self.folder, self._button("Save", lambda: self.desk.save(self.folder.value)))
+
+    def _button(self, label: str, work: Callable[[], object], kind: str = "default") -> Button:
+        button = Button(label=label, button_type=kind, width=150, align="end")
+        button.on_click(lambda: work())
+        return button
+
+    # What is clicked
+
+    def _take(self, files: FileInput) -> None:
+        names, values = files.filename, files.value
+        if names and values:
+            self.desk.take(list(names), [base64.b64decode(value) for value in values])
+
+    def _import(self) -> None:
+        units = {name: select.value for name, select in self.units.items() if select.value != AUTO}
+        length = {"length": self.length.value} if self.length.value.strip() else {}
+        columns: dict[str, Any] = {}
+        for row in self.columns.children:
+            entry = {select.title: select.value for select in row.children[1:] if select.value != NONE}
+            if row.name == "time":
+                columns |= entry
+            elif entry:
+                columns[row.name] = entry
+        gains, nominal = (
+            {name: text.value.strip() for name, text in texts.items() if text.value.strip()}
+            for texts in (self.gains, self.nominal)
+        )
+        self.desk.import_waiting(gains | {"mode": self.mode.value}, nominal, columns, units | length)
+
+    def _again(self) -> None:
+        if not self.showing:
+            self._show_curves()
+
+    def _zoom(self) -> None:
+        if not self.showing and self.where.value != NONE:
+            _, start, end = self.where.value.split("|")
+            self.time.zoom(float(start), float(end))
+
+    def _scored(self) -> list[Any]:
+        return self.desk.scores.get(self.joint.value, [])[:RANKED]
+
+    def _look_closer(self) -> None:
+        if self.showing or self.ranked.active is None:
+            return
+        score = self._scored()[self.ranked.active]
+        self.another.value = NONE
+        self.desk.draw(score, f"{self.names[self.ranked.active]}@{self.joint.value}", self.joint.value)
+
+    def _another(self) -> None:
+        if not self.showing and self.another.value != NONE:
+            self.ranked.active = None
+
+    def _add(self) -> None:
+        name = self.another.value
+        if self.ranked.active is not None:
+            name = self.names[self.ranked.active]
+        if name not in (NONE, ""):
+            label = f"{name}@{self.joint.value}"
+            self.desk.change(f"adding {label}", lambda bench: bench.add(label))
+
+    def _remove(self) -> None:
+        label = self.present.value
+        self.desk.change(f"removing {label}", lambda bench: bench.remove(label))
+
+    def _start_or_stop(self) -> None:
+        (self.desk.diagnose if self.desk.diagnosing is None else self.desk.stop)()
+
+    def _accept(self) -> None:
+        found = self.desk.found
+        if found is not None and found.effects:
+            self.desk.change("adding what was found", lambda bench: bench.add(*found.effects))
+
+    def _move(self, one: Value, value: float) -> None:
+        bench = self.desk.bench
+        if bench is not None:
+            self.time.move(bench.simulate(self.trial.value, one.unknown.put(bench.stage.model, value)).position)
+
+    def _set(self, one: Value, value: float) -> None:
+        if value != one.value:
+            self.desk.change(f"setting {one.key}", lambda bench: bench.set_parameter(one.key, value))
+
+    # What is shown
+
+    def _soon(self) -> None:
+        """Show the desk as it will be when the window's turn comes; called from any thread."""
+        if not self._pending:
+            self._pending = True
+            self._loop.add_callback(self._next)
+
+    def _next(self) -> None:
+        if self._soon in self.desk.listeners:  # else the window was closed in the meantime
+            self.document.add_next_tick_callback(self.refresh)
+
+    def refresh(self) -> None:
+        """Show the desk."""
+        self._pending = False
+        self.showing = True
+        try:
+            self._show()
+        finally:
+            self.showing = False
+
+    def _show(self) -> None:
+        desk, bench = self.desk, self.desk.bench
+        self._show_status()
+        self._show_import()
+        self.start.label = "Diagnose" if desk.diagnosing is None else "Stop"
+        known = bench.effects if bench else []
+        self.accept.disabled = not (desk.found and set(desk.found.effects) - set(known))
+        answer = f'<pre style="white-space:pre-wrap">{escape(desk.found.text)}</pre>' if desk.found else ""
+        self.progress.text = answer or _list(desk.progress)
+        if bench is None:
+            return
+        for part in self.parts:
+            part.visible = True
+        renewed = self.version != desk.version
+        if renewed:
+            self.version = desk.version
+            self._show_model(bench)
+        self._show_candidates(bench)
+        self._show_experiment(bench)
+        self._show_curves(only_missing=not renewed)
+
+    def _show_status(self) -> None:
+        desk = self.desk
+        busy = f'<div style="color:{SIMULATED}">&#9679; {escape(desk.busy)} ...</div>' if desk.busy else ""
+        problem = _list([desk.problem], RED) if desk.problem else ""
+        doubts = [one for one in desk.notes if "warning" in one or "assumed" in one or "values" in one]
+        notes = _list(doubts, YELLOW) + _list(one for one in desk.notes if one not in doubts)
+        hint = (
+            "" if desk.bench or desk.logs or desk.notes else "Open a recording, or drop logs and the URDF of their rig."
+        )
+        self.status.text = f'<div role="status" aria-live="polite">{busy}{problem}{notes}{hint}</div>'
+
+    def _show_import(self) -> None:
+        desk, seen = self.desk, self.desk.preview
+        self.importing.visible = bool(desk.logs) or (desk.urdf is not None and desk.bench is None)
+        names = [path.name for path in desk.logs]
+        lacks = [what for what, there in (("a log", names), ("the URDF of the rig", desk.urdf)) if not there]
+        text = f"To be imported: {', '.join(names)} with {desk.urdf.name if desk.urdf else '?'}"
+        self.waiting.text = _list([text]) + _list([f"still needed: {' and '.join(lacks)}"] if lacks else [], YELLOW)
+        if seen is None:
+            self.table.text, self.columns.children, self.columns.tags = "", [], []
+            return
+        if self.columns.tags == [seen.columns, seen.joints]:
+            return
+        self.columns.tags = [seen.columns, seen.joints]
+        cells = ["".join(f"<td>{value:.6g}</td>" for value in row) for row in seen.rows]
+        head = "".join(f"<th>{escape(name)}</th>" for name in seen.columns)
+        doubt = _list([seen.doubt] if seen.doubt else [], YELLOW)
+        self.table.text = f'{doubt}<table cellpadding="4"><tr>{head}</tr><tr>{"</tr><tr>".join(cells)}</tr></table>'
+        known = seen.guess.joints if seen.guess else {}
+        time = (seen.guess.time if seen.guess else None) or NONE
+        rows = [Row(Div(text="", width=80), self._column(seen.columns, "time", time), name="time")]
+        for joint in seen.joints:
+            entry = known.get(joint, {})
+            selects = [self._column(seen.columns, s, entry.get(s, NONE)) for s in ("command", "position", "torque")]
+            rows.append(Row(Div(text=escape(joint), width=80), *selects, name=joint))
+        self.columns.children = rows
+
+    def _column(self, columns: list[str], title: str, value: str) -> Select:
+        return Select(title=title, options=[NONE, *columns], value=value, width=170)
+
+    def _show_model(self, bench: Workbench) -> None:
+        recording = bench.recording
+        trials = [t.name for t in recording.trials if t.name in bench.never_fitted]
+        others = [t.name for t in recording.trials if t.name not in bench.never_fitted]
+        _choose(self.trial, [(name, f"{name} (never fitted)") for name in trials] + [(name, name) for name in others])
+        _choose(self.joint, list(recording.joints), "" if self.joint.value else recording.joints[-1])
+        _choose(self.other, [NONE, *(f"{k}: {one.label}" for k, one in enumerate(bench.stages[:-1]))])
+        _choose(self.present, bench.effects)
+        self.remove.disabled = not bench.effects
+        self.stairs.text = _staircase(bench)
+
+    def _show_candidates(self, bench: Workbench) -> None:
+        joint = self.joint.value
+        scores = self.desk.scores.get(joint)
+        tag = [self.desk.version, joint, scores is not None]
+        if self.ranked.tags == tag:
+            return
+        self.ranked.tags = tag
+        self.names = [effect_path(score.candidate.effect) for score in self._scored()]
+        self.ranked.active = None
+        self.ranked.labels = [
+            f"{100 * bench.share(score):.0f} %  {name}" for name, score in zip(self.names, self._scored(), strict=True)
+        ]
+        if scores is None:
+            self.desk.look(joint)
+        unseen = bench.unseen(joint)
+        hidden = {one.effect for one in unseen}
+        every = sorted(bench.effect_names())
+        _choose(self.another, [NONE, *(name for name in every if name not in hidden and name not in self.names)], NONE)
+        lines = "".join(f"<div>{escape(one.effect)}: {escape(one.why)}</div>" for one in unseen)
+        self.unseen.text = (
+            "First look: the part of the squared error on the fitted trials that each would take away."
+            f'<details style="color:{FLOOR}"><summary>{len(unseen)} cannot be seen in these trials</summary>'
+            f"{lines}</details>"
+        )
+
+    def _show_experiment(self, bench: Workbench) -> None:
+        proposed = self.desk.experiment
+        self.experiment.figure.visible = proposed is not None
+        self.download.disabled = proposed is None or not proposed.decides
+        self.csv.text = self.desk.commands if proposed is not None and proposed.decides else ""
+        if proposed is None:
+            self.proposal.text = ""
+            return
+        safety = "keeps to the limits" if proposed.safety.safe else "would LEAVE the limits, do not play it"
+        worth = f"evidence expected: {proposed.told:.3g} times what decides" if proposed.decides else "decides nothing"
+        pair = " and ".join(proposed.predictions) or "the models"
+        self.proposal.text = _list(
+            [f"{proposed.name}, {proposed.time[-1]:.1f} s, to tell {pair} apart: {worth}; {safety} (dashed)"]
+        )
+        if self.experiment.figure.tags != [self.desk.version, id(proposed)]:
+            self.experiment.figure.tags = [self.desk.version, id(proposed)]
+            self.experiment.show(proposed, list(bench.recording.units.values()))
+
+    def _show_curves(self, only_missing: bool = False) -> None:
+        bench, joint = self.desk.bench, self.joint.value
+        if bench is None or not joint:
+            return
+        before, self.showing = self.showing, True
+        try:
+            if not only_missing:
+                self._show_trial(bench, joint)
+                self._show_sliders(bench, joint)
+                self._show_candidates(bench)
+            tag = [self.desk.version, joint, self.signal.value, self.desk.signature_of]
+            if self.signal.tags != tag:
+                self._show_missing(bench, joint)
+                self.signal.tags = [*tag[:2], self.signal.value, tag[3]]
+        finally:
+            self.showing = before
+
+    def _show_missing(self, bench: Workbench, joint: str) -> None:
+        missing, law = bench.missing(joint), self.desk.signature
+        _choose(self.signal, signals(missing))
+        law = law if law is not None and law.joint == joint else None
+        self.missing.show(missing, self.signal.value, law, bench.recording.units[joint])
+
+    def _show_trial(self, bench: Workbench, joint: str) -> None:
+        place = bench.recording.joints.index(joint)
+        compared = bench.comparison(self.trial.value)
+        beside = None
+        if self.other.value != NONE:
+            other = bench.stages[int(self.other.value.partition(":")[0])]
+            beside = bench.simulate(self.trial.value, other.model).position
+        self.time.show(compared, place, beside)
+        unit = bench.recording.units[joint]
+        failing = [one for one in compared.failing_intervals if one.joint == joint]
+        failing.sort(key=lambda one: -one.error)
+        self.where.value = NONE
+        self.where.options = [NONE, *(_interval(one, unit) for one in failing[:20])]
+        error = f"{joint} in this trial: {milli(compared.raw[0].joints[joint], unit)} RMS of the free run"
+        self.sentences.text = _list([error, *(one for one in compared.sentences if one.startswith(joint))])
+
+    def _show_sliders(self, bench: Workbench, joint: str) -> None:
+        values = bench.values(joint)
+        tag = [self.desk.version, joint]
+        if self.sliders.tags != tag:
+            self.sliders.tags = tag
+            self.sliders.children = [self._slider(one) for one in values[-SLIDERS:]]
+
+    def _slider(self, one: Value) -> Slider:
+        name = one.key.replace(f"@{self.joint.value}", "")
+        found = "" if one.interval is None else f" in [{one.interval[0]:.4g}, {one.interval[1]:.4g}]"
+        low, high = one.unknown.low, one.unknown.high
+        slider = Slider(
+            start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
+            title=f"{name} [{one.unit}]: {one.value:.4g}{found}; now", format=PrintfTickFormatter(format="%.4g"),
+        )  # fmt: skip
+        slider.on_change("value", lambda attr, old, new: self._move(one, new))
+        slider.on_change("value_throttled", lambda attr, old, new: self._set(one, new))
+        return slider
+
+
+def _interval(one: FailingInterval, unit: str) -> tuple[str, str]:
+    return f"{one.joint}|{one.start}|{one.end}", f"{one.start:.2f} to {one.end:.2f} s: {milli(one.error, unit)}"
+
+
+def _staircase(bench: Workbench) -> str:
+    """The table of stages: raw error and error over the noise on the trials that were never fitted."""
+    joints, units = bench.recording.joints, bench.recording.units
+    most = max(max(stage.raw.joints.values()) for stage in bench.stages) or 1.0
+
+    def row(label: str, errors: dict[str, float], over: str) -> str:
+        cells = "".join(
+            f'<td style="text-align:right;background:linear-gradient(90deg,#cfe3f2 {100 * errors[j] / most:.0f}%,'
+            f'transparent 0)">{milli(errors[j], units[j])}</td>'
+            for j in joints
+        )
+        return f"<tr><td>{escape(label)}</td>{cells}<td style='text-align:right'>{over}</td></tr>"
+
+    def stage_row(stage: Stage) -> str:
+        return row(stage.label, stage.raw.joints, f"{stage.judgement.error:.2f}")
+
+    head = "".join(f"<th>{escape(joint)}</th>" for joint in joints)
+    floor = "noise floor" + ("" if bench.floor.source == "repeats" else " (guess: no repeats)")
+    return (
+        f'<table cellpadding="4" style="width:100%"><tr><th></th>{head}<th>over noise</th></tr>'
+        + "".join(map(stage_row, bench.stages))
+        + row(floor, bench.floor.joints, "1")
+        + f"</table>RMS error of free runs on {len(bench.never_fitted)} trials that are never fitted; "
+        "over noise: error in short segments over the sensor's noise."
+    )

@@ -1,0 +1,44 @@
+"""An integral of a controller, where a log begins out of balance and segments begin in the middle of it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.measurement.replay.integrals import integrated
+from tactile_cube.measurement.replay.model import Model, Term
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tests.identification.rigs_of_any_size import EFFECTS, NOISE, Size, simulated
+
+INTEGRAL = find_effect("integral_action")
+
+
+def test_windows_that_begin_later_know_what_the_integral_has_come_to(tmp_path: Path) -> None:
+    values, wound = {"ki": 2.0}, 0.04
+    recording = simulated(tmp_path, Size(), INTEGRAL, values, wound=wound)
+    shooting = Shooting(recording, EFFECTS)
+    problem = Problem(shooting, shooting.cut(recording, np.array([NOISE]), segment=100))
+    plain = nominal_model(recording)
+    true = Model(plain.constants, (Term(INTEGRAL, "a", values, ()),), plain.offsets)
+    problem.linearise_starts(true)
+    assert problem.windows.wound == pytest.approx(wound, abs=0.2 * wound)
+    later = np.repeat(problem.windows.time > 0.0, problem.windows.segments)
+
+    def error() -> float:
+        cost = problem.cost(problem.residual(problem.predictions([true])[0]))[later].sum()
+        return float(np.sqrt(cost / np.count_nonzero(problem.weight[later])))
+
+    assert error() < 1.5
+    problem.windows = replace(problem.windows, errors=tuple(0.0 * one for one in problem.windows.errors))
+    assert error() > 10.0
+    assert problem.chosen_numbers(true).sum() == len(recording.trials), "one number was chosen for each trial"
+
+
+def test_an_integral_stops_at_its_limit_and_comes_back_at_once() -> None:
+    errors = np.array([0.02, 0.02, 0.02, -0.01])
+    assert integrated(errors, 0.01, 2.0, 0.0) == pytest.approx(0.11)
+    assert integrated(errors, 0.01, 2.0, 0.06) == pytest.approx(0.04)

@@ -1,0 +1,132 @@
+"""The workbench without a browser: what a notebook does in ten lines."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_cube.drivetrain.model_file import read_model
+from tactile_cube.errors import InputError
+from tactile_cube.identification.identification import identify_effects
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.workbench.state import Workbench
+from tests.workbench.small_bench import HIDDEN, OWN, STRIBECK, stribeck_recording
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return stribeck_recording(tmp_path_factory.mktemp("stribeck"))
+
+
+@pytest.fixture
+def bench(measured: Recording) -> Workbench:
+    return Workbench(measured)
+
+
+def test_ten_lines_lead_from_a_recording_to_a_model_at_the_noise(bench: Workbench, tmp_path: Path) -> None:
+    best, *_ = bench.candidates("a")
+    assert best.candidate.effect.name == "stribeck_friction"
+    assert bench.share(best) > 0.5
+    bench.add(STRIBECK)
+    assert [stage.label for stage in bench.stages] == ["stated", "refitted", f"+ {STRIBECK}"]
+    stated, refitted, added = bench.stages
+    assert stated.errors.overall > refitted.errors.overall > 10 * added.errors.overall
+    assert added.judgement.error < 1.1
+    bench.save(tmp_path / "model")
+    saved = read_model(tmp_path / "model" / "model.yaml")
+    for name, value in HIDDEN.items():
+        estimate = saved.effects[0].parameters[name]
+        assert estimate.low < value < estimate.high
+    assert saved.provenance.held_out == bench.never_fitted
+    assert (tmp_path / "model" / "report.html").is_file()
+
+
+def test_the_staircase_is_that_of_identify(bench: Workbench, measured: Recording) -> None:
+    bench.add(STRIBECK)
+    stages = identify_effects(measured, [STRIBECK], "fast", say=lambda line: None).stages
+    mine = {stage.label: stage.errors.overall for stage in bench.stages}
+    assert mine["stated"] == stages["nominal"].overall
+    assert mine["refitted"] == pytest.approx(stages["refitted"].overall, rel=1e-6)
+    assert mine[f"+ {STRIBECK}"] == pytest.approx(stages[f"+ {STRIBECK}"].overall, rel=0.1)  # which fits all windows
+
+
+def test_nothing_is_fitted_to_the_trials_that_judge(bench: Workbench) -> None:
+    assert set(bench.never_fitted).isdisjoint(trial.name for trial in bench.search.fitted.trials)
+    assert len(bench.recording.trials) == 4
+
+
+def test_a_value_is_tried_without_a_change_and_set_with_a_stage_that_undo_takes_back(bench: Workbench) -> None:
+    name = bench.never_fitted[0]
+    before = bench.simulate(name).position
+    tried = bench.simulate(name, bench.with_value("kd@a", 0.25)).position
+    assert np.abs(tried - before).max() > 1e-4
+    assert len(bench.history) == 1
+    bench.set_parameter("kd@a", 0.24)
+    bench.set_parameter("kd@a", 0.25)
+    assert [stage.label for stage in bench.stages] == ["stated", "refitted", "by hand"]
+    assert np.array_equal(bench.simulate(name).position, tried)
+    assert {one.key: one for one in bench.values("a")}["kd@a"].interval is None
+    assert bench.undo()
+    assert bench.undo()
+    assert not bench.undo()
+    assert np.array_equal(bench.simulate(name).position, before)
+    with pytest.raises(InputError, match=r"kd@b: no number of the model; it has kd@a"):
+        bench.set_parameter("kd@b", 1.0)
+
+
+def test_an_effect_is_taken_out_again(bench: Workbench) -> None:
+    refitted = bench.stage.errors.overall
+    bench.add(STRIBECK)
+    with pytest.raises(InputError, match="the model has it already"):
+        bench.add(STRIBECK)
+    bench.remove(STRIBECK)
+    assert bench.effects == []
+    assert bench.stage.errors.overall == pytest.approx(refitted, rel=0.01)
+    with pytest.raises(InputError, match=r"backlash@a: the model has only its constants"):
+        bench.remove("backlash@a")
+
+
+def test_the_signature_of_the_true_effect_looks_like_what_is_missing(bench: Workbench) -> None:
+    missing, (best, *others) = bench.missing("a"), bench.candidates("a")
+
+    def alike(score: object) -> float:
+        return float(np.corrcoef(missing.torque, bench.signature(score, "a").torque)[0, 1])  # type: ignore[arg-type]
+
+    assert alike(best) > 0.7
+    assert alike(best) > max(alike(one) for one in others if one.candidate.effect.name == "cogging")
+
+
+def test_where_the_model_fails_is_what_compare_says(bench: Workbench) -> None:
+    compared = bench.comparison(bench.never_fitted[0])
+    assert compared.failing_intervals
+    assert compared.floor == bench.floor
+
+
+def test_an_experiment_is_proposed_for_the_effect_that_was_added(bench: Workbench) -> None:
+    with pytest.raises(InputError, match="add an effect first"):
+        bench.propose()
+    bench.add(STRIBECK)
+    proposed = bench.propose()
+    assert proposed.decides
+    assert set(proposed.predictions) == {"refitted", f"+ {STRIBECK}"}
+
+
+def test_what_cannot_be_seen_is_named_with_its_reason(bench: Workbench) -> None:
+    assert all(one.joint == "a" and one.why for one in bench.unseen("a"))
+    assert bench.unseen("a")
+
+
+def test_a_saved_model_is_the_next_one_to_begin_with(bench: Workbench, measured: Recording, tmp_path: Path) -> None:
+    bench.add(STRIBECK)
+    bench.save(tmp_path)
+    again = Workbench(measured, tmp_path / "model.yaml")
+    assert again.effects == [STRIBECK]
+    assert again.stages[0].errors.overall < 0.1 * bench.stages[0].errors.overall
+    assert again.stages[1].judgement.error < 1.5
+
+
+def test_an_effect_of_ones_own_is_named_at_the_start_and_added_by_the_same_call(measured: Recording) -> None:
+    with pytest.raises(InputError, match=r"name it when the workbench starts, own_effects=\[tests.*OwnDrag\]"):
+        Workbench(measured).add(f"{OWN}@a")
+    bench = Workbench(measured, own_effects=[OWN])
+    assert bench.add(f"{OWN}@a").label == f"+ {OWN}@a"
