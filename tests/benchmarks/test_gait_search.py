@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from benchmarks.teacher.gait_search import BOUNDS, search_gait, try_gait, write_gait
-from tactile_cube.env import Moment, RotationEnv, Task
+from tactile_cube.env import RotationEnv, Task, TimeStep
 from tactile_cube.env.task import DROPPED, RUNNING, TIME_LIMIT
 from tactile_cube.hand import DLR_HAND2, Gait
 from tactile_cube.hand.gait import GaitRanges
@@ -20,23 +20,23 @@ class TurnsBySwing:
     def seed(self, seed: int, index: int = 0) -> None:
         pass
 
-    def reset(self) -> Moment:
+    def reset(self) -> TimeStep:
         self._theta, self._last = 0.0, None
         return self._moment(0, RUNNING)
 
-    def step(self, action: np.ndarray) -> Moment:
+    def step(self, action: np.ndarray) -> TimeStep:
         if self._last is not None:
             self._theta += float(np.abs(action - self._last).sum())
         self._last, step = action, self._step + 1
         return self._moment(step, TIME_LIMIT if step == 30 else RUNNING)
 
-    def _moment(self, step: int, outcome: int) -> Moment:
+    def _moment(self, step: int, outcome: int) -> TimeStep:
         self._step = step
-        return Moment(np.zeros(12), np.zeros(12), np.zeros(25), self._theta, np.zeros(8), 0.0, outcome, step)
+        return TimeStep(np.zeros(12), np.zeros(12), np.zeros(25), self._theta, np.zeros(8), 0.0, outcome, step)
 
 
 class DropsAtOnce(TurnsBySwing):
-    def step(self, action: np.ndarray) -> Moment:
+    def step(self, action: np.ndarray) -> TimeStep:
         super().step(action)
         self._theta = 3.0
         return self._moment(15, DROPPED)

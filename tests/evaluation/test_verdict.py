@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode, verdict
-from tests.evaluation.synthetic import episode
+from tactile_cube.evaluation.verdict import (
+    EpisodeVerdict,
+    cube_tilt,
+    exploits,
+    free_spin,
+    integrated_rotation,
+    judge_episode,
+    verdict,
+)
+from tests.evaluation.synthetic import SPOTS, contacts, episode
 
 
 @pytest.mark.parametrize(
@@ -68,3 +76,65 @@ def test_the_cubes_height_is_that_of_the_last_part() -> None:
     height = np.zeros((101, 3))
     height[:, 2] = np.where(np.arange(101) < 60, 0.01, 0.03)
     assert judge_episode(episode(cube_position=height)).rise == pytest.approx(0.02)
+
+
+def test_honest_turning_is_not_suspected() -> None:
+    assert exploits(episode(angle=5.0)) == []
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.0, -0.6, 0.8)])
+def test_integrated_rotation_passes_full_turns_about_the_tasks_axis(axis: tuple[float, ...]) -> None:
+    theta = np.linspace(0.0, 15.0, 101)
+    turn = Rotation.from_rotvec(np.outer(-theta, axis)) * Rotation.from_rotvec([0.1, 0.2, 0.3])
+    record = episode(theta=theta, cube_quaternion=turn.as_quat(), axis=axis)
+    np.testing.assert_allclose(integrated_rotation(record), theta, atol=1e-9)
+    assert "angle_mismatch" not in exploits(record)
+
+
+def test_a_leaning_cube_that_turns_about_its_own_axis_is_not_suspected() -> None:
+    turned = np.linspace(0.0, 10 * np.pi, 401)
+    lean = Rotation.from_rotvec([0.3, 0.0, 0.0])
+    quaternion = (lean * Rotation.from_rotvec(np.outer(-turned, [0.0, 0.0, 1.0]))).as_quat()
+    record = episode(angle=10 * np.pi, steps=400, cube_quaternion=quaternion)
+    np.testing.assert_allclose(integrated_rotation(record)[-1], np.cos(0.3) * turned[-1])
+    assert exploits(record) == []
+
+
+def test_an_angle_that_the_cube_did_not_turn_is_found() -> None:
+    assert exploits(episode(angle=2.0, theta=np.linspace(0.0, 8.0, 101))) == ["angle_mismatch"]
+
+
+def test_a_jump_of_a_quarter_turn_is_found() -> None:
+    turned = np.where(np.arange(101) < 50, 0.0, np.pi / 2)
+    quaternion = Rotation.from_rotvec(np.outer(-turned, [0.0, 0.0, 1.0])).as_quat()
+    assert "angle_jump" in exploits(episode(theta=turned, cube_quaternion=quaternion))
+
+
+def test_a_cube_that_spins_without_fingers_is_flung() -> None:
+    touch = np.ones((101, 4), dtype=bool)
+    touch[40:, 1:] = False
+    record = episode(angle=5.0, touch=touch)
+    assert exploits(record) == ["flung"]
+    np.testing.assert_allclose(free_spin(record), 3.0, atol=0.1)
+
+
+def test_on_a_table_one_finger_may_push() -> None:
+    touch = np.ones((101, 4), dtype=bool)
+    touch[:, 1:] = False
+    assert exploits(episode(angle=5.0, touch=touch, constants={"table_height": -0.04})) == []
+    touch[50:, 0] = False
+    assert exploits(episode(angle=5.0, touch=touch, constants={"table_height": -0.04})) == ["flung"]
+
+
+def test_a_tumbled_cube_is_found_unless_it_was_falling() -> None:
+    quaternion = Rotation.from_rotvec(np.outer(np.linspace(0.0, 1.0, 101), [1.0, 0.0, 0.0])).as_quat()
+    kept = episode(theta=np.zeros(101), cube_quaternion=quaternion)
+    np.testing.assert_allclose(cube_tilt(kept)[-1], 1.0)
+    assert "tumbled" in exploits(kept)
+    fallen = episode(theta=np.zeros(101), cube_quaternion=quaternion, ending="dropped")
+    assert "tumbled" not in exploits(fallen)
+
+
+def test_deep_penetration_is_found() -> None:
+    table = contacts(np.ones((101, 4), dtype=bool), np.tile(SPOTS, (101, 1, 1)), distance=-0.01)
+    assert exploits(episode(angle=0.0, contacts=table)) == ["penetration"]

@@ -22,7 +22,7 @@ from tactile_cube.visualization.comparison_figures import band, overlay
 from tactile_cube.visualization.comparison_report import comparison_report
 from tactile_cube.visualization.comparison_summary import markdown, summary
 from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
-from tactile_cube.visualization.diagnosis_sections import staircase_section
+from tactile_cube.visualization.diagnosis_sections import stage_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report
 from tests.identification.easy_safety import half_used
 from tests.measurement.small_rig import URDF, write
@@ -258,7 +258,7 @@ def test_what_the_trials_do_not_prove_is_named_and_more_is_asked_for(comparison:
     assert "next_experiment.csv" in text
 
 
-def test_the_identification_page_shows_the_staircase(comparison: Comparison, tmp_path: Path) -> None:
+def test_the_identification_page_shows_the_error_of_each_stage(comparison: Comparison, tmp_path: Path) -> None:
     joints = {"nominal": {"a": 0.007, "b": 0.006}, "with_effects": {"a": 0.0006, "b": 0.0005}}
     text = page(identification_report(comparison, DIAGNOSIS["error"], joints, "cmd", "model.yaml"), tmp_path / "i.html")
     assert "fell from 7 mrad to 0.6 mrad" in text
@@ -303,7 +303,7 @@ def test_the_rerun_recording_is_written_with_all_trials(comparison: Comparison, 
 @pytest.mark.parametrize(("joints", "header"), [(3, "j2"), (12, "as stated")])
 def test_the_error_table_has_many_joints_in_its_rows(joints: int, header: str) -> None:
     errors = {f"j{k}": 1e-3 * k for k in range(joints)}
-    section = staircase_section({"nominal": 1e-3}, {"nominal": errors, "with_effects": errors})
+    section = stage_section({"nominal": 1e-3}, {"nominal": errors, "with_effects": errors})
     (table,) = (block for block in section.blocks if isinstance(block, Table))
     assert header in table.header
     assert len(table.rows) == (2 if joints == 3 else 12)

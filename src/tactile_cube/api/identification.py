@@ -46,9 +46,9 @@ class IdentificationResult:
     @property
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
-        from tactile_cube.identification.in_words import staircase
+        from tactile_cube.identification.in_words import errors_by_stage
 
-        lines = [staircase(self.data["error"], self.model, self.recording.units)]
+        lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
         for parameter in self.contact.as_json()["silent"] if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
         return "\n".join(lines)

@@ -2,7 +2,7 @@
 
 from tactile_cube.env.cube_pose import CubePose, cube_pose
 from tactile_cube.env.reward import BORNE_TERMS, REWARD_TERMS, Reward
-from tactile_cube.env.rotation import Moment, RotationEnv
+from tactile_cube.env.rotation import RotationEnv, TimeStep
 from tactile_cube.env.task import OUTCOMES, Conditions, Curriculum, Task
 
 __all__ = [
@@ -12,9 +12,9 @@ __all__ = [
     "Conditions",
     "CubePose",
     "Curriculum",
-    "Moment",
     "Reward",
     "RotationEnv",
     "Task",
+    "TimeStep",
     "cube_pose",
 ]

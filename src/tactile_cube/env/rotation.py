@@ -25,7 +25,7 @@ LOST = frozenset((DROPPED, LEFT_RANGE, TILTED, LIFTED))
 
 
 @dataclass(slots=True)
-class Moment:
+class TimeStep:
     """What the task says after a reset or a policy step.
 
     Attributes:
@@ -125,7 +125,7 @@ class RotationEnv:
         """Conditions of the episodes from the next reset on."""
         self.conditions = conditions
 
-    def reset(self) -> Moment:
+    def reset(self) -> TimeStep:
         """Starts the next episode."""
         rng = np.random.default_rng([self._seed, self._index, self._episode])
         self._episode += 1
@@ -141,7 +141,7 @@ class RotationEnv:
         self._moment = self._observe(np.zeros(len(self.reward.terms)), RUNNING, 0)
         return self._moment
 
-    def step(self, action: Array) -> Moment:
+    def step(self, action: Array) -> TimeStep:
         """One policy step of 0.1 s with desired joint angles `action` (joints,) in [-1, 1], scaled to the action range.
 
         Faulty physics ends the episode with the last sound state once more and no reward.
@@ -196,7 +196,7 @@ class RotationEnv:
         tips, links, share = borne(normal_forces(self.world))
         return terms.climb(self._first, after), max(turned, 0.0) * links, tips, links, share
 
-    def _observe(self, measured: Array, outcome: int, step: int) -> Moment:
+    def _observe(self, measured: Array, outcome: int, step: int) -> TimeStep:
         world, pose = self.world, self._pose
         q_m, q_f = world.q_m, world.q_f
         state = np.empty(OBJECT + q_f.size)
@@ -207,13 +207,13 @@ class RotationEnv:
         state[OBJECT:] = q_f
         theta = self.task.direction * (pose.theta - self._first.theta)
         reward = float(measured @ self._weights)
-        return Moment(np.array(q_m), q_f - q_m, state, theta, measured, reward, outcome, step)
+        return TimeStep(np.array(q_m), q_f - q_m, state, theta, measured, reward, outcome, step)
 
-    def _fault(self, step: int) -> Moment:
+    def _fault(self, step: int) -> TimeStep:
         last = self._moment
         nothing = np.zeros(len(self.reward.terms))
         state = (last.joint_position, last.control_error, last.object_state, last.theta)
-        return Moment(*state, nothing, 0.0, FAULTY, step)
+        return TimeStep(*state, nothing, 0.0, FAULTY, step)
 
 
 TOUCH_FORCE = 0.02

@@ -11,12 +11,12 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from tactile_cube.env.rotation import OBJECT, Array, Moment, RotationEnv
+from tactile_cube.env.rotation import OBJECT, Array, RotationEnv, TimeStep
 from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions, Curriculum
 
 
 def float_sizes(joints: int, terms: int) -> dict[str, int]:
-    """Keys and sizes of the real-valued observations of a hand with so many joints, as Moment describes them."""
+    """Keys and sizes of the real-valued observations of a hand with so many joints, as TimeStep describes them."""
     return {
         "joint_position": joints,
         "control_error": joints,
@@ -45,7 +45,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         super().__init__(device="cpu", batch_size=[len(tasks)])
         self.tasks = list(tasks)
         self.curriculum = curriculum
-        self._moments: list[Moment] = []
+        self._moments: list[TimeStep] = []
         self._make_specs()
         self.set_progress(0, 0.0)
         self._seed_tasks(0)

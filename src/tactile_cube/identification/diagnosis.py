@@ -86,7 +86,7 @@ class Diagnosis:
         return self.findings.unproven[:UNPROVEN] if self.verdict.kind in NOT_ALL else ()
 
     def errors(self) -> ModelErrors:
-        """The staircase as the model file and diagnosis.json state it [rad]."""
+        """The error of each stage as the model file and diagnosis.json state it [rad]."""
         overall = {stage: summary.overall for stage, summary in self.stages.items()}
         joints = {stage: summary.joints for stage, summary in self.stages.items()}
         over_noise = self.over_noise["with_effects"]

@@ -33,7 +33,7 @@ from tactile_cube.measurement.split import held_out_split
 
 @dataclass(frozen=True)
 class Identification:
-    """A fitted model and the staircase that led to it.
+    """A fitted model and the error of each stage on the way to it.
 
     Attributes:
         fitted: the final model with intervals.
@@ -50,7 +50,7 @@ class Identification:
     held_out: list[str]
 
     def errors(self) -> ModelErrors:
-        """The staircase as the model file states it [rad]."""
+        """The error of each stage as the model file states it [rad]."""
         return ModelErrors(
             nominal=self.stages["nominal"].overall,
             refitted=self.stages["refitted"].overall,

@@ -168,7 +168,7 @@ def unseen_effects(result: Mapping[str, Any]) -> list[str]:
     return [f"These trials cannot reveal {name} at {', '.join(at)}." for name, at in joints.items()]
 
 
-def staircase(stages: Mapping[str, float], model: ModelFile, units: Mapping[str, str]) -> str:
+def errors_by_stage(stages: Mapping[str, float], model: ModelFile, units: Mapping[str, str]) -> str:
     """How the held-out error fell, and the values of the effects that were fitted."""
     unit = common_unit(units.values())
     lines = ["Held-out error, free-running simulation:"]

@@ -14,7 +14,7 @@ from tactile_cube.visualization.diagnosis_sections import (
     effect_section,
     held_section,
     ranking_section,
-    staircase_section,
+    stage_section,
     train_section,
 )
 from tactile_cube.visualization.report import Listing, Report, Section, Table
@@ -32,14 +32,14 @@ def contact_sections(found: ContactIdentification, alone: bool = True) -> list[S
     effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
     rows = [
         (effect, parameter, str(one.initialisation), f"{one.value:.4g}", "" if one.telling else "does not show it")
-        for (effect, parameter), said in found.fit.opinions.items()
+        for (effect, parameter), said in found.fit.by_initialisation.items()
         for one in said
     ]
     table = Table(("effect", "parameter", "initialisation", "value", ""), rows)
     stages = {key: one.overall for key, one in found.stages.items()} | {"noise_floor": found.noise_floor}
     joints = {key: one.joints for key, one in found.stages.items()}
-    opinions = Section("What each initialisation says", (EXPLANATION,), [table])
-    return [staircase_section(stages, joints, HELD), *(effect_section(effects) if alone else []), opinions]
+    by_initialisation = Section("What each initialisation says", (EXPLANATION,), [table])
+    return [stage_section(stages, joints, HELD), *(effect_section(effects) if alone else []), by_initialisation]
 
 
 def contact_diagnosis_report(

@@ -32,7 +32,7 @@ from tactile_cube.visualization.diagnosis_sections import (
     next_section,
     ranking_section,
     shape_section,
-    staircase_section,
+    stage_section,
     train_section,
     value_section,
 )
@@ -81,7 +81,7 @@ def diagnosis_report(
     )
     sections = [
         _verdict_section(diagnosis, units),
-        staircase_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
+        stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
         *([held_section(diagnosis["contact"])] if "contact" in diagnosis else []),
         *effect_section(diagnosis["effects"], units),
         *shape_section(shapes, units),
@@ -112,7 +112,7 @@ def identification_report(
     model_path: str,
     further: Sequence[Section] = (),
 ) -> Report:
-    """The page of an identification: the staircase of errors, the values found, the fitted model beside the recording.
+    """The page of an identification: the error of each stage, the values found, the fitted model beside the recording.
 
     Args:
         after: the fitted model beside the recording.
@@ -133,7 +133,7 @@ def identification_report(
         f"{milli(steps[-1], unit)}; {milli(stages['noise_floor'] or after.floor.overall, unit)} would be noise alone.",
         tone="good",
         sections=[
-            staircase_section(stages, joints, units=units),
+            stage_section(stages, joints, units=units),
             *effect_section(found, units),
             *further,
             value_section(after),

@@ -38,7 +38,7 @@ REACHED = ("joint", "position in any model", "speed", "torque")
 HELD = "How the error with an object falls"
 
 
-def staircase_section(
+def stage_section(
     stages: Mapping[str, float | None],
     joints: Mapping[str, Mapping[str, float]],
     title: str = "How the error falls",
@@ -65,11 +65,9 @@ def staircase_section(
 
 
 def held_section(contact: Mapping[str, Any]) -> Section:
-    """The staircase of the trials with an object, from what diagnosis.json says under `contact`."""
+    """The error of each stage in the trials with an object, from what diagnosis.json says under `contact`."""
     # grasps refit no constants
-    return staircase_section(
-        {k: v for k, v in contact["error"].items() if k != "refitted"}, contact["error_joints"], HELD
-    )
+    return stage_section({k: v for k, v in contact["error"].items() if k != "refitted"}, contact["error_joints"], HELD)
 
 
 def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None) -> list[Section]:

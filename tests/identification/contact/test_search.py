@@ -4,11 +4,11 @@ import pytest
 from tactile_cube.identification.contact.fit import fit_contact, summarise_fit
 from tactile_cube.identification.contact.search import (
     NARROWINGS,
-    Opinion,
+    GroupEstimate,
     contact_unknowns,
     first_value,
+    group_estimate,
     narrowed,
-    opinion,
 )
 from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import (
@@ -23,8 +23,8 @@ from tests.identification.easy_contact import GrippedTrial, LoadedTrial, frictio
 LATERAL = contact_unknowns([LateralFriction])[0]
 
 
-def said(initialisation: int, value: float, telling: bool = True) -> Opinion:
-    return Opinion("t", initialisation, value, telling, 1.0)
+def said(initialisation: int, value: float, telling: bool = True) -> GroupEstimate:
+    return GroupEstimate("t", initialisation, value, telling, 1.0)
 
 
 def test_a_grid_spans_the_bounds_in_equal_factors_or_differences() -> None:
@@ -50,7 +50,7 @@ def test_the_coarse_grid_and_narrower_ones_find_the_truth(truth: float) -> None:
     trials = [friction("hold", k, truth) for k in range(2)]
     start = first_value(trials, ContactModel({}), LATERAL)  # type: ignore[arg-type]
     assert start is not None
-    found = opinion(trials, ContactModel({}), LATERAL, start)  # type: ignore[arg-type]
+    found = group_estimate(trials, ContactModel({}), LATERAL, start)  # type: ignore[arg-type]
     assert found.telling
     assert found.value == pytest.approx(truth, rel=0.05)
 
@@ -58,15 +58,15 @@ def test_the_coarse_grid_and_narrower_ones_find_the_truth(truth: float) -> None:
 def test_a_trial_that_does_not_change_knows_nothing() -> None:
     trial = friction("twist", 0)
     assert first_value([trial], ContactModel({}), LATERAL) is None  # type: ignore[list-item]
-    assert not opinion([trial], ContactModel({}), LATERAL, 0.9).telling  # type: ignore[list-item]
+    assert not group_estimate([trial], ContactModel({}), LATERAL, 0.9).telling  # type: ignore[list-item]
 
 
 def test_the_interval_is_students_of_the_initialisations() -> None:
     values = [0.5, 0.6, 0.66]
-    opinions = [said(k, value) for k, value in enumerate(values)] + [said(3, 0.1, telling=False)]
+    by_initialisation = [said(k, value) for k, value in enumerate(values)] + [said(3, 0.1, telling=False)]
     logs = np.log(values)
     half = np.hypot(4.3027 * logs.std(ddof=1) / np.sqrt(3), 0.03)
-    estimate = summarise_fit(LATERAL, opinions)
+    estimate = summarise_fit(LATERAL, by_initialisation)
     assert np.log([estimate.low, estimate.value, estimate.high]) == pytest.approx(
         [logs.mean() - half, logs.mean(), logs.mean() + half], abs=1e-4
     )
@@ -91,7 +91,7 @@ def test_one_trial_alone_gives_a_wide_interval() -> None:
 def test_each_effect_is_fitted_on_the_kind_of_trial_that_shows_it() -> None:
     trials = [friction(kind, k, 0.6, 0.03) for k in range(3) for kind in ("hold", "twist")]
     fit = fit_contact(trials, [LateralFriction, SpinningFriction], ContactModel({}), lambda line: None)  # type: ignore[arg-type]
-    assert {one.trials.split("_")[0] for one in fit.opinions["spinning_friction", "radius"]} == {"twist"}
+    assert {one.trials.split("_")[0] for one in fit.by_initialisation["spinning_friction", "radius"]} == {"twist"}
     assert fit.contact.values["lateral_friction"]["coefficient"] == pytest.approx(0.6, rel=0.05)
     assert fit.contact.values["spinning_friction"]["radius"] == pytest.approx(0.03, rel=0.05)
     assert fit.silent() == []

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.measurement.comparing.error import (
+    failing_intervals,
     free_run_error,
     normalised_fit,
     raw_residuals,
@@ -78,3 +79,18 @@ def test_the_offsets_found_never_make_a_model_follow_worse(recording: Recording)
     simulator, nominal = Simulator(recording, step=STEP), nominal_model(recording)
     before, after = simulator.free_runs([nominal, with_fitted_offsets(simulator, nominal)])
     assert free_run_error(recording, after).overall < free_run_error(recording, before).overall
+
+
+def test_a_burst_is_found_where_it_is() -> None:
+    time = np.arange(1000) / 100
+    residual = 1e-4 * np.random.default_rng(0).normal(size=1000)
+    residual[400:500] += 0.005
+    (interval,) = failing_intervals("t", "a", time, residual, floor=1e-4)
+    assert 3.8 < interval.start < 4.05
+    assert 4.95 < interval.end < 5.2
+    assert interval.error > 0.003
+
+
+def test_noise_fails_nowhere() -> None:
+    residual = 1e-4 * np.random.default_rng(0).normal(size=1000)
+    assert failing_intervals("t", "a", np.arange(1000) / 100, residual, floor=1e-4) == []

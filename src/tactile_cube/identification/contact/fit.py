@@ -12,13 +12,13 @@ from tactile_cube.drivetrain.model_file import Estimate
 from tactile_cube.identification.contact.search import (
     NARROWINGS,
     ContactUnknown,
-    Opinion,
+    GroupEstimate,
     best_of,
     contact_unknowns,
+    estimate_of,
     first_value,
+    group_estimate,
     narrowed,
-    opinion,
-    opinion_of,
     solved,
 )
 from tactile_cube.identification.contact.trial import ContactTrial
@@ -48,16 +48,16 @@ class ContactFit:
     Attributes:
         contact: the values.
         estimates: (effect, parameter) -> value with interval.
-        opinions: (effect, parameter) -> what each initialisation said.
+        by_initialisation: (effect, parameter) -> what each initialisation said.
     """
 
     contact: ContactModel
     estimates: dict[tuple[str, str], Estimate]
-    opinions: dict[tuple[str, str], list[Opinion]]
+    by_initialisation: dict[tuple[str, str], list[GroupEstimate]]
 
     def silent(self) -> list[str]:
         """Parameters of which no trial knows anything."""
-        return [" ".join(key) for key, said in self.opinions.items() if not any(one.telling for one in said)]
+        return [" ".join(key) for key, said in self.by_initialisation.items() if not any(one.telling for one in said)]
 
 
 def fit_contact(
@@ -88,31 +88,32 @@ def fit_contact(
     for unknown in _of_the_same_trials([one for one in wanted if one.effect not in together]):
         costs = narrowed(evenly(shown_by(trials, unknown.effect), FEW), contact, unknown, _value(contact, unknown))
         contact = unknown.put(contact, best_of(costs))
-    opinions: dict[tuple[str, str], list[Opinion]] = {}
+    by_initialisation: dict[tuple[str, str], list[GroupEstimate]] = {}
     estimates: dict[tuple[str, str], Estimate] = {}
     for effect in effects:
         groups = [evenly(group, ASKED) for group in _initialisations(shown_by(trials, effect))]
-        at_once = (
-            [_opinions(group, contact, contact_unknowns([effect])) for group in groups] if effect in together else []
-        )
-        for k, unknown in enumerate(contact_unknowns([effect])):
+        own = contact_unknowns([effect])
+        at_once = [_estimates_of(group, contact, own) for group in groups] if effect in together else []
+        for k, unknown in enumerate(own):
             key = (effect.name, unknown.parameter.name)
-            opinions[key] = []
+            by_initialisation[key] = []
             for g, group in enumerate(groups):
-                said = at_once[g][k] if at_once else opinion(group, contact, unknown, _value(contact, unknown))
-                opinions[key].append(said)
+                said = at_once[g][k] if at_once else group_estimate(group, contact, unknown, _value(contact, unknown))
+                by_initialisation[key].append(said)
                 telling = "" if said.telling else ", but does not show it"
                 say(f"{unknown.label}: initialisation {said.initialisation} says {said.value:.3g}{telling}")
-            estimates[key] = summarise_fit(unknown, opinions[key])
+            estimates[key] = summarise_fit(unknown, by_initialisation[key])
             contact = unknown.put(contact, estimates[key].value)
             say(f"{unknown.label}: {in_words(estimates[key])}")
-    return ContactFit(contact, estimates, opinions)
+    return ContactFit(contact, estimates, by_initialisation)
 
 
-def _opinions(trials: Sequence[ContactTrial], contact: ContactModel, wanted: Sequence[ContactUnknown]) -> list[Opinion]:
+def _estimates_of(
+    trials: Sequence[ContactTrial], contact: ContactModel, wanted: Sequence[ContactUnknown]
+) -> list[GroupEstimate]:
     """What the trials of one initialisation say of all parameters of an effect, found together."""
     found, known = solved(trials, contact, wanted)
-    return [opinion_of(trials, found, _value(found, one), shows) for one, shows in zip(wanted, known, strict=True)]
+    return [estimate_of(trials, found, _value(found, one), shows) for one, shows in zip(wanted, known, strict=True)]
 
 
 def shown_by(trials: Sequence[ContactTrial], effect: type[ContactEffect]) -> list[ContactTrial]:
@@ -121,13 +122,13 @@ def shown_by(trials: Sequence[ContactTrial], effect: type[ContactEffect]) -> lis
     return chosen or list(trials)
 
 
-def summarise_fit(unknown: ContactUnknown, opinions: Sequence[Opinion]) -> Estimate:
+def summarise_fit(unknown: ContactUnknown, by_initialisation: Sequence[GroupEstimate]) -> Estimate:
     """Mean of what the initialisations say, with Student's interval of their scatter, no narrower than the last grid.
 
     Where none knows anything the value is the neutral one and the interval the whole range.
     """
     parameter = unknown.parameter
-    values = [unknown.scaled(one.value) for one in opinions if one.telling]
+    values = [unknown.scaled(one.value) for one in by_initialisation if one.telling]
     if not values:
         return Estimate(value=_neutral(unknown), low=parameter.low, high=parameter.high, unit=parameter.unit)
     half = unknown.spacing

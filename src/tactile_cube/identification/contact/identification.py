@@ -65,7 +65,9 @@ class ContactIdentification:
             "error": {key: one.overall for key, one in self.stages.items()} | {"noise_floor": self.noise_floor},
             "joints": {key: one.joints for key, one in self.stages.items()},
             "held_out": self.held_out,
-            "initialisations": {" ".join(key): [vars(one) for one in said] for key, said in self.fit.opinions.items()},
+            "initialisations": {
+                " ".join(key): [vars(one) for one in said] for key, said in self.fit.by_initialisation.items()
+            },
             "silent": self.fit.silent(),
         }
 

@@ -82,7 +82,7 @@ MISFIT_COUNTS = 10.0  # as so many measured numbers beside the joint offsets, wh
 
 
 @dataclass(frozen=True)
-class Opinion:
+class GroupEstimate:
     """What the trials of one initialisation say.
 
     Attributes:
@@ -151,21 +151,23 @@ def prior_penalties(trials: Sequence[ContactTrial], contact: ContactModel) -> di
     return {key: float(np.mean(values)) for key, values in by_initialisation.items()}
 
 
-def opinion(trials: Sequence[ContactTrial], contact: ContactModel, unknown: ContactUnknown, around: float) -> Opinion:
+def group_estimate(
+    trials: Sequence[ContactTrial], contact: ContactModel, unknown: ContactUnknown, around: float
+) -> GroupEstimate:
     """The value near another one that suits trials of one initialisation best."""
     costs = narrowed(trials, contact, unknown, around)
     found = best_of(costs)
     rises = [max((cost for value, cost in costs.items() if side * (value - found) > 0), default=costs[found])
              for side in (-1, 1)]  # fmt: skip
     telling = bool(min(rises) - costs[found] > np.log(TELLING) * len(trials)) or _at_neutral(unknown, found)
-    return opinion_of(trials, unknown.put(contact, found), found, telling)
+    return estimate_of(trials, unknown.put(contact, found), found, telling)
 
 
-def opinion_of(trials: Sequence[ContactTrial], contact: ContactModel, value: float, telling: bool) -> Opinion:
-    """A value as the opinion of some trials."""
+def estimate_of(trials: Sequence[ContactTrial], contact: ContactModel, value: float, telling: bool) -> GroupEstimate:
+    """A value as the estimate of some trials."""
     name = " ".join(one.trial.name for one in trials)
     cost = float(np.exp(np.mean(np.log([one.cost(contact) for one in trials]))))
-    return Opinion(name, trials[0].trial.initialisation, value, telling, cost)
+    return GroupEstimate(name, trials[0].trial.initialisation, value, telling, cost)
 
 
 def _at_neutral(unknown: ContactUnknown, value: float) -> bool:

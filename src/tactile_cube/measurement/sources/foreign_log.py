@@ -46,11 +46,11 @@ class TableReading:
     def rows(self, rate: float) -> Iterator[Row]:
         """What was understood, for people: what, how, and what told it."""
         if self.time is not None:
-            yield "time", f"{self.columns.time} [{self.time.name}], {rate:g} Hz", self.time.told_by
+            yield "time", f"{self.columns.time} [{self.time.name}], {rate:g} Hz", self.time.source
         for joint, entry in self.columns.joints.items():
             for signal, column in entry.items():
                 unit = self.units[joint][signal]
-                yield f"{joint} {signal}", f"{column} [{unit.name}]", unit.told_by
+                yield f"{joint} {signal}", f"{column} [{unit.name}]", unit.source
         yield "not used", ", ".join(self.columns.unused), ""
 
     def trial(self, table: Table, path: Path, entry: TrialEntry, rate: float | None) -> TrialTable:

@@ -122,7 +122,7 @@ class Unit:
 
     name: str
     size: float
-    told_by: str
+    source: str
 
 
 def chosen_unit(said: str | None, name: str, units: Mapping[str, float], key: str) -> Unit | None:
@@ -170,7 +170,7 @@ def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
         position: its unit.
         ratio: range of the position over that of the command, as logged.
     """
-    guessed = not {"its name"} & {command.told_by, position.told_by}
+    guessed = not {"its name"} & {command.source, position.source}
     if command.name == position.name or not guessed or not NOT_ALIKE < ratio < 1 / NOT_ALIKE:
         return command, position
     smaller = min(command, position, key=lambda unit: unit.size)
