@@ -93,8 +93,9 @@ def drop(window: Any, *files: tuple[str, str]) -> None:
 def open_recording(window: Any, recording: Recording) -> None:
     window.get_by_label("Folder of a recording").fill(str(recording.folder))
     window.get_by_role("button", name="Open").click()
-    window.get_by_role("cell", name="refitted", exact=True).wait_for()
-    window.get_by_role("radio").first.wait_for()
+    # the state may be that of another test until it is loaded
+    window.get_by_role("cell", name=f"+ {STRIBECK}").wait_for(state="hidden")
+    window.get_by_role("radio", name="stribeck_friction").wait_for()
 
 
 def over_noise(window: Any, stage: str) -> float:

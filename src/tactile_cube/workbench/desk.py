@@ -73,10 +73,10 @@ class Desk:
 
     def do(self, words: str, work: Callable[[], None], asked: bool = True) -> None:
         """Work while the windows stay usable, one thing after another; what goes wrong is shown until more is asked."""
-        self._queued += 1
+        self._queued += asked
 
         def run() -> None:
-            self._queued -= 1
+            self._queued -= asked
             self.problem = "" if asked else self.problem
             self.say(words)
             try:
