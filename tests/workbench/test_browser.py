@@ -28,6 +28,7 @@ CHROMIUM = next(
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (Debian: apt install chromium)")
 PICTURES = os.environ.get("WORKBENCH_PICTURES")
 PATIENCE = 120_000  # [ms]
+NAME = "<img src=x onerror=document.title='run'>"  # of a column, as a hostile log may have it
 GIVEN = {
     "K_P [N m/rad]": "4.0", "K_D [N m s/rad]": "0.2", "torque limit [N m]": "4.0",
     "stiffness, if known": "40", "friction [N m]": "0.02", "rotor inertia [kg m^2]": "0.004",
@@ -111,7 +112,7 @@ def logs(recording: Recording) -> list[tuple[str, str]]:
             "t_ms": 1e3 * trial.time,
             "goal_deg": np.degrees(trial.command[:, 0]),
             "angle_deg": np.degrees(trial.position[:, 0]),
-            "temp": np.full(len(trial.time), 31.0),
+            NAME: np.full(len(trial.time), 31.0),
         }
         files.append((f"{trial.name}.csv", polars.DataFrame(columns).write_csv()))
     return files
@@ -125,6 +126,8 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     drop(window, ("rig.urdf", measured.urdf))
     window.get_by_label("position", exact=True).last.wait_for()
     assert window.get_by_label("command", exact=True).input_value() == "goal_deg"
+    assert NAME in window.get_by_role("columnheader").last.inner_text()
+    assert window.title() == "workbench"
     for label, text in GIVEN.items():
         window.get_by_label(label).fill(text)
     picture(window, "1_import")
