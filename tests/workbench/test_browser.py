@@ -143,6 +143,13 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     assert over_noise(window, f"+ {STRIBECK}") < 1.1
     window.get_by_role("radio").first.wait_for()
     picture(window, "4_added")
+    zoomed = "() => [...Bokeh.documents[0]._all_models.values()].some((one) => one.type == 'Range1d' && one.end < 1.0)"
+    assert not window.evaluate(zoomed)
+    window.locator(".bk-events").first.click(position={"x": 85, "y": 100})
+    window.wait_for_function(zoomed)
+    window.get_by_label("beside").select_option("1: refitted")
+    window.get_by_label("where it fails").select_option(index=1)
+    picture(window, "4_zoomed")
     window.get_by_role("button", name="Propose").click()
     window.get_by_text("times what decides").wait_for()
     with window.expect_download() as download:
