@@ -38,7 +38,7 @@ def test_columns_that_are_said_are_taken(tmp_path: Path) -> None:
     swapped = {"time": "t", "a": {"command": "b_cmd", "position": "b_pos"}}
     recording, understood = import_logs(tmp_path / "out", [file], urdf, GAINS, columns=swapped)
     assert recording.joints == ("a",)
-    assert any(line.startswith("a command: b_cmd [rad]") for line in understood)
+    assert any(line.startswith("guess: a command: b_cmd [rad] (values") for line in understood)
 
 
 def test_an_error_names_the_row(tmp_path: Path) -> None:

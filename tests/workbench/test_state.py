@@ -24,7 +24,7 @@ def bench(measured: Recording) -> Workbench:
 
 
 def test_ten_lines_lead_from_a_recording_to_a_model_at_the_noise(bench: Workbench, tmp_path: Path) -> None:
-    best, *_ = bench.candidates("a")
+    best, *_ = bench.candidates("a") or []
     assert best.candidate.effect.name == "stribeck_friction"
     assert bench.share(best) > 0.5
     bench.add(STRIBECK)
@@ -87,7 +87,7 @@ def test_an_effect_is_taken_out_again(bench: Workbench) -> None:
 
 
 def test_the_signature_of_the_true_effect_looks_like_what_is_missing(bench: Workbench) -> None:
-    missing, (best, *others) = bench.missing("a"), bench.candidates("a")
+    missing, (best, *others) = bench.missing("a"), bench.candidates("a") or []
 
     def alike(score: object) -> float:
         return float(np.corrcoef(missing.torque, bench.signature(score, "a").torque)[0, 1])  # type: ignore[arg-type]
@@ -130,3 +130,14 @@ def test_an_effect_of_ones_own_is_named_at_the_start_and_added_by_the_same_call(
         Workbench(measured).add(f"{OWN}@a")
     bench = Workbench(measured, own_effects=[OWN])
     assert bench.add(f"{OWN}@a").label == f"+ {OWN}@a"
+
+
+def test_a_first_look_gives_way_to_whoever_waits(bench: Workbench) -> None:
+    asked = []
+
+    def stop() -> bool:
+        asked.append(True)
+        return len(asked) > 1
+
+    assert bench.candidates("a", stop) is None
+    assert len(asked) == 2

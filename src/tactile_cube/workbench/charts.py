@@ -75,7 +75,7 @@ class TimeChart:
         recording, trial = compared.recording, compared.recording.trials[0]
         unit = recording.units[recording.joints[joint]]
         if self._trial is not trial:
-            self.x.update(start=0.0, end=trial.duration)
+            self.x.update(start=0.0, end=trial.duration, reset_start=0.0, reset_end=trial.duration)
         self._trial, self._joint = trial, joint
         self.angle.yaxis.axis_label = f"position [{unit}]"
         self.error.yaxis.axis_label = f"error [{THOUSANDTHS[unit]}]"
@@ -101,7 +101,7 @@ class TimeChart:
 
     def zoom(self, start: float, end: float) -> None:
         """Show an interval with what is around it."""
-        self.x.update(start=start - CONTEXT, end=end + CONTEXT)
+        self.x.update(start=max(0.0, start - CONTEXT), end=min(end + CONTEXT, self.x.reset_end))
 
     def _draw(self, source: ColumnDataSource, position: Array) -> None:
         assert self._trial is not None

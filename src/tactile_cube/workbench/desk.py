@@ -50,7 +50,7 @@ class Desk:
         self.preview: Preview | None = None
         self.diagnosing: Diagnosing | None = None
         self.listeners: list[Callable[[], None]] = []
-        self._worker = ThreadPoolExecutor(1)
+        self._worker, self._queued = ThreadPoolExecutor(1), 0
         self._forget()
 
     def _forget(self) -> None:
@@ -71,11 +71,13 @@ class Desk:
         self.busy = words
         self.changed()
 
-    def do(self, words: str, work: Callable[[], None]) -> None:
-        """Work while the windows stay usable, one thing after another; what goes wrong is shown."""
+    def do(self, words: str, work: Callable[[], None], asked: bool = True) -> None:
+        """Work while the windows stay usable, one thing after another; what goes wrong is shown until more is asked."""
+        self._queued += asked
 
         def run() -> None:
-            self.problem = ""
+            self._queued -= asked
+            self.problem = "" if asked else self.problem
             self.say(words)
             try:
                 work()
@@ -178,10 +180,15 @@ class Desk:
         """Take a first look at the candidates of a joint, unless it was taken."""
 
         def run() -> None:
-            if self.bench is not None and joint not in self.scores:
-                self.scores[joint] = self.bench.candidates(joint)
+            if self.bench is None or joint not in self.bench.recording.joints or joint in self.scores:
+                return
+            found = self.bench.candidates(joint, stop=lambda: self._queued > 0)
+            if found is None:
+                self.look(joint)  # after what somebody is waiting for
+            else:
+                self.scores[joint] = found
 
-        self.do(f"a first look at what may be missing at {joint}", run)
+        self.do(f"a first look at what may be missing at {joint}", run, asked=False)
 
     def draw(self, score: Score, label: str, joint: str) -> None:
         """Find the torque that a candidate would supply."""

@@ -96,5 +96,10 @@ def import_logs(
     tables = made.recordings(0)
     write_recordings(out, tables)
     recording = read_recording(out)
-    understood = [f"{what}: {how}" + (f" ({by})" if by else "") for what, how, by in tables[""].understood]
-    return recording, understood
+    return recording, [_in_a_line(*row) for row in tables[""].understood]
+
+
+def _in_a_line(what: str, how: str, by: str) -> str:
+    """What was understood, marked as a guess where values told it."""
+    guess = "guess: " if by.startswith(("values", "steps", "assumed")) else ""
+    return f"{guess}{what}: {how}" + (f" ({by})" if by else "")

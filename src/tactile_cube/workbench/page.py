@@ -329,11 +329,9 @@ class Page:
         desk = self.desk
         busy = f'<div style="color:{SIMULATED}">&#9679; {escape(desk.busy)} ...</div>' if desk.busy else ""
         problem = _list([desk.problem], RED) if desk.problem else ""
-        doubts = [one for one in desk.notes if "warning" in one or "assumed" in one or "values" in one]
+        doubts = [one for one in desk.notes if one.startswith(("warning: ", "guess: "))]
         notes = _list(doubts, YELLOW) + _list(one for one in desk.notes if one not in doubts)
-        hint = (
-            "" if desk.bench or desk.logs or desk.notes else "Open a recording, or drop logs and the URDF of their rig."
-        )
+        hint = "" if desk.bench or desk.logs else "Open a recording, or drop logs and the URDF of their rig."
         self.status.text = f'<div role="status" aria-live="polite">{busy}{problem}{notes}{hint}</div>'
 
     def _show_import(self) -> None:
@@ -456,7 +454,7 @@ class Page:
         self.where.value = NONE
         self.where.options = [NONE, *(_interval(one, unit) for one in failing[:20])]
         error = f"{joint} in this trial: {milli(compared.raw[0].joints[joint], unit)} RMS of the free run"
-        self.sentences.text = _list([error, *(one for one in compared.sentences if one.startswith(joint))])
+        self.sentences.text = _list([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))])
 
     def _show_sliders(self, bench: Workbench, joint: str) -> None:
         values = bench.values(joint)

@@ -28,7 +28,7 @@ from tactile_cube.identification.recommended import UNITS, model_file
 from tactile_cube.identification.search.division import BRIEF
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_shape import Missing, missing_torques
-from tactile_cube.identification.search.screening import Score
+from tactile_cube.identification.search.screening import Score, screen
 from tactile_cube.identification.search.shortlist import resized
 from tactile_cube.identification.simulations import with_offsets
 from tactile_cube.measurement.bench import without_touches
@@ -43,6 +43,7 @@ from tactile_cube.workbench.background import Diagnosing
 
 Array = NDArray[np.float64]
 BY_HAND = "by hand"
+AT_ONCE = 24  # candidates of a first look
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
 COMMAND = "python -m tactile_cube.workbench recording={}"
@@ -192,16 +193,22 @@ class Workbench:
         before, after = problem.predictions([replace(added, terms=added.terms[:-1]), added])
         return self._as_torque(joint, problem.limited(after - before) * problem.weight)
 
-    def candidates(self, joint: str) -> list[Score]:
+    def candidates(self, joint: str, stop: Callable[[], bool] = lambda: False) -> list[Score] | None:
         """Return a first look at what could be missing at a joint: the best form of each effect, best first.
 
         `share` says what a score takes away. The first look is linear; `diagnose` refits and judges what it promises.
+        None: `stop`, which is called every second or so, said so.
         """
         frozen = self.search.frozen(self.stage.fit)
+        wanted = [one for one in self.search.wanted(frozen) if one.joints == (joint,)]
         best: dict[str, Score] = {}
-        for score in self.search.screened(frozen, joint):
-            best.setdefault(effect_path(score.candidate.effect), score)
-        return [one for one in best.values() if one.gain > 0.0]
+        for first in range(0, len(wanted), AT_ONCE):
+            if stop():
+                return None
+            for score in screen(self.search.problem, frozen, wanted[first : first + AT_ONCE]):
+                name = effect_path(score.candidate.effect)
+                best[name] = max(score, best.get(name, score), key=lambda one: one.gain)
+        return sorted((one for one in best.values() if one.gain > 0.0), key=lambda one: -one.gain)
 
     def share(self, score: Score) -> float:
         """Return the part of the squared error on the fitted trials that a candidate would take away."""

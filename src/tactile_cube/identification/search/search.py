@@ -194,7 +194,7 @@ class Search(Division):
     def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
         frozen = self.frozen(parent.fit)
-        self.last_scores = self.screened(frozen)
+        self.last_scores = screen(self.problem, frozen, self.wanted(frozen))
         chosen = with_groups(self.last_scores, least_gain(parent, base, self.criteria) * frozen.cost)[:REFITTED]
         self.say(f"screened {len(self.last_scores)} candidates, refitting {len(chosen)}")
         raced = of_each(self.race(frozen, self.brief(frozen, chosen)), FINALISTS)
@@ -203,10 +203,9 @@ class Search(Division):
         judged = (*raced, *special)
         return [self.finish(parent, candidate, fitted, len(judged)) for candidate, fitted in judged]
 
-    def screened(self, frozen: Fit, joint: str | None = None) -> list[Score]:
-        """A first look at every candidate, or at those of one joint, beside a fit, best first."""
-        wanted = self.new([*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)])
-        return screen(self.problem, frozen, [one for one in wanted if joint is None or one.joints == (joint,)])
+    def wanted(self, frozen: Fit) -> list[Candidate]:
+        """Return what may be added to a fit: at starts of its own, or read from what the fit leaves."""
+        return self.new([*self.candidates, *residual_candidates(self.problem, self.fitted, frozen, self.effects)])
 
     def new(self, wanted: Sequence[Candidate]) -> list[Candidate]:
         """Without effects that the model to begin with has at that joint already."""
