@@ -134,7 +134,8 @@ class MissingChart:
     def show(self, missing: Missing, signal: str, law: Missing | None, unit: str) -> None:
         """Draw it over one of its signals."""
         self.figure.xaxis.axis_label = of_joint(signal, unit)
-        self.figure.yaxis.axis_label = of_joint("missing torque [N m]", unit)
+        label = of_joint("missing torque [N m]", unit)
+        self.figure.yaxis.axis_label = label.replace("torque", "force") if label.endswith("[N]") else label
         some = slice(None, None, max(1, len(missing.torque) // POINTS))
         self.points.data = {"x": missing.signals[signal][some], "y": missing.torque[some]}
         self.mean.data = _curves(missing, signal)
