@@ -72,6 +72,13 @@ def test_a_base_model_at_the_noise_is_adequate() -> None:
     assert decide(findings(1.02)).kind == "adequate"
 
 
+def test_where_nothing_is_named_the_model_that_predicts_best_is_recommended() -> None:
+    plain = explanation("backlash", 10.2)
+    best = replace(explanation("payload", 10.0), effects=(*plain.effects, *explanation("payload", 10.0).effects))
+    verdict = decide(findings(20.0, plain, best))
+    assert (verdict.kind, verdict.chosen) == ("unknown_effect", best)
+
+
 def test_an_error_that_no_effect_lowers_is_unknown() -> None:
     assert decide(findings(8.0)).kind == "unknown_effect"
 
