@@ -72,6 +72,14 @@ def test_a_base_model_at_the_noise_is_adequate() -> None:
     assert decide(findings(1.02)).kind == "adequate"
 
 
+def test_a_number_that_a_fit_chooses_where_a_trial_begins_counts_as_one() -> None:
+    bias, integral = explanation("torque_bias", 1.02), explanation("integral_action", 1.02)
+    clamped = replace(integral, effects=(replace(integral.effects[0], form={"ki": 5.0, "limit": 0.15}),))
+    assert clamped.size == 3
+    verdict = decide(findings(20.0, bias, clamped))
+    assert (verdict.kind, verdict.chosen) == ("missing_effect", bias)
+
+
 def test_where_nothing_is_named_the_model_that_predicts_best_is_recommended() -> None:
     plain = explanation("backlash", 10.2)
     best = replace(explanation("payload", 10.0), effects=(*plain.effects, *explanation("payload", 10.0).effects))

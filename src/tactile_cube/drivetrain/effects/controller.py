@@ -33,6 +33,7 @@ class IntegralAction(Effect):
 
     name = "integral_action"
     stage = Stage.MOTOR_TORQUE
+    chosen_starts = 1
     parameters = (
         Parameter("ki", "N m/(rad s)", 0.0, 0.0, 200.0, 5.0, "kp over 0.1 to 2 s"),
         Parameter("limit", "N m", 0.0, 0.0, 10.0, 0.0, "none, or a part of the torque limit", scale=0.02),

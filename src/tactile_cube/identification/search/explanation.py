@@ -48,8 +48,8 @@ class Explanation:
 
     @property
     def size(self) -> int:
-        """Numbers fitted beyond the base."""
-        return sum(c.size for c in self.effects)
+        """Numbers fitted beyond the base, those of a state's start among them."""
+        return sum(c.size + len(c.joints) * c.effect.chosen_starts for c in self.effects)
 
     @property
     def terms(self) -> int:
