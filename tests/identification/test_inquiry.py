@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from tactile_cube.identification import inquiry
+from tactile_cube.identification import diagnosis, inquiry
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.disturbances import Disturbance
 from tactile_cube.identification.inquiry import ALL, beside_disturbances
@@ -173,3 +174,38 @@ def test_what_was_played_once_is_left_out_only_where_that_names_all(monkeypatch:
     assert (found.inquiry.recording, found.left_out, found.suspected) == (EVERY, (), (ALONE,))
     found, asked = inquired(monkeypatch, seen, {EVERY: ALL})
     assert (found.left_out, asked) == ((), [EVERY]), "an answer that names all is not asked again"
+
+
+@dataclass(frozen=True)
+class InAnySteps:
+    """An inquiry that answers in any steps with the same error [sensor noise]."""
+
+    recording: int
+    error: float
+    effects: tuple[()] = ()
+    known: None = None
+    known_answer: tuple[Any, ...] = ()
+
+    def say(self, line: str) -> None:
+        """Take a line."""
+
+    @property
+    def first(self) -> Any:
+        """What is found."""
+        chosen = SimpleNamespace(error=self.error, effects=("law",))
+        return SimpleNamespace(verdict=SimpleNamespace(chosen=chosen, rivals=()))
+
+
+@pytest.mark.parametrize(("left", "steps"), [(1.1, 8), (4.0, 8), (9.0, 8), (400.0, 1)])
+def test_an_answer_stands_in_steps_that_hide_nothing_beside_what_it_leaves(
+    monkeypatch: pytest.MonkeyPatch, left: float, steps: int
+) -> None:
+    # a recording is the number of its steps: 8 where errors as small as the noise shall show, 1 where larger ones
+    monkeypatch.setattr(diagnosis, "stated_error", lambda *args: 1000.0)
+    monkeypatch.setattr(
+        diagnosis, "resolved", lambda recording, effects, say, known, beside=1.0: 8 if beside <= 1.0 else 1
+    )
+    monkeypatch.setattr(diagnosis, "_steps", lambda recording: recording)
+    asked = diagnosis.in_long_steps_first(InAnySteps(0, left))  # type: ignore[arg-type]
+    assert asked.recording == steps
+    assert len(asked.known_answer) == (steps == 8), "what long steps found is asked of first"

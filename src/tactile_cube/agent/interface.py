@@ -23,7 +23,7 @@ class Agent(Protocol):
 
         Args:
             batch: replayed transitions (size,), as TorchRL's losses read them. The reward sums "steps_to_next_obs"
-                discounted ones, "terminated" leaves out time limits, "demonstrated" marks those of a gait or a teacher.
+                discounted ones, "terminated" leaves out time limits, "demonstrated" marks demonstrations.
 
         Returns:
             Scalars on the agent's device: critic_loss, actor_loss, alpha, entropy, value (mean Q of the batch).

@@ -78,11 +78,9 @@ def _but_for_the_implausible(
 ) -> Verdict:
     """What is left to say where the best explanation stands in for another law: its plausible part, if that is most."""
     part = [one for one in plausible if named(one) < named(chosen) and one.explained(base) > criteria.most]
-    return (
-        Verdict("partly_explained", simplest(part, criteria))
-        if part
-        else Verdict("unknown_effect", closest(plausible or [chosen]))
-    )
+    if part:
+        return Verdict("partly_explained", simplest(part, criteria))
+    return Verdict("unknown_effect", closest(plausible or [chosen]))
 
 
 def closest(found: Sequence[Explanation]) -> Explanation:

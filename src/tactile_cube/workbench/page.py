@@ -372,7 +372,7 @@ class Page:
         _choose(self.other, [NONE, *(f"{k}: {one.label}" for k, one in enumerate(bench.stages[:-1]))])
         _choose(self.present, bench.effects)
         self.remove.disabled = not bench.effects
-        self.stairs.text = _staircase(bench)
+        self.stairs.text = _error_by_stage(bench)
 
     def _show_candidates(self, bench: Workbench) -> None:
         joint = self.joint.value
@@ -480,7 +480,7 @@ def _interval(one: FailingInterval, unit: str) -> tuple[str, str]:
     return f"{one.joint}|{one.start}|{one.end}", f"{one.start:.2f} to {one.end:.2f} s: {milli(one.error, unit)}"
 
 
-def _staircase(bench: Workbench) -> str:
+def _error_by_stage(bench: Workbench) -> str:
     """The table of stages: raw error and error over the noise on the trials that were never fitted."""
     joints, units = bench.recording.joints, bench.recording.units
     most = max(max(stage.raw.joints.values()) for stage in bench.stages) or 1.0

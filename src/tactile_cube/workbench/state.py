@@ -145,7 +145,7 @@ class Workbench:
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        """The staircase, from the stated model to the one in force."""
+        """From the stated model to the one in force."""
         return self.history[-1]
 
     @property
