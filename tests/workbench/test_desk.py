@@ -66,3 +66,21 @@ def test_a_recording_takes_the_place_of_another_one(desk: Desk, measured: Record
     desk.open(str(measured.folder / "nothing*.csv"))
     done(desk)
     assert "no recording's folder" in desk.problem
+
+
+def test_what_came_back_is_added_to_the_logs_before(measured: Recording, tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    gains = {"kp": "4.0", "kd": "0.2", "torque_limit": "4.0", "mode": "position"}
+    files = sorted(measured.folder.glob("*.parquet"))
+    desk.open(str(measured.folder / "rig.urdf"))
+    for dropped, together, trials in ((files[:2], True, 2), (files[2:], True, 4), (files[:3], False, 3)):
+        desk.take([one.name for one in dropped], [one.read_bytes() for one in dropped])
+        done(desk)
+        desk.import_waiting(gains, {}, {}, {}, together)
+        done(desk)
+        assert desk.problem == ""
+        assert desk.bench is not None
+        assert len(desk.bench.opened.trials) == trials
+    desk.open(str(measured.folder / "rig.urdf"))
+    done(desk)
+    assert desk.imported == [], "another rig"

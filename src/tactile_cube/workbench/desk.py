@@ -33,6 +33,7 @@ class Desk:
         busy: what is being done, in words.
         problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
         logs: files that wait to be imported; `urdf`: of their rig; `preview`: what is in the first.
+        imported: those of the recording that is loaded, to which what came back from an experiment may be added.
         scores: a first look at the candidates, joint -> best first, of this version.
         signature: the torque that the candidate looked at would supply.
         progress: of the diagnosis that runs or ran last; `found`: its answer.
@@ -46,6 +47,7 @@ class Desk:
         self.busy = self.problem = self.commands = ""
         self.notes: list[str] = []
         self.logs: list[Path] = []
+        self.imported: list[Path] = []
         self.urdf: Path | None = None
         self.preview: Preview | None = None
         self.diagnosing: Diagnosing | None = None
@@ -139,12 +141,18 @@ class Desk:
 
     def _wait_for_import(self, files: Sequence[Path]) -> None:
         rigs = [file for file in files if file.suffix.lower() in RIGS]
-        self.urdf = rigs[-1] if rigs else self.urdf
+        if rigs:
+            self.urdf, self.imported = rigs[-1], []
         self.logs = [file for file in files if file not in rigs] or self.logs
         self.preview = preview(self.logs[0], self.urdf) if self.logs and self.urdf else None
 
     def import_waiting(
-        self, controller: dict[str, str], nominal: dict[str, str], columns: dict[str, Any], settings: dict[str, str]
+        self,
+        controller: dict[str, str],
+        nominal: dict[str, str],
+        columns: dict[str, Any],
+        settings: dict[str, str],
+        together: bool = False,
     ) -> None:
         """Import the logs that wait and load what they make; they wait on where something is wrong.
 
@@ -153,8 +161,10 @@ class Desk:
             nominal: as typed: stiffness, static_friction, reflected_inertia, as far as known.
             columns: as `source.columns`.
             settings: others of `record source=csv`, as typed.
+            together: with the logs of the recording that is loaded.
         """
-        logs, urdf = self.logs, self.urdf
+        before = [one for one in self.imported if together and one not in self.logs]
+        logs, urdf = [*before, *self.logs], self.urdf
 
         def run() -> None:
             given = {key: text if key == "mode" else _number(key, text) for key, text in controller.items()}
@@ -165,7 +175,7 @@ class Desk:
             out = self.folder / f"recording_{self.version}_{len(list(self.folder.glob('recording_*')))}"
             recording, understood = import_logs(out, logs, urdf, given, nominal=believed, columns=columns, **more)
             self._load(recording.folder)
-            self.notes = [*understood, *self.notes]
+            self.imported, self.notes = logs, [*understood, *self.notes]
 
         self.do("importing", run)
 
@@ -174,7 +184,7 @@ class Desk:
         bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
         self._renewed(bench)
         self.notes = [f"warning: {line}" for line in bench.opened.warnings]
-        self.logs, self.preview = [], None
+        self.logs, self.imported, self.preview = [], [], None
 
     def look(self, joint: str) -> None:
         """Take a first look at the candidates of a joint, unless it was taken."""

@@ -44,6 +44,7 @@ NOMINAL = {
     "reflected_inertia": "rotor inertia [kg m^2]",
 }
 AUTO, NONE = "by name and values", "-"
+TOGETHER, ALONE = "together with these", "left out"
 SAVE_CSV = """
 const link = document.createElement("a");
 link.href = URL.createObjectURL(new Blob([text.text], {type: "text/csv"}));
@@ -140,7 +141,8 @@ class Page:
             for name, units in (("time", TIME_UNITS), ("angle", ANGLE_UNITS), ("torque", TORQUE_UNITS))
         }
         words = (*self.gains.values(), self.mode, *self.nominal.values(), self.length, *self.units.values())
-        button = _row(self._button("Import", self._import, "primary"))
+        self.before = Select(title="logs imported before", options=[TOGETHER, ALONE], value=TOGETHER, width=200)
+        button = _row(self._button("Import", self._import, "primary"), self.before)
         self.importing = Column(
             self.waiting, self.table, self.columns, _row(*words), button, visible=False, sizing_mode="stretch_width"
         )
@@ -229,7 +231,8 @@ class Page:
             {name: text.value.strip() for name, text in texts.items() if text.value.strip()}
             for texts in (self.gains, self.nominal)
         )
-        self.desk.import_waiting(gains | {"mode": self.mode.value}, nominal, columns, units | length)
+        gains["mode"] = self.mode.value
+        self.desk.import_waiting(gains, nominal, columns, units | length, self.before.value == TOGETHER)
 
     def _again(self) -> None:
         if not self.showing:
@@ -337,6 +340,7 @@ class Page:
     def _show_import(self) -> None:
         desk, seen = self.desk, self.desk.preview
         self.importing.visible = bool(desk.logs) or (desk.urdf is not None and desk.bench is None)
+        self.before.visible = bool(desk.imported)
         names = [path.name for path in desk.logs]
         lacks = [what for what, there in (("a log", names), ("the URDF of the rig", desk.urdf)) if not there]
         text = f"To be imported: {', '.join(names)} with {desk.urdf.name if desk.urdf else '?'}"
