@@ -53,7 +53,7 @@ def test_seed_determines_everything() -> None:
 
 
 def reading(env: TransformedEnv, world: int) -> torch.Tensor:
-    moment = env.base_env._moments[world]
+    moment = env.base_env._time_steps[world]
     return torch.cat([torch.tensor(moment.joint_position), torch.tensor(moment.control_error)]).float()
 
 
@@ -93,7 +93,7 @@ def test_policy_cannot_see_the_object() -> None:
     for displacement in (0.0, 0.02):
         env.set_seed(0)
         data = step_mdp(env.step(env.reset().set("action", torch.zeros(1, 12))))
-        moments = list(base._moments)
+        moments = list(base._time_steps)
         object_part = moments[0].object_state.copy()
         object_part[:13] += displacement
         moments[0].object_state = object_part

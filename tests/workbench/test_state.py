@@ -41,7 +41,13 @@ def test_ten_lines_lead_from_a_recording_to_a_model_at_the_noise(bench: Workbenc
     assert (tmp_path / "model" / "report.html").is_file()
 
 
-def test_the_staircase_is_that_of_identify(bench: Workbench, measured: Recording) -> None:
+def test_what_any_law_could_explain_is_little_once_the_effect_is_there(bench: Workbench) -> None:
+    assert bench.explainable("a") > 0.8
+    bench.add(STRIBECK)
+    assert bench.explainable("a") < 0.2
+
+
+def test_the_error_by_stage_is_that_of_identify(bench: Workbench, measured: Recording) -> None:
     bench.add(STRIBECK)
     stages = identify_effects(measured, [STRIBECK], "fast", say=lambda line: None).stages
     mine = {stage.label: stage.errors.overall for stage in bench.stages}

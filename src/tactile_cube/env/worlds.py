@@ -45,7 +45,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         super().__init__(device="cpu", batch_size=[len(tasks)])
         self.tasks = list(tasks)
         self.curriculum = curriculum
-        self._moments: list[TimeStep] = []
+        self._time_steps: list[TimeStep] = []
         self._make_specs()
         self.set_progress(0, 0.0)
         self._seed_tasks(0)
@@ -96,21 +96,21 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
-        chosen = [True] * len(self.tasks) if mask is None or not self._moments else mask.flatten().tolist()
-        self._moments = [
-            task.reset() if start else self._moments[i]
+        chosen = [True] * len(self.tasks) if mask is None or not self._time_steps else mask.flatten().tolist()
+        self._time_steps = [
+            task.reset() if start else self._time_steps[i]
             for i, (task, start) in enumerate(zip(self.tasks, chosen, strict=True))
         ]
         return self._batch(with_reward=False)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         actions = tensordict.get("action").numpy()
-        self._moments = [task.step(action) for task, action in zip(self.tasks, actions, strict=True)]
+        self._time_steps = [task.step(action) for task, action in zip(self.tasks, actions, strict=True)]
         return self._batch(with_reward=True)
 
     def _batch(self, with_reward: bool) -> TensorDictBase:
         """All worlds' moments as one tensordict."""
-        moments, n = self._moments, len(self.tasks)
+        moments, n = self._time_steps, len(self.tasks)
         data: dict[str, torch.Tensor] = {
             "joint_position": _rows([m.joint_position for m in moments]),
             "control_error": _rows([m.control_error for m in moments]),

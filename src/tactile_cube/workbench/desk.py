@@ -35,6 +35,7 @@ class Desk:
         logs: files that wait to be imported; `urdf`: of their rig; `preview`: what is in the first.
         imported: those of the recording that is loaded, to which what came back from an experiment may be added.
         scores: a first look at the candidates, joint -> best first, of this version.
+        explainable: joint -> part of the missing torque that any law could explain, of this version.
         signature: the torque that the candidate looked at would supply.
         progress: of the diagnosis that runs or ran last; `found`: its answer.
         experiment: proposed; `commands`: its file as text.
@@ -57,6 +58,7 @@ class Desk:
 
     def _forget(self) -> None:
         self.scores: dict[str, list[Score]] = {}
+        self.explainable: dict[str, float] = {}
         self.signature: Missing | None = None
         self.signature_of: str = ""
         self.progress: list[str] = []
@@ -196,6 +198,7 @@ class Desk:
             if found is None:
                 self.look(joint)  # after what somebody is waiting for
             else:
+                self.explainable[joint] = self.bench.explainable(joint)
                 self.scores[joint] = found
 
         self.do(f"a first look at what may be missing at {joint}", run, asked=False)

@@ -397,8 +397,14 @@ class Page:
         every = sorted(bench.effect_names())
         _choose(self.another, [NONE, *(name for name in every if name not in hidden and name not in self.names)], NONE)
         lines = "".join(f"<div>{escape(one.effect)}: {escape(one.why)}</div>" for one in unseen)
+        reach = self.desk.explainable.get(joint)
+        bound = (
+            ""
+            if reach is None
+            else f" A black box of the logged signals explains {100 * reach:.0f} % of what is missing."
+        )
         self.unseen.text = (
-            "First look: the part of the squared error on the fitted trials that each would take away."
+            f"First look: the part of the squared error on the fitted trials that each would take away.{bound}"
             f'<details style="color:{FLOOR}"><summary>{len(unseen)} cannot be seen in these trials</summary>'
             f"{lines}</details>"
         )

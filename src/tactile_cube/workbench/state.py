@@ -27,7 +27,7 @@ from tactile_cube.identification.next_experiment import Experiment, next_experim
 from tactile_cube.identification.recommended import UNITS, model_file
 from tactile_cube.identification.search.division import BRIEF
 from tactile_cube.identification.search.evidence import Judgement
-from tactile_cube.identification.search.residual_shape import Missing, missing_torques
+from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques
 from tactile_cube.identification.search.screening import Score, screen
 from tactile_cube.identification.search.shortlist import resized
 from tactile_cube.identification.simulations import with_offsets
@@ -213,6 +213,10 @@ class Workbench:
     def share(self, score: Score) -> float:
         """Return the part of the squared error on the fitted trials that a candidate would take away."""
         return score.gain / max(self.stage.fit.cost, 1e-12)
+
+    def explainable(self, joint: str) -> float:
+        """Return the part of the missing torque that a black box of the logged signals explains: what any law could."""
+        return black_box(self.missing(joint), self.seed)
 
     def unseen(self, joint: str) -> list[Unseen]:
         """Return the effects that no trial could show at a joint, and why."""
