@@ -24,7 +24,7 @@ from tactile_cube.identification.search.residual_starts import residual_candidat
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.simulations import with_offsets
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
@@ -133,7 +133,7 @@ def divided(
     """
     recording = in_time(resolved(recording, effects, say, known), effects, say, known)
     fitted, held_out = held_out_split(recording, seed=seed)
-    return Search(fitted, held_out, sensor_noise(recording), effects, say, known), noise_floor(recording)
+    return Search(fitted, held_out, noise_with_links(recording), effects, say, known), noise_floor(recording)
 
 
 def _with_parameters(text: str) -> tuple[str, tuple[str, ...]]:

@@ -15,7 +15,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.search import Findings, Search
 from tactile_cube.identification.simulations import Simulations
 from tactile_cube.identification.verdict import Verdict, decide
-from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.simulator import Engine
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part
@@ -91,7 +91,7 @@ class Inquiry:
     def search_in(self, longer: int) -> Search:
         """In segments so many times as long as usual."""
         fitted, held_out, _ = self.parts
-        noise, folds = sensor_noise(self.recording), turned(fitted, held_out)
+        noise, folds = noise_with_links(self.recording), turned(fitted, held_out)
         return Search(fitted, held_out, noise, self.effects, self.say, self.known, self.criteria, folds, longer)
 
     @cached_property

@@ -8,7 +8,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.division import Division
-from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import noise_with_links
 from tactile_cube.measurement.recordings.description import MOST_LATE
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
@@ -55,7 +55,7 @@ def in_time(
 
 def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> tuple[float, float]:
     """Error of the base model [sensor noise], and when the joint that is read last is read [rows after its stamp]."""
-    shooting, noise = Shooting(recording, effects), sensor_noise(recording)
+    shooting, noise = Shooting(recording, effects), noise_with_links(recording)
     base = Division(shooting, recording, recording, noise, known=known, segments=SEGMENTS).fit_base()
     return base.error, float(base.fit.model.constants["reading_delay"].max() / recording.step)
 

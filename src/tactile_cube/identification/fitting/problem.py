@@ -35,7 +35,7 @@ class Problem:
         self.weight = windows.by_segment(windows.weight)
         self.measured = windows.by_segment(windows.measured)
         self.segment_trial = np.repeat(windows.trial, windows.segments)
-        self.run_away = np.tile(RUN_AWAY * shooting.per_joint("rad"), windows.segment)
+        self.run_away = np.tile(RUN_AWAY * shooting.per_joint("rad")[windows.joint_of], windows.segment)
         self.segment_initialisation = np.repeat(windows.initialisation, windows.segments)
         self._starts: Array = np.zeros((*self.weight.shape, 0))
         self._inverse: Array = np.zeros((len(self.weight), 0, 0))

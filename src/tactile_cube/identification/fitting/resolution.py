@@ -13,7 +13,7 @@ from tactile_cube.identification.fitting.base import base_unknowns, every_effect
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.time_step import finer, spread
-from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import noise_with_links
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
@@ -47,7 +47,7 @@ def resolved(
         known: the model to simulate; None: what the recording's owner states.
         beside: error of the model that the steps' error hides behind [sensor noise].
     """
-    noise = sensor_noise(recording)
+    noise = noise_with_links(recording)
 
     def error(one: Recording, times: int) -> float:
         start = nominal_model(one, known)
@@ -86,7 +86,7 @@ def stated_error(recording: Recording, effects: Sequence[type[Effect]], known: M
     """RMS error [sensor noise] of the model to begin with, nothing refitted, on windows spread over the recording."""
     start = nominal_model(recording, known)
     shooting = Shooting(recording, every_effect(effects, start))
-    problem = Problem(shooting, spread(shooting.cut(recording, sensor_noise(recording))))
+    problem = Problem(shooting, spread(shooting.cut(recording, noise_with_links(recording))))
     problem.linearise_starts(start)
     residual = problem.residual(problem.predictions([start])[0])
     return float(np.sqrt(problem.cost(residual).sum() / np.count_nonzero(problem.weight)))

@@ -55,21 +55,21 @@ class Shooting(Simulator):
         return np.array([scales.of(unit) for scales in self.scales])
 
     def positions(self, models: Sequence[Model], windows: Windows) -> Array:
-        """Measured positions that each model predicts, (models, S, K segment, n) [rad]."""
+        """Measured positions that each model predicts, (models, S, K segment, sensors) [rad]."""
         return self.simulate(models, [windows] * len(models))[:, 0]
 
     def positions_from(self, model: Model, initial_states: Sequence[Array], windows: Windows) -> Array:
-        """The same for one model from several `initial_state`s, (initial states, S, K segment, n) [rad]."""
+        """The same for one model from several `initial_state`s, (initial states, S, K segment, sensors) [rad]."""
         begun = [replace(windows, initial_state=one) for one in initial_states]
         return self.simulate([model] * len(begun), begun)[:, 0]
 
     def start_sensitivity(self, model: Model, windows: Windows) -> Array:
-        """D position / d start of each segment, (2 n, S, K segment, n): n start positions, then n start speeds."""
+        """D position / d start of each segment, (2 n, S, K segment, sensors): by n positions, then n speeds."""
         joints = len(self.recording.joints)
         correction = np.diag([*(POSITION_STEP * self.per_joint("rad")), *(SPEED_STEP * self.per_joint("rad/s"))])
         count = 2 * joints + 1
         moved = self.simulate([model] * count, [windows] * count, np.vstack([correction, np.zeros(2 * joints)]))[:, 0]
         # a simulation that ran away has no slope; it would swamp those of all others
-        most = self.per_joint("rad")
+        most = self.per_joint("rad")[windows.joint_of]
         change = np.clip(np.nan_to_num(moved[:-1] - moved[-1], nan=0.0), -most, most)
         return np.asarray(change / correction.max(axis=1)[:, None, None, None])

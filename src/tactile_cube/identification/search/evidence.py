@@ -83,7 +83,7 @@ def all_of(judgements: Sequence[Judgement]) -> Judgement:
 
 
 def _joint_errors(problem: Problem, residual: Array) -> Array:
-    """RMS (n,) of each joint's residual with the starts of segments taken out."""
+    """RMS (n,) of the residual of each joint's sensors with the starts of segments taken out."""
     squares, present = _joint_squares(problem, residual)
     return np.asarray(np.sqrt(np.maximum(squares.sum(axis=0), 0.0) / np.maximum(present.sum(axis=0), 1)))
 
@@ -96,9 +96,15 @@ def segment_errors(problem: Problem, residual: Array) -> Array:
 
 def _joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np.int64]]:
     """Squared residuals (G, n) with the starts taken out, and how many numbers were measured."""
-    shape = (len(residual), -1, problem.windows.measured.shape[2])
+    joint_of = problem.windows.joint_of
+    shape = (len(residual), -1, len(joint_of))
     present = np.count_nonzero(problem.weight.reshape(shape), axis=1)
-    return (residual * problem.free(residual)).reshape(shape).sum(axis=1), present
+    squares = (residual * problem.free(residual)).reshape(shape).sum(axis=1)
+    joints = len(problem.shooting.recording.joints)
+    for sensor in range(joints, len(joint_of)):
+        squares[:, joint_of[sensor]] += squares[:, sensor]
+        present[:, joint_of[sensor]] += present[:, sensor]
+    return squares[:, :joints], present[:, :joints]
 
 
 def gain(before: Judgement, after: Judgement) -> float:

@@ -66,9 +66,10 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
         residual: (G, R) weighted measured - predicted.
     """
     n, segment = len(recording.joints), problem.windows.segment
-    weight = problem.weight.reshape(-1, segment, n)
-    error = np.divide(residual.reshape(weight.shape), weight, out=np.zeros_like(weight), where=weight > 0)
-    measured = problem.measured.reshape(weight.shape)
+    weight, measured, left = (
+        one.reshape(len(residual), segment, -1)[..., :n] for one in (problem.weight, problem.measured, residual)
+    )
+    error = np.divide(left, weight, out=np.zeros_like(weight), where=weight > 0)
     fine = problem.windows.substeps
     commands = problem.windows.commands[:, problem.windows.history * fine :: fine].reshape(weight.shape)
     step = recording.step

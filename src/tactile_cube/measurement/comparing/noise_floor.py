@@ -171,15 +171,24 @@ SMALLEST = 1e-6  # part of the range of motion
 
 def sensor_noise(recording: Recording) -> Array:
     """White part (n,) of the position signals [rad], robust against jumps; at least what the owner states of it."""
-    positions = np.concatenate([trial.position for trial in recording.trials])
-    least = SMALLEST * np.ptp(positions, axis=0)
-    estimates = [
-        [_white(trial.position[trial.valid, j]) for j in range(len(recording.joints))] for trial in recording.trials
-    ]
     sensors = recording.description.sensors
     stated = np.hypot(sensors.position_resolution / np.sqrt(12.0), sensors.position_noise)
-    white = np.median(np.array(estimates), axis=0)
-    return np.asarray(np.maximum(white, np.maximum(stated, least)))
+    joints = range(len(recording.joints))
+    return np.array([_noise([t.position[t.valid, j] for t in recording.trials], stated) for j in joints])
+
+
+def noise_with_links(recording: Recording) -> Array:
+    """The same, and after it that of the sensors on links, nan where there are none (2 n,) [rad]."""
+    noise = np.concatenate([sensor_noise(recording), np.full(len(recording.joints), np.nan)])
+    for j in recording.linked:
+        shown = [t.link_position[t.valid, j] for t in recording.trials if t.link_position is not None and j in t.linked]
+        noise[len(recording.joints) + j] = _noise(shown)
+    return noise
+
+
+def _noise(signals: Sequence[Array], stated: float = 0.0) -> float:
+    least = SMALLEST * float(np.ptp(np.concatenate(signals)))
+    return max(float(np.median([_white(signal) for signal in signals])), stated, least)
 
 
 def _white(signal: Array) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.recordings.description import Controller, Description, PerJoint, Sensors, TrialEntry
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -29,6 +30,8 @@ class TrialArrays:
         torque: measured joint torques (n, joints) [N m]; None: not measured.
         kind: of excitation; trials of one kind repeat one command.
         initialisation: of the robot that it belongs to; each has joint offsets of its own.
+        link_position: measured on the link side (n, joints) [rad], nan where a joint has no sensor; None: nowhere.
+        feedforward: torques (n, joints) [N m] that the controller added to its own; None: it added none.
     """
 
     command: ArrayLike
@@ -36,6 +39,8 @@ class TrialArrays:
     torque: ArrayLike | None = None
     kind: str = "unspecified"
     initialisation: int = 0
+    link_position: ArrayLike | None = None
+    feedforward: ArrayLike | None = None
 
 
 def recording_from_arrays(
@@ -98,16 +103,20 @@ def recording_from_arrays(
 
 
 def _table(trial: TrialArrays, number: int, joints: int, rate: float) -> TrialTable:
-    command = _signal(trial.command, "command", number, joints)
-    position = _signal(trial.position, "position", number, joints)
-    torque = None if trial.torque is None else _signal(trial.torque, "torque", number, joints)
-    for name, signal in (("position", position), ("torque", torque)):
+    given = {name: getattr(trial, name) for name in SIGNALS}
+    signals = {name: None if one is None else _signal(one, name, number, joints) for name, one in given.items()}
+    command, position = signals["command"], signals["position"]
+    assert command is not None
+    assert position is not None
+    for name, signal in signals.items():
         if signal is not None and len(signal) != len(command):
             raise InputError(f"trials[{number}]: {name} has {len(signal)} samples, command has {len(command)}")
     entry = TrialEntry(
         file=f"trials/{trial.kind}_{number}.parquet", initialisation=trial.initialisation, kind=trial.kind
     )
-    return TrialTable(entry, np.arange(len(command)) / rate, command, position, torque)
+    time = np.arange(len(command)) / rate
+    link_position, feedforward = signals["link_position"], signals["feedforward"]
+    return TrialTable(entry, time, command, position, signals["torque"], None, link_position, feedforward)
 
 
 def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[np.float64]:

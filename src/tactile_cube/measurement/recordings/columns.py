@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +15,29 @@ from tactile_cube.measurement.recordings.tables import Table
 
 Array = NDArray[np.float64]
 MINIMUM_SAMPLES = 20
-SIGNALS = ("command", "position", "torque")
+SIGNALS = ("command", "position", "torque", "link_position", "feedforward")
+"""Of a joint; command and position it must have."""
 
 
 @dataclass(frozen=True)
 class TrialColumns:
-    """A trial as written in its file: time (n,) and signals (n, joints); torque is None where it was not measured."""
+    """A trial as written in its file: time (n,) and signals (n, joints), None where no joint has them.
+
+    A joint without a sensor on its link has nan in `link_position`; one without a feed-forward torque has 0 there.
+    """
 
     time: Array
     command: Array
     position: Array
     torque: Array | None
+    link_position: Array | None = None
+    feedforward: Array | None = None
+
+    def rows(self, chosen: NDArray[np.bool_]) -> TrialColumns:
+        """Some of the rows."""
+        signals = {field.name: getattr(self, field.name) for field in fields(self)}
+        chosen_rows: dict[str, Any] = {name: None if one is None else one[chosen] for name, one in signals.items()}
+        return TrialColumns(**chosen_rows)
 
 
 def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[TrialColumns, list[str]]:
@@ -47,6 +60,8 @@ def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Tri
         _stack(table, joints, "command", path),
         _stack(table, joints, "position", path),
         torque,
+        _of_some(table, joints, "link_position", np.nan, path),
+        _of_some(table, joints, "feedforward", 0.0, path),
     )
     return columns, warnings + torque_warnings
 
@@ -69,6 +84,15 @@ def _torque(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Array | 
 
 def _stack(table: Table, joints: tuple[str, ...], signal: str, path: Path) -> Array:
     return np.stack([_finite(table, f"{joint}.{signal}", path) for joint in joints], axis=1)
+
+
+def _of_some(table: Table, joints: tuple[str, ...], signal: str, lacking: float, path: Path) -> Array | None:
+    """A signal (n, joints) that some joints have, or None where none has it."""
+    names = [f"{joint}.{signal}" for joint in joints]
+    if not any(name in table for name in names):
+        return None
+    rest = np.full(len(table["time"]), lacking)
+    return np.stack([_finite(table, name, path) if name in table else rest for name in names], axis=1)
 
 
 def _finite(table: Table, name: str, path: Path) -> Array:

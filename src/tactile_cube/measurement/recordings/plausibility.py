@@ -20,6 +20,7 @@ IN_MILLIMETRES = "this looks like mm, recordings are in m: import it by record s
 SLACK = 0.1  # [rad] beyond a joint's limit that offsets and soft stops explain
 WRAP = 0.5  # [rad] within which a jump is a whole turn; no joint turns so far in a row
 SMOOTH = 0.05  # of the command's scatter, below which a position is none that a sensor measured
+LEAST_FOLLOWED = 0.2  # part of a motor's motion that a link makes, whatever the gap between them
 MOVES = 0.02  # [rad] range below which a signal says nothing about its neighbours
 
 
@@ -164,3 +165,38 @@ def _correlation(first: Array, second: Array) -> float:
     a, b = first - first.mean(), second - second.mean()
     scale = float(np.sqrt(np.sum(a * a) * np.sum(b * b)))
     return float(np.sum(a * b)) / scale if scale > 0 else 0.0
+
+
+def check_links(columns: TrialColumns, joints: tuple[str, ...], path: Path) -> None:
+    """Refuse a sensor on a link in another unit than its motor's, or before its gear.
+
+    Raises:
+        InputError: a link moves clearly more or less than its motor.
+    """
+    if columns.link_position is None:
+        return
+    for link, motor, joint in zip(columns.link_position.T, columns.position.T, joints, strict=True):
+        moved = motor - motor.mean()
+        if np.isnan(link).all() or np.ptp(motor) < MOVES:
+            continue
+        ratio = float(moved @ (link - link.mean()) / (moved @ moved))
+        if not LEAST_FOLLOWED < ratio < 1.0 / LEAST_FOLLOWED:
+            raise InputError(
+                f"{path}: column '{joint}.link_position' moves {ratio:.4g} times as far as '{joint}.position'; both "
+                "are the joint's angle [rad]: divide a motor's by its gear ratio, and look at signs and units"
+            )
+
+
+def check_feedforward(columns: TrialColumns, joints: tuple[str, ...], gains: Gains, path: Path) -> None:
+    """Refuse a torque beside a controller that has none of its own.
+
+    Raises:
+        InputError: a joint without stiffness has a feed-forward torque.
+    """
+    if columns.feedforward is None:
+        return
+    for j in np.flatnonzero((gains.kp == 0.0) & np.any(columns.feedforward != 0.0, axis=0)):
+        raise InputError(
+            f"{path}: column '{joints[j]}.feedforward' has torques, but controller.kp is 0; where torques alone moved "
+            "the joint, they are its command, with controller.mode: torque"
+        )

@@ -23,6 +23,8 @@ from tactile_cube.measurement.recordings.consistency import (
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.plausibility import (
     check_assignment,
+    check_feedforward,
+    check_links,
     check_roles,
     check_units,
     without_wraps,
@@ -101,6 +103,9 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         warnings += check_units(columns, ranges, gains, path)
         warnings += check_assignment(columns, ranges, path) if entry.object is None else []
         warnings += check_roles(columns, joints, path)
+    check_links(columns, joints, path)
+    if description.controller.mode == "position":
+        check_feedforward(columns, joints, gains, path)
     columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, description.rate_hz)
     stamps = (columns.time[outlying] - columns.time[0]) * description.rate_hz
@@ -122,6 +127,8 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         entry.touch,
         tuple(warnings + time_warnings + single),
         load_of(description.object, entry.object) if description.object and entry.object else None,
+        grid.link_position,
+        grid.feedforward,
     )
 
 
@@ -145,16 +152,4 @@ def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key
         kept &= (trial.time < start) | (trial.time >= end)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(int)))
     pieces = [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= MINIMUM_SAMPLES]
-    return [_piece(trial, rows, f"{trial.name}_{number}") for number, rows in enumerate(pieces)]
-
-
-def _piece(trial: Trial, rows: slice, name: str) -> Trial:
-    return replace(
-        trial,
-        name=name,
-        time=trial.time[rows] - trial.time[rows.start],
-        command=trial.command[rows],
-        position=trial.position[rows],
-        torque=None if trial.torque is None else trial.torque[rows],
-        valid=trial.valid[rows],
-    )
+    return [trial.cut(rows, f"{trial.name}_{number}") for number, rows in enumerate(pieces)]

@@ -58,6 +58,11 @@ class Recording:
         return tuple(self.description.joints)
 
     @property
+    def linked(self) -> NDArray[np.int64]:
+        """Joints with a sensor on their link in any trial."""
+        return np.unique(np.concatenate([trial.linked for trial in self.trials]))
+
+    @property
     def coupled(self) -> dict[str, Coupling]:
         """Joints that follow another one."""
         return self.description.coupled

@@ -71,8 +71,7 @@ def _without_repeats(columns: TrialColumns, path: Path) -> tuple[TrialColumns, l
     if keep.all():
         return columns, []
     row = int(np.argmin(keep))
-    torque = None if columns.torque is None else columns.torque[keep]
-    shorter = TrialColumns(columns.time[keep], columns.command[keep], columns.position[keep], torque)
+    shorter = columns.rows(keep)
     if len(shorter.time) < 2:
         raise InputError(f"{path}: column 'time', row {row}: all rows have the same time {columns.time[0]:.6g} s")
     return shorter, [
@@ -100,7 +99,7 @@ def _require_rate(gaps: Array, rate: float, path: Path) -> None:
 def on_grid(columns: TrialColumns, rate: float) -> tuple[TrialColumns, NDArray[np.bool_]]:
     """Columns at uniform time steps from 0, and which samples are not bridged over a gap.
 
-    Positions and torques are interpolated; a command is held until the next one, as a controller does.
+    Positions and measured torques are interpolated; commands are held until the next ones, as a controller does.
     """
     time = columns.time - columns.time[0]
     grid = np.arange(int(np.floor(time[-1] * rate + 0.5)) + 1) / rate
@@ -111,9 +110,12 @@ def on_grid(columns: TrialColumns, rate: float) -> tuple[TrialColumns, NDArray[n
     valid = (time[after] - time[after - 1]) * rate <= DROPPED
     valid |= np.minimum(np.abs(grid - time[after]), np.abs(grid - time[after - 1])) * rate < ON_GRID
     held = np.searchsorted(time, grid + ON_GRID / rate, side="right") - 1
-    torque = None if columns.torque is None else _interpolated(grid, time, columns.torque)
-    return TrialColumns(grid, columns.command[held], _interpolated(grid, time, columns.position), torque), valid
+    measured = (columns.position, columns.torque, columns.link_position)
+    position, torque, link_position = (_interpolated(grid, time, one) for one in measured)
+    assert position is not None
+    feedforward = None if columns.feedforward is None else columns.feedforward[held]
+    return TrialColumns(grid, columns.command[held], position, torque, link_position, feedforward), valid
 
 
-def _interpolated(grid: Array, time: Array, values: Array) -> Array:
-    return np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
+def _interpolated(grid: Array, time: Array, values: Array | None) -> Array | None:
+    return None if values is None else np.stack([np.interp(grid, time, column) for column in values.T], axis=1)

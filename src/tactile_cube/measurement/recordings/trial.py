@@ -1,7 +1,7 @@
 """One trial on a uniform time grid: what was commanded and what was measured."""
 
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,8 @@ class Trial:
         clamped: the links were held still.
         touch: the link ended at a known place, or None.
         load: the object that the hand held, or None.
+        link_position: (n, joints) measured on the link side [rad], nan where a joint has no sensor there; or None.
+        feedforward: (n, joints) torque that the controller added to its own [N m], acting like `command`; or None.
     """
 
     name: str
@@ -90,6 +92,14 @@ class Trial:
     touch: Touch | None = None
     warnings: tuple[str, ...] = field(default=(), repr=False)
     load: Load | None = None
+    link_position: Array | None = None
+    feedforward: Array | None = None
+
+    @property
+    def linked(self) -> NDArray[np.int64]:
+        """Joints with a sensor on their link."""
+        none = np.zeros(0, dtype=np.int64)
+        return none if self.link_position is None else np.flatnonzero(np.isfinite(self.link_position[0]))
 
     @property
     def is_bench(self) -> bool:
@@ -118,6 +128,13 @@ class Trial:
 
     def with_earlier_commands(self, rows: int) -> Self:
         """The trial with its commands so many rows earlier; of its last rows nothing is known then."""
-        command = np.concatenate([self.command[rows:], np.repeat(self.command[-1:], rows, axis=0)])[: len(self.valid)]
+        later = np.minimum(np.arange(len(self.valid)) + rows, len(self.valid) - 1)
+        feedforward = None if self.feedforward is None else self.feedforward[later]
         known = np.arange(len(self.valid)) < len(self.valid) - rows
-        return replace(self, command=command, valid=self.valid & known)
+        return replace(self, command=self.command[later], feedforward=feedforward, valid=self.valid & known)
+
+    def cut(self, rows: slice, name: str) -> Self:
+        """Some of the trial's rows as a trial that starts at 0."""
+        signals = ("command", "position", "torque", "valid", "link_position", "feedforward")
+        parts: dict[str, Any] = {key: None if (one := getattr(self, key)) is None else one[rows] for key in signals}
+        return replace(self, name=name, time=self.time[rows] - self.time[rows.start], **parts)

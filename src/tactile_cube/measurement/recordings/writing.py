@@ -13,6 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
 from tactile_cube.measurement.recordings.recording import Recording
@@ -23,9 +24,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TrialTable:
-    """One trial to be written: its entry, time (n,) [s] and signals (n, joints); torque may be None.
+    """One trial to be written: its entry, time (n,) [s] and signals (n, joints); only the first two must be there.
 
-    `origin` is the file that it was read from.
+    `link_position` has nan where a joint has no sensor there. `origin` is the file that it was read from.
     """
 
     entry: TrialEntry
@@ -34,6 +35,8 @@ class TrialTable:
     position: Array
     torque: Array | None = None
     origin: Path | None = None
+    link_position: Array | None = None
+    feedforward: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -78,10 +81,10 @@ def write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
     """Write one trial as Parquet, CSV or NPZ, by the ending of `path`; signals as 32-bit numbers, time as 64-bit."""
     columns: dict[str, NDArray[np.floating]] = {"time": table.time}
     for index, joint in enumerate(joints):
-        columns[f"{joint}.command"] = table.command[:, index].astype(np.float32)
-        columns[f"{joint}.position"] = table.position[:, index].astype(np.float32)
-        if table.torque is not None:
-            columns[f"{joint}.torque"] = table.torque[:, index].astype(np.float32)
+        for signal in SIGNALS:
+            values = getattr(table, signal)
+            if values is not None and not np.isnan(values[:, index]).all():
+                columns[f"{joint}.{signal}"] = values[:, index].astype(np.float32)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".npz":
         np.savez_compressed(path, allow_pickle=False, **columns)

@@ -16,7 +16,7 @@ from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
-from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, TORQUE
+from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -130,7 +130,7 @@ class Simulator:
             torques: whether to give torques as well.
 
         Returns:
-            What a log would show, (M, 1 or 2, S, K segment, n): positions [rad] and torques [N m].
+            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and torques [N m].
         """
         out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
         if corrections is None:
@@ -176,26 +176,30 @@ class Simulator:
         gap = gaps(self.plant, memory[0])
         ratios = self._jump_ratios(memory, windows)
         limit = self.plant.view(memory, "torque_limit")[:, None].copy()
-        rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, *([LEAD, LOOP_GAIN] if gap.any() else [])])
-        signals = np.zeros((len(windows), out.shape[2] * windows.substeps, len(rows), out.shape[3]))
+        rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, POSITION, *([LEAD, LOOP_GAIN] if gap.any() else [])])
+        joints = len(self.recording.joints)
+        signals = np.zeros((len(windows), out.shape[2] * windows.substeps, len(rows), joints))
         if self._world is not None:
             self._in_world(self._world, windows, memory, rows, signals)
         else:
             self._in_closed_form(windows, correction, memory, rows, signals, pool)
         jump = simulated_jumps(signals[:, :, 2], windows)
         shown = signals[:, :: windows.substeps]
-        free = free_way(self.plant, memory[:, None], jump, shown[:, :, 3], shown[:, :, 4]) if gap.any() else 0.0
+        free = free_way(self.plant, memory[:, None], jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
         position, torque = read_out(shown[:, :, 0], shown[:, :, 1], jump, ratios, limit, free)
         far = asks_for_much(jump, self.plant.view(memory, "kp")[:, None], limit)
         if far.any():
             before, known = before_steps(signals[:, :, :2], windows.segment, windows.substeps)
             far &= known[:, None]
             position, torque = np.where(far, before[:, :, 0], position), np.where(far, before[:, :, 1], torque)
-        out[0] = self._as_read(position, model, windows)
-        out[1:] = torque
+        links = shown[:, :, 3, windows.joint_of[joints:]]
+        out[0] = self._as_read(np.concatenate([position, links], axis=2), model, windows)
+        out[1:, ..., :joints] = torque
+        if links.size:
+            _zero_links(out[0], windows, joints)
 
     def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
-        """Positions (S, K segment, n) as old as the log reads them, within each segment."""
+        """Positions (S, K segment, M) as old as the log reads them, within each segment."""
         delay = model.constants.get("reading_delay", np.zeros(1))
         if not delay.any():
             return position
@@ -265,7 +269,8 @@ class Simulator:
         self.plant.view(memory, "brake")[windows.clamped] = CLAMPED
         for k, force in enumerate(windows.forces):
             if force is not None:
-                resting = np.average(windows.measured[k], axis=0, weights=windows.weight[k, :, 0])
+                measured = windows.measured[k, :, : len(self.recording.joints)]
+                resting = np.average(measured, axis=0, weights=windows.weight[k, :, 0])
                 self.plant.view(memory, "external_torque")[k] = force_torque(self.tree, force, resting)
         wind_up(self.plant, model, windows, memory)
         return memory
@@ -291,6 +296,21 @@ class Simulator:
                 j = self.recording.joints.index(term.joint)
                 links[:, j] -= smooth_lead(torque[:, j], term.values["smooth"], term.values["softness"])
         return links
+
+
+def _zero_links(shown: Array, windows: Windows, joints: int) -> None:
+    """Shift what sensors on links show (S, K segment, M), for their zero is nobody's.
+
+    In each trial the mean of what a link is ahead of its motor becomes the measured one.
+    """
+    motors = windows.joint_of[joints:]
+    ahead = (windows.measured - shown)[..., joints:] - (windows.measured - shown)[..., motors]
+    known = np.where(windows.weight[..., joints:] > 0.0, ahead, np.nan)
+    for trial in np.unique(windows.trial):
+        own = windows.trial == trial
+        for k in range(len(motors)):
+            if np.isfinite(part := known[own, :, k]).any():
+                shown[own, :, joints + k] += np.nanmean(part)
 
 
 def _pybullet(plant: Plant) -> RigWorld:

@@ -25,6 +25,7 @@ HISTORY = 8.0  # [s] of commands before a window at most, for effects that remem
 WAKING = 0.15  # [s] of the first command before a free run, for effects with a memory
 LONGEST_STEP = 0.0021  # [s] of the simulation; of a finger, as all times here
 FEWEST = 4  # samples that a window after a trial's first one needs
+NO_LINKS = np.zeros(0, dtype=np.int64)
 ROWS = (
     "commands",
     "measured",
@@ -53,14 +54,14 @@ MANY = 12  # samples around a start that suffice for a polynomial of fourth degr
 
 @dataclass(frozen=True)
 class Windows:
-    """S windows of K segments of `segment` rows each; n joints.
+    """S windows of K segments of `segment` rows each; n joints; M sensors: the motors', then those on links.
 
     Attributes:
         commands: (S, (H + K segment) substeps, n) what each step takes, after `history` rows of the past [rad].
-        measured: (S, K segment, n) measured positions [rad].
+        measured: (S, K segment, M) measured positions [rad].
         jump: (S, K segment, n) command of the step at each reading less the one that the log feels: half the change of
             the command, or of what the torque reaches [rad].
-        weight: (S, K segment, n) 1 / sensor noise; 0 where nothing was measured [1/rad].
+        weight: (S, K segment, M) 1 / sensor noise; 0 where nothing was measured [1/rad].
         position: (S, K, n) measured position at each segment's start, under the mean command of the jump there [rad].
         speed: (S, K, n) [rad/s].
         acceleration: (S, K, n) measured at each segment's start, a gauge of how well the speed is known [rad/s^2].
@@ -76,6 +77,7 @@ class Windows:
         wound: (S, n) what the integral of a controller holds beyond balance as the trial begins [N m].
         errors: of each window, (rows before it, n) errors of the trial's position times the sampling step [rad s].
         forces: known forces on a link, or None.
+        joint_of: (M,) joint that each sensor belongs to.
         history: H.
         segment: rows of a segment.
         substeps: simulation steps from row to row.
@@ -99,6 +101,7 @@ class Windows:
     wound: Array
     errors: tuple[Array, ...]
     forces: tuple[KnownForce | None, ...]
+    joint_of: NDArray[np.int64]
     history: int
     segment: int
     substeps: int
@@ -146,7 +149,7 @@ def cut(
 
     Args:
         recording: gives the joints and the sampling step.
-        noise: (n,) standard deviation of the position sensor of each joint [rad].
+        noise: (n,) standard deviation of the position sensor of each joint, or (2 n,) with those on links [rad].
         trials: all of the recording's by default.
         segment: rows of a segment; as short as identification likes it by default.
         time: what a second of a finger stands for [s].
@@ -159,12 +162,15 @@ def cut(
     forward = max(rows - LEAD * segment, segment)  # from the start of a window to that of the next one
     history = min(round(HISTORY * time / recording.step), (longest - 1) // forward * forward)
     substeps = steps_per_row(recording, time)
+    links = np.unique(np.concatenate([trial.linked for trial in trials]))
+    joints = len(recording.joints)
+    noise = noise[[*range(joints), *(joints + links)]]
     pieces = [
         piece
         for k, trial in enumerate(trials)
-        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time, speed, substeps)
+        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time, speed, substeps, links)
     ]
-    return _stacked(pieces, history, segment, substeps)
+    return _stacked(pieces, history, segment, substeps, links)
 
 
 def whole_trials(recording: Recording, trials: Sequence[Trial], substeps: int, time: float = 1.0) -> Windows:
@@ -185,13 +191,17 @@ def whole_trials(recording: Recording, trials: Sequence[Trial], substeps: int, t
     return _stacked(pieces, history, longest, substeps)
 
 
-def _stacked(pieces: Sequence[Mapping[str, object]], history: int, segment: int, substeps: int) -> Windows:
+def _stacked(
+    pieces: Sequence[Mapping[str, object]], history: int, segment: int, substeps: int, links: Rows = NO_LINKS
+) -> Windows:
     columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     forces, errors = (tuple(piece[key] for piece in pieces) for key in ("force", "errors"))
+    joints = columns["position"].shape[2]
     return Windows(
         **columns,
         forces=forces,  # type: ignore[arg-type]
         errors=errors,  # type: ignore[arg-type]
+        joint_of=np.concatenate([np.arange(joints), links]),
         history=history,
         segment=segment,
         substeps=substeps,
@@ -210,7 +220,10 @@ def _pieces(
     time: float,
     speed_known: Array | float,
     substeps: int,
+    links: Rows = NO_LINKS,
 ) -> Iterator[dict[str, object]]:
+    measured, seen = _shown(trial, links)
+    noise, every = noise[: trial.position.shape[1]], noise
     fine, jump = _as_simulated(recording, trial, substeps)
     command, after = _around(_as_positions(recording, trial), recording.read)
     errors = trial.step * (after[:-1] - 0.5 * (trial.position[:-1] + trial.position[1:]))
@@ -231,9 +244,9 @@ def _pieces(
             trial_start = np.stack([position[0], fine[0, 0], speed[0]])
         yield {
             "commands": _rows(fine, first - history, first + rows).reshape((history + rows) * substeps, -1),
-            "measured": trial.position[usable],
+            "measured": measured[usable],
             "jump": np.where((span < len(trial.time))[:, None], jump[usable], 0.0),
-            "weight": present[:, None] / noise,
+            "weight": present[:, None] * seen / every,
             "position": position,
             "speed": speed,
             "acceleration": acceleration,
@@ -251,9 +264,24 @@ def _pieces(
         }
 
 
+def _shown(trial: Trial, links: Rows) -> tuple[Array, NDArray[np.bool_]]:
+    """What a trial's sensors read (T, M) [rad], and which of them it has (M,)."""
+    if not len(links):
+        return trial.position, np.ones(trial.position.shape[1], dtype=bool)
+    both = trial.position[:, links] if trial.link_position is None else trial.link_position[:, links]
+    has = np.isin(links, trial.linked)
+    shown = np.concatenate([trial.position, np.where(has, both, trial.position[:, links])], axis=1)
+    return shown, np.concatenate([np.ones(trial.position.shape[1], dtype=bool), has])
+
+
 def _as_positions(recording: Recording, trial: Trial) -> Array:
-    """A trial's commands (T, n) as positions [rad]."""
-    return np.asarray(trial.command / (TORQUE_MODE_GAIN if recording.torque_controlled else 1.0))
+    """A trial's commands (T, n) as positions [rad], with what a feed-forward torque adds at the stated stiffness."""
+    if recording.torque_controlled:
+        added = 0.0 if trial.feedforward is None else trial.feedforward
+        return np.asarray((trial.command + added) / TORQUE_MODE_GAIN)
+    if trial.feedforward is None:
+        return trial.command
+    return np.asarray(trial.command + trial.feedforward / trial.gains.kp)
 
 
 def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Array, Array]:
