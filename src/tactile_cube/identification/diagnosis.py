@@ -168,7 +168,7 @@ def in_long_steps_first(asked: Inquiry) -> Inquiry:
         asked.say(f"{_steps(fine)} steps of simulation a sample")
         return replace(asked, recording=fine)
     asked.say(f"{_steps(quick)} steps of simulation a sample, {_steps(fine)} where the noise is reached")
-    first = replace(asked, recording=quick)
+    first = replace(asked, recording=quick, finer=_steps(fine) // _steps(quick))
     verdict = first.first.verdict
     needed = resolved(recording, effects, said.append, known, verdict.chosen.error / FAR_OFF)
     if _steps(needed) == _steps(quick):

@@ -64,6 +64,7 @@ class Inquiry:
         known: the model to begin with; None: what the recording's owner states.
         criteria: what decides.
         known_answer: explanations that are asked of first; all others only where those are not the whole of it.
+        finer: times as short are the steps of simulation that its sensors call for.
     """
 
     recording: Recording
@@ -75,6 +76,7 @@ class Inquiry:
     known: ModelFile | None
     criteria: Criteria
     known_answer: tuple[Explanation, ...] = ()
+    finer: int = 1
 
     @cached_property
     def parts(self) -> tuple[Recording, Recording, Recording | None]:
@@ -91,8 +93,8 @@ class Inquiry:
     def search_in(self, longer: int) -> Search:
         """In segments so many times as long as usual."""
         fitted, held_out, _ = self.parts
-        noise, folds = noise_with_links(self.recording), turned(fitted, held_out)
-        return Search(fitted, held_out, noise, self.effects, self.say, self.known, self.criteria, folds, longer)
+        asked = (self.effects, self.say, self.known, self.criteria, turned(fitted, held_out), longer, self.finer)
+        return Search(fitted, held_out, noise_with_links(self.recording), *asked)
 
     @cached_property
     def answer(self) -> Answer:

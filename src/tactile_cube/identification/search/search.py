@@ -15,6 +15,7 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import every_effect
 from tactile_cube.identification.fitting.error_growth import steady_rows
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
+from tactile_cube.identification.fitting.resolution import step_error
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.candidates import Candidate, candidates
 from tactile_cube.identification.search.division import BRIEF, LONG, SEGMENTS, Division, some
@@ -40,6 +41,7 @@ Array = NDArray[np.float64]
 REFITTED, RACED, FINALISTS = 14, 6, 4  # candidates that are refitted briefly, at length, and with everything free
 RESTARTED, PROBED = 2, 3  # finalists that are tried from other values, and the most promising of these values
 FAR_BEHIND = 2.5  # squared error over the best one's at which a refitted candidate is given up
+HIDING = 2.0  # times the error of steps that an error may be which they hide
 FAR_BEHIND_AT_FLOOR = 2.0  # the same where the best one explains nearly everything
 DEEPEST = 3  # effects in combination
 BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
@@ -94,6 +96,7 @@ class Search(Division):
         criteria: Criteria = STANDARD,
         folds: Sequence[Divided] = (),
         longer: int = 1,
+        finer: int = 1,
     ) -> None:
         """Prepare the problems.
 
@@ -108,6 +111,7 @@ class Search(Division):
             folds: the same trials divided in other ways, for where these few held-out trials do not tell.
             longer: times as long as usual that segments are, and as few, unless small errors grow in them; more than
                 once, no sets of effects are looked for, which takes minutes and has been done in the usual ones.
+            finer: times as short are the steps of simulation that the sensors call for.
         """
         start = nominal_model(fitted, known)
         effects = every_effect(effects, start)
@@ -118,7 +122,7 @@ class Search(Division):
         segments = min(SEGMENTS, SEGMENTS * usual.segment // segment)
         super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
         self.say, self.criteria, self.effects, self.folds = say, criteria, effects, folds
-        self.sets = longer == 1
+        self.sets, self.finer_steps = longer == 1, finer
         self.candidates = candidates(shooting.sizes, effects)
         self.last_scores: list[Score] = []
         self.leaders: list[Proposal] = []
@@ -138,7 +142,7 @@ class Search(Division):
         found = [e for level in levels for e in level]
         best = min(found, key=lambda e: e.error, default=base)
         surpassed: list[Explanation] = []
-        if self.sets and not standard and best.error > self.criteria.far:
+        if self.sets and not standard and best.error > self.criteria.far and not self.hidden_by_steps(best):
             folds = [
                 Division(self.shooting, *one, self.noise, self.segment, self.known, self.segments) for one in self.folds
             ]
@@ -156,6 +160,13 @@ class Search(Division):
             levels = [(shared,)] if shared else []
         unproven = tuple(sorted(doubtful, key=lambda e: e.error))
         return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed))
+
+    def hidden_by_steps(self, one: Explanation) -> bool:
+        """Whether what an explanation leaves may be the error of its steps of simulation."""
+        if self.finer_steps == 1:
+            return False
+        steps = step_error(self.fitted, self.shooting, one.fit.model, self.noise, self.finer_steps)
+        return bool(one.error < np.hypot(1.0, HIDING * steps))
 
     def among(self, known: Sequence[Explanation]) -> Findings:
         """The same of explanations that are known, and no others."""
