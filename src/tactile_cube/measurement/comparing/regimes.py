@@ -43,9 +43,10 @@ def regimes(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[s
             for name, part in parts.items():
                 mask = part & np.isfinite(error)
                 if mask.sum() >= FEWEST:
-                    lag, rms = np.mean(error[mask] * direction[mask]), np.sqrt(np.mean(error[mask] ** 2))
-                    numbers = map(float, (rms, error[mask].mean(), lag, mask.mean()))
-                    table.append(Regime(joint, dimension, name, *numbers, int(mask.sum())))
+                    here = error[mask]
+                    rms, lag = float(np.sqrt(np.mean(here**2))), float(np.mean(here * direction[mask]))
+                    row = (rms, float(here.mean()), lag, float(mask.mean()), int(mask.sum()))
+                    table.append(Regime(joint, dimension, name, *row))
     return table
 
 
