@@ -153,22 +153,21 @@ def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object,
     from tactile_cube.measurement.recordings.description import TrialEntry
     from tactile_cube.measurement.replay.model import Model, terms_of
     from tactile_cube.measurement.replay.simulator import Simulator
-    from tactile_cube.measurement.sources import session
+    from tactile_cube.measurement.sources.session import silent_trial, unmeasured
     from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 
     config = called_job("record", ("source=finger", "out=unused")).config.source
-    source = SimulatedRig(controller=config.controller, nominal=config.nominal, duration=6.0, reach=0.5)
-    rig = source._rig()
-    description = source._description(rig)
-    constants = session.true_constants(
-        dict(config.controller) | dict(config.nominal), tuple(description.joints), 0.0, np.random.default_rng(0)
+    source = SimulatedRig(
+        controller=config.controller, nominal=config.nominal, true_spread=0.0, duration=6.0, reach=0.5
     )
-    empty = session.unmeasured(description, rig, constants)
+    rig = source.rig()
+    description = source.description(rig)
+    constants = source.true_constants(tuple(description.joints), np.random.default_rng(0))
+    empty = unmeasured(description, rig, constants)
     rng, trials = np.random.default_rng(3), []
     for motion in motions:
-        command = session.free_command(motion, rig, description.joints, 0.5, 6.0, source.rate, rng)
-        entry = TrialEntry(file=f"{motion}.parquet", kind=motion)
-        trials.append(session._silent_trial(command, empty, entry))
+        command = source.free_command(motion, rig, description.joints, rng)
+        trials.append(silent_trial(command, empty, TrialEntry(file=f"{motion}.parquet", kind=motion)))
     found: dict[str, list[tuple[object, object, object]]] = {}
     joints = tuple(description.joints)
     simulator, still = Simulator(empty, step=0.001), {0: np.zeros(len(joints))}

@@ -144,15 +144,13 @@ def _of_free_motion(
     from tactile_cube.identification.contact.identification import identify_contact
     from tactile_cube.identification.identification import identify_effects
     from tactile_cube.identification.recommended import model_file
-    from tactile_cube.measurement.bench import without_touches
-    from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
+    from tactile_cube.measurement.bench import touch_offsets, without_touches
 
     config = job.config
-    offsets = bench_estimates(recording).offsets
     moving = without_touches(recording)
     found = identify_effects(moving, drive, config.engine, config.step, config.seed, say)
     model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
-    model = BenchEstimates(offsets=offsets).into(model)
+    model = model.model_copy(update={"offsets": model.offsets | touch_offsets(recording, model)})
     contact = identify_contact(recording, effects, model, config.step, config.seed, say) if effects else None
     model = model if contact is None else contact.into(model, alone=False)
     stages = {name: summary.overall for name, summary in found.stages.items()} | {"noise_floor": found.floor.overall}

@@ -1,4 +1,4 @@
-"""The bench tests of the paper as trials: what to command, what is known.
+"""The bench tests of the paper as trials: what to command, what is known, and what touches show.
 
 A known force on a static finger shows kp, clamped links under torque show the drive's stiffness, links moved until they
 touch show the range of the joint offsets; free motion, for kd and friction, is every other trial.
@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Mimic, RigidBodyTree
 from tactile_cube.measurement.excitation import safe_range
 from tactile_cube.measurement.recordings.description import Description, KnownForce, Touch, TrialEntry
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
+from tactile_cube.measurement.recordings.trial import Trial
 
 Array = NDArray[np.float64]
 FORCE = 2.0  # [N] the largest, on the last link
@@ -26,8 +28,67 @@ SIDE = 0.1  # [rad] from either side of which a weighed posture is approached, s
 MOVE, HOLD = 0.5, 1.0  # [s] of each approach and of each hold
 SWEEP, SWEEP_TIME = 0.2, 4.0  # [rad], [s] of the command about a clamped posture
 PRESS, APPROACH = 0.1, 2.0  # [rad] beyond the touch, [s] to get there; then HOLD
+BEFORE_TOUCH = 0.2  # [rad] from the posture to the obstacle
+SETTLED = 0.5  # last share of a touch, at rest
 
 BenchTrial = tuple[TrialEntry, Array]
+
+
+def touch_offsets(recording: Recording, model: ModelFile) -> dict[str, Estimate]:
+    """Joint -> mean offset [rad] that its touches show, with the range that the initialisations span.
+
+    The offset is measured less true angle, without the drive's deflection by the stiffness in `model` or as stated.
+    """
+    by_joint: dict[str, list[float]] = {}
+    for trial in recording.trials:
+        if trial.touch is not None:
+            joint, index = trial.touch.joint, recording.joints.index(trial.touch.joint)
+            stated, found = recording.stated("stiffness", joint), model.values.get("stiffness", {}).get(joint)
+            stiffness = found.value if found is not None else np.inf if stated is None else stated
+            rest = slice(round(SETTLED * len(trial.time)), None)
+            deflection = _torque(trial)[rest, index].mean() / stiffness
+            offset = float(trial.position[rest, index].mean() - deflection - trial.touch.angle)
+            by_joint.setdefault(joint, []).append(offset)
+    return {
+        joint: Estimate(value=float(np.mean(offsets)), low=min(offsets), high=max(offsets), unit="rad")
+        for joint, offsets in by_joint.items()
+    }
+
+
+def _torque(trial: Trial) -> Array:
+    """Measured torque, or the one that the controller must have asked for, (n, joints) [N m]."""
+    if trial.torque is not None:
+        return trial.torque
+    asked = trial.gains.kp * (trial.command - trial.position) - trial.gains.kd * trial.velocity()
+    return np.clip(asked, -trial.gains.torque_limit, trial.gains.torque_limit)
+
+
+def without_touches(recording: Recording) -> Recording:
+    """The recording without links that touch or hold something, which no model of a free mechanism can follow.
+
+    Raises:
+        InputError: nothing is left.
+    """
+    if not has_free_motion(recording):
+        raise InputError(
+            f"{recording.folder}: in every trial something is touched or held, none shows the mechanism alone; name "
+            "contact effects (python -m tactile_cube.identify effects=[lateral_friction]) or record free motion too"
+        )
+    return recording.with_trials([trial for trial in recording.trials if _is_free(trial)])
+
+
+def has_free_motion(recording: Recording) -> bool:
+    """Whether some trial shows the mechanism alone."""
+    return any(map(_is_free, recording.trials))
+
+
+def _is_free(trial: Trial) -> bool:
+    return trial.touch is None and trial.load is None
+
+
+def with_object(recording: Recording) -> Recording:
+    """The trials in which the hand holds an object."""
+    return recording.with_trials([trial for trial in recording.trials if trial.load is not None])
 
 
 @dataclass(frozen=True)
@@ -58,31 +119,6 @@ def bench_trials(bench: Bench, kinds: Iterable[str], initialisations: int) -> li
     """Entries and commands (n, joints) [rad] of the bench tests among `kinds`, for every initialisation."""
     chosen = [kind for kind in kinds if kind in BENCH_KINDS]
     return [trial for number in range(initialisations) for kind in chosen for trial in BENCH_KINDS[kind](bench, number)]
-
-
-def without_touches(recording: Recording) -> Recording:
-    """The recording without links that touch or hold something, which no model of a free mechanism can follow.
-
-    Raises:
-        InputError: nothing is left.
-    """
-    free = [trial for trial in recording.trials if trial.touch is None and trial.load is None]
-    if not free:
-        raise InputError(
-            f"{recording.folder}: in every trial something is touched or held, none shows the mechanism alone; name "
-            "contact effects (python -m tactile_cube.identify effects=[lateral_friction]) or record free motion too"
-        )
-    return recording.with_trials(free)
-
-
-def has_free_motion(recording: Recording) -> bool:
-    """Whether some trial shows the mechanism alone."""
-    return any(trial.touch is None and trial.load is None for trial in recording.trials)
-
-
-def with_object(recording: Recording) -> Recording:
-    """The trials in which the hand holds an object."""
-    return recording.with_trials([trial for trial in recording.trials if trial.load is not None])
 
 
 def _known_force(bench: Bench, number: int) -> list[BenchTrial]:
@@ -119,16 +155,12 @@ def _touch(bench: Bench, number: int) -> list[BenchTrial]:
     trials = []
     for index, joint in enumerate(bench.description.joints):
         posture = bench.posture()
-        angle = float(posture[index] + 0.2)
+        angle = float(posture[index] + BEFORE_TOUCH)
         way = np.clip(bench.time(APPROACH + HOLD) / APPROACH, 0.0, 1.0)
         command = np.tile(posture, (len(way), 1))
-        command[:, index] += (0.2 + PRESS) * way
-        entry = TrialEntry(
-            file=f"trials/touch_{number}_{joint}.parquet",
-            initialisation=number,
-            kind="touch",
-            touch=Touch(joint=joint, angle=angle),
-        )
+        command[:, index] += (BEFORE_TOUCH + PRESS) * way
+        file, touch = f"trials/touch_{number}_{joint}.parquet", Touch(joint=joint, angle=angle)
+        entry = TrialEntry(file=file, initialisation=number, kind="touch", touch=touch)
         trials.append((entry, command))
     return trials
 

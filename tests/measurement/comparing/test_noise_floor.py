@@ -4,7 +4,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.comparing.noise_floor import aligned_repeats, noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import table, write
@@ -73,7 +72,7 @@ def test_a_sensor_is_no_better_than_its_owner_says_or_than_a_millionth_of_the_mo
 
 def test_the_floor_is_the_recordings_alone_and_the_step_size_error_stands_beside_it(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path))
-    plain, floor = noise_floor(recording), noise_floor(recording, ErrorSummary(3e-4, {"a": 4e-4, "b": 0.0}))
+    plain, floor = noise_floor(recording), noise_floor(recording, {"a": 4e-4, "b": 0.0})
     assert (floor.overall, floor.joints) == (plain.overall, plain.joints)
     assert floor.step_size == {"a": 4e-4, "b": 0.0}
     assert floor.reachable == pytest.approx(np.hypot(floor.overall, np.sqrt(0.5) * 4e-4))

@@ -32,21 +32,13 @@ COVER = 0.95  # of the simulations lie in the band
 
 @dataclass(frozen=True)
 class Band:
-    """The middle 95 % of randomised simulations, widened by the sensor's noise.
-
-    Attributes:
-        simulations: how many.
-        low: (n, joints) of each trial [rad].
-        high: (n, joints) of each trial [rad].
-        inside: share of all measured samples in the band.
-        joints: the same by joint.
-    """
+    """The middle 95 % of randomised simulations, widened by the sensor's noise."""
 
     simulations: int
-    low: list[Array]
-    high: list[Array]
-    inside: float
-    joints: dict[str, float]
+    low: list[Array]  # (n, joints) of each trial [rad]
+    high: list[Array]  # likewise
+    inside: float  # share of all measured samples in the band
+    joints: dict[str, float]  # the same by joint
 
 
 def simulate_band(
@@ -77,43 +69,24 @@ HIDDEN = 0.5  # of the sensor noise: an error of the step that adds an eighth to
 
 @dataclass(frozen=True)
 class Comparison:
-    """A model beside a recording; every error in rad, residual = measured - simulated, joint offsets removed.
-
-    Attributes:
-        recording: what was measured.
-        model: what was simulated; None for what the rig's owner believes.
-        simulated: one entry a trial.
-        residuals: (n, joints) of each trial, nan where a dropped sample was bridged.
-        errors: overall and by joint.
-        trials: the same for each trial.
-        raw: RMS of the free run from the first state, nothing removed: overall and by joint, then for each trial.
-        fit: joint -> normalised fit of the free run [%], nothing removed.
-        floor: what a perfect model would leave.
-        regimes: the error by joint and regime.
-        sentences: the same in words.
-        whiteness: does the residual remember itself?
-        cross_correlations: what it goes with, strongest first.
-        failing_intervals: where it is far above the floor.
-        band: randomised simulations, or None.
-        step: of the simulation, at most [s].
-    """
+    """A model beside a recording; every error in rad, residual = measured - simulated, joint offsets removed."""
 
     recording: Recording
-    model: ModelFile | None
-    simulated: list[Simulated]
-    residuals: list[Array]
+    model: ModelFile | None  # None for what the rig's owner believes
+    simulated: list[Simulated]  # one entry a trial
+    residuals: list[Array]  # (n, joints) of each trial, nan where a dropped sample was bridged
     errors: ErrorSummary
     trials: list[ErrorSummary]
-    raw: list[ErrorSummary]
-    fit: dict[str, float]
-    floor: NoiseFloor
+    raw: list[ErrorSummary]  # RMS from the first state, nothing removed: of all trials together, then of each
+    fit: dict[str, float]  # joint -> normalised fit of the free run [%], nothing removed
+    floor: NoiseFloor  # what a perfect model would leave
     regimes: list[Regime]
-    sentences: list[str]
+    sentences: list[str]  # the regimes in words
     whiteness: list[Whiteness]
-    cross_correlations: list[CrossCorrelation]
+    cross_correlations: list[CrossCorrelation]  # the strongest first
     failing_intervals: list[FailingInterval]
     band: Band | None
-    step: float
+    step: float  # of the simulation, at most [s]
 
     @property
     def ratio(self) -> float:
@@ -164,20 +137,16 @@ def compare_recording(
     band = simulate_band(recording, model, simulations, spread or {}, used, seed) if simulations else None
     if floor is None or step is None:
         fine = free_run(recording, fitted, "fast", used / FINER)
-        left = summarise_errors(
-            [a.position - b.position for a, b in zip(simulated, fine, strict=True)], recording.joints
-        )
-        if step is None and engine == "fast" and _shown(recording, left):
-            used, left = used / FINER, left.times(1.0 / (FINER - 1))  # errors of the step are of first order
+        differences = [a.position - b.position for a, b in zip(simulated, fine, strict=True)]
+        left = summarise_errors(differences, recording.joints).joints
+        noise = dict(zip(recording.joints, sensor_noise(recording), strict=True))
+        if step is None and engine == "fast" and any(left[joint] > HIDDEN * noise[joint] for joint in noise):
+            used /= FINER
+            finer = 1.0 / (FINER - 1)  # errors of the step are of first order
+            left = {joint: finer * error for joint, error in left.items()}
             simulated, _ = simulated_at(used)
         floor = floor or noise_floor(recording, left)
     return describe_comparison(recording, model, simulated, floor, band, used)
-
-
-def _shown(recording: Recording, left: ErrorSummary) -> bool:
-    """Whether the position sensors would show an error of the simulation's step."""
-    noise = dict(zip(recording.joints, sensor_noise(recording), strict=True))
-    return any(error > HIDDEN * noise[joint] for joint, error in left.joints.items())
 
 
 def describe_comparison(
@@ -189,9 +158,8 @@ def describe_comparison(
     step: float,
 ) -> Comparison:
     """What simulations of the trials, one each, leave of the measurement, and where."""
-    trials, joints = recording.trials, recording.joints
-    errors = residuals(trials, [one.position for one in simulated])
-    raw = raw_residuals(trials, [one.position for one in simulated])
+    trials, joints, positions = recording.trials, recording.joints, [one.position for one in simulated]
+    errors, raw = residuals(trials, positions), raw_residuals(trials, positions)
     summary = summarise_errors(errors, joints)
     table = regimes(trials, errors, joints)
     return Comparison(
@@ -208,19 +176,15 @@ def describe_comparison(
         sentences=where_it_fails(table, summary.joints, floor, recording.units),
         whiteness=whiteness(trials, errors, joints),
         cross_correlations=cross_correlations(trials, errors, joints),
-        failing_intervals=_failing_intervals(recording, errors, floor),
+        failing_intervals=[
+            interval
+            for trial, error in zip(trials, errors, strict=True)
+            for index, joint in enumerate(joints)
+            for interval in failing_intervals(trial.name, joint, trial.time, error[:, index], floor.joints[joint])
+        ],
         band=band,
         step=step,
     )
-
-
-def _failing_intervals(recording: Recording, errors: list[Array], floor: NoiseFloor) -> list[FailingInterval]:
-    return [
-        interval
-        for trial, error in zip(recording.trials, errors, strict=True)
-        for index, joint in enumerate(recording.joints)
-        for interval in failing_intervals(trial.name, joint, trial.time, error[:, index], floor.joints[joint])
-    ]
 
 
 def comparison_json(comparison: Comparison) -> dict[str, Any]:

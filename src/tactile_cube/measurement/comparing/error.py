@@ -23,26 +23,9 @@ class ErrorSummary:
     overall: float
     joints: dict[str, float]
 
-    def times(self, factor: float) -> ErrorSummary:
-        """So many times as large."""
-        return ErrorSummary(factor * self.overall, {joint: factor * error for joint, error in self.joints.items()})
-
-
-def joint_offsets(trials: Sequence[Trial], simulated: Sequence[Array]) -> dict[int, Array]:
-    """Mean of measured - simulated for each robot initialisation, initialisation -> (joints,) [rad]."""
-    offsets = {}
-    for initialisation in sorted({trial.initialisation for trial in trials}):
-        differences = [
-            (trial.position - positions)[trial.valid]
-            for trial, positions in zip(trials, simulated, strict=True)
-            if trial.initialisation == initialisation
-        ]
-        offsets[initialisation] = np.concatenate(differences).mean(axis=0)
-    return offsets
-
 
 def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
-    """Measured - simulated without the constant offset of each joint and robot initialisation.
+    """Measured - simulated without its mean, the joint offset, over all trials of a robot initialisation.
 
     Args:
         trials: what was measured.
@@ -51,11 +34,14 @@ def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array
     Returns:
         (n, joints) of each trial [rad]; nan where a dropped sample was bridged.
     """
-    offsets = joint_offsets(trials, simulated)
-    return [
-        np.where(trial.valid[:, None], trial.position - positions - offsets[trial.initialisation], np.nan)
-        for trial, positions in zip(trials, simulated, strict=True)
-    ]
+    raw = raw_residuals(trials, simulated)
+    offsets = {
+        start: np.concatenate(
+            [one[trial.valid] for trial, one in zip(trials, raw, strict=True) if trial.initialisation == start]
+        ).mean(axis=0)
+        for start in {trial.initialisation for trial in trials}
+    }
+    return [one - offsets[trial.initialisation] for trial, one in zip(trials, raw, strict=True)]
 
 
 def raw_residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
@@ -133,48 +119,36 @@ def with_fitted_offsets(simulator: Simulator, model: Model) -> Model:
 
     An offset does more than shift the reading: gravity and all that depends on the angle act elsewhere.
     """
-    recording = simulator.recording
     model = replace(model, offsets={key: np.zeros_like(value) for key, value in model.offsets.items()})
+    units = DIFFERENCE * np.eye(len(simulator.recording.joints))
     for _ in range(ITERATIONS):
-        moved = [_moved(model, joint) for joint in range(len(recording.joints))]
+        moved = [replace(model, offsets={key: value + unit for key, value in model.offsets.items()}) for unit in units]
         left, *changed = _errors(simulator, [model, *moved])
-        columns = [[(a - b) / DIFFERENCE for a, b in zip(left, one, strict=True)] for one in changed]
-        tried = {key: _step(recording, key, value, left, columns) for key, value in model.offsets.items()}
+        tried = {
+            key: _step(offset, left[key], np.stack([(left[key] - one[key]) / DIFFERENCE for one in changed], axis=1))
+            for key, offset in model.offsets.items()
+        }
         (after,) = _errors(simulator, [replace(model, offsets=tried)])
-        better = {key: _size(recording, key, after) < _size(recording, key, left) for key in tried}
-        model = replace(model, offsets={key: tried[key] if better[key] else model.offsets[key] for key in tried})
+        better = {key for key in tried if np.sum(after[key] ** 2) < np.sum(left[key] ** 2)}
+        model = replace(model, offsets={key: (tried if key in better else model.offsets)[key] for key in tried})
     return model
 
 
-def _moved(model: Model, joint: int) -> Model:
-    unit = np.eye(len(model.constants["kp"]))[joint]
-    return replace(model, offsets={key: value + DIFFERENCE * unit for key, value in model.offsets.items()})
-
-
-def _step(
-    recording: Recording, initialisation: int, offset: Array, left: list[Array], columns: list[list[Array]]
-) -> Array:
+def _step(offset: Array, error: Array, slopes: Array) -> Array:
     """A cautious Gauss-Newton step of one initialisation's offset (joints,) [rad]."""
-    error = _stacked(recording, initialisation, left)
-    slopes = np.stack([_stacked(recording, initialisation, one) for one in columns], axis=1)
     trust = CORRELATED * float(np.mean(error**2)) / SPREAD**2
     normal = slopes.T @ slopes + trust * np.eye(len(offset))
     step = np.linalg.solve(normal, slopes.T @ error - trust * offset)
     return np.asarray(np.clip(offset + np.clip(step, -LARGEST_STEP, LARGEST_STEP), -LARGEST_OFFSET, LARGEST_OFFSET))
 
 
-def _stacked(recording: Recording, initialisation: int, arrays: list[Array]) -> Array:
-    rows = [k for k, trial in enumerate(recording.trials) if trial.initialisation == initialisation]
-    return np.concatenate([arrays[k].ravel() for k in rows])
-
-
-def _size(recording: Recording, initialisation: int, errors: list[Array]) -> float:
-    return float(np.sum(_stacked(recording, initialisation, errors) ** 2))
-
-
-def _errors(simulator: Simulator, models: Sequence[Model]) -> list[list[Array]]:
-    trials = simulator.recording.trials
-    return [
-        [np.nan_to_num(one) for one in residuals(trials, [simulated.position for simulated in runs])]
-        for runs in simulator.free_runs(models)
-    ]
+def _errors(simulator: Simulator, models: Sequence[Model]) -> list[dict[int, Array]]:
+    """Of each model: initialisation -> residuals of its trials end to end [rad], 0 where a sample was bridged."""
+    trials, found = simulator.recording.trials, []
+    for runs in simulator.free_runs(models):
+        errors = residuals(trials, [run.position for run in runs])
+        rows: dict[int, list[Array]] = {}
+        for trial, error in zip(trials, errors, strict=True):
+            rows.setdefault(trial.initialisation, []).append(np.nan_to_num(error).ravel())
+        found.append({key: np.concatenate(parts) for key, parts in rows.items()})
+    return found

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 
+Array = NDArray[np.float64]
 LONGEST_LAG = 0.3  # [s] two starts of one command are not further apart
 SAME = 0.02  # share of a command's spread by which a repeat may differ
 LEFT_START = 0.1  # [rad] of motion after which a joint no longer knows where friction held it at the start
@@ -29,16 +29,11 @@ def aligned_repeats(trials: Sequence[Trial]) -> list[list[Array]]:
     groups: list[list[Array]] = []
     waiting = list(trials)
     while waiting:
-        first, rest = waiting[0], waiting[1:]
-        lags = {
-            index: lag_between(first.command, other.command, first.step)
-            for index, other in enumerate(rest)
-            if _comparable(first, other)
-        }
-        same = {index: lag for index, lag in lags.items() if lag is not None}
+        same = repeats_of(waiting, 0)
         if same:
-            groups.append(_cut([(first, 0), *((rest[index], lag) for index, lag in same.items())]))
-        waiting = [other for index, other in enumerate(rest) if index not in same]
+            groups.append(_cut([(waiting[0], 0), *((waiting[place], lag) for place, lag in same)]))
+        taken = {0, *(place for place, _ in same)}
+        waiting = [trial for place, trial in enumerate(waiting) if place not in taken]
     return groups
 
 
@@ -103,31 +98,21 @@ def _telling(trial: Trial) -> NDArray[np.bool_]:
     return np.asarray(gone & trial.valid[:, None])
 
 
-Array = NDArray[np.float64]
 LEAST = 1e-6  # [rad] no sensor is better; keeps the ratio of error to floor finite
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """RMS error [rad] of a perfect model of this rig and this sensor: a property of the recording alone.
+    """RMS error [rad] of a perfect model of this rig and this sensor: a property of the recording alone."""
 
-    Attributes:
-        overall: pooled over joints.
-        joints: joint by joint.
-        source: `repeats` (measured), `guess` (nothing was repeated), or `contact` (how well a world with the true
-            effects follows a grasp).
-        repeats: how many trials had a repeat.
-        sensor: noise of the position sensor, joint by joint; the floor itself where it is a guess.
-        step_size: what the simulator's own time step adds to a perfect model's error, joint by joint; no part of the
-            floor, and empty where it was not asked for.
-    """
-
-    overall: float
+    overall: float  # pooled over joints
     joints: dict[str, float]
-    source: Literal["repeats", "guess", "contact"]
-    repeats: int
-    step_size: dict[str, float]
-    sensor: dict[str, float] = field(default_factory=dict)
+    source: Literal["repeats", "guess", "contact"]  # contact: how well a world with the true effects follows a grasp
+    repeats: int  # trials that had a repeat
+    step_size: dict[str, float]  # what the simulator's time step adds, no part of the floor; empty: not asked for
+    sensor: dict[str, float] = field(
+        default_factory=dict
+    )  # noise of the position sensor, the floor where it is a guess
 
     @property
     def reachable(self) -> float:
@@ -135,8 +120,8 @@ class NoiseFloor:
         return float(np.hypot(self.overall, np.sqrt(np.mean(np.square([*self.step_size.values()] or [0.0])))))
 
 
-def noise_floor(recording: Recording, step_size: ErrorSummary | None = None) -> NoiseFloor:
-    """Noise floor of a recording; `step_size` is the error of the simulator's time step, stated beside it."""
+def noise_floor(recording: Recording, step_size: Mapping[str, float] | None = None) -> NoiseFloor:
+    """Noise floor of a recording; `step_size` is the error [rad] of the simulator's time step, joint by joint."""
     groups = aligned_repeats(recording.trials)
     sensor = sensor_noise(recording)
     variance = _scatter(groups) if groups else sensor**2
@@ -146,7 +131,7 @@ def noise_floor(recording: Recording, step_size: ErrorSummary | None = None) -> 
         dict(zip(recording.joints, map(float, np.sqrt(variance)), strict=True)),
         "repeats" if groups else "guess",
         sum(len(group) for group in groups),
-        dict(step_size.joints) if step_size is not None else {},
+        dict(step_size or {}),
         dict(zip(recording.joints, map(float, sensor), strict=True)),
     )
 

@@ -1,6 +1,6 @@
 """Where the error is: by joint and speed, after a reversal, direction, load, posture, time and kind of trial."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,79 +20,34 @@ FEWEST = 25  # samples below which a regime says nothing
 
 @dataclass(frozen=True)
 class Regime:
-    """The error of one joint in one regime.
-
-    Attributes:
-        joint: its name.
-        dimension: speed, reversal, direction, load, posture, time, neighbours or kind.
-        regime: which part of the dimension, in words.
-        error: RMS [rad].
-        bias: mean of measured - simulated [rad].
-        lag: mean of measured - simulated in the direction of the latest motion [rad]; negative: the rig stays behind.
-        share: part of the joint's samples.
-        samples: how many.
-    """
+    """The error of one joint in one regime."""
 
     joint: str
-    dimension: str
-    regime: str
-    error: float
-    bias: float
-    lag: float
-    share: float
+    dimension: str  # speed, reversal, direction, load, posture, time, neighbours or kind
+    regime: str  # which part of the dimension, in words
+    error: float  # RMS [rad]
+    bias: float  # mean of measured - simulated [rad]
+    lag: float  # mean of measured - simulated in the direction of the latest motion [rad]; negative: the rig lags
+    share: float  # part of the joint's samples
     samples: int
-
-
-@dataclass(frozen=True)
-class Samples:
-    """All samples of one joint, trials end to end, each (samples,)."""
-
-    error: Array
-    position: Array
-    velocity: Array
-    direction: Array
-    torque: Array
-    neighbours: Array
-    reversed: Mask
-    phase: Array
-    kind: NDArray[np.str_]
-
-
-def joint_samples(trials: Sequence[Trial], errors: Sequence[Array], joint: int) -> Samples:
-    """The samples of joint number `joint`: residual [rad], position, velocity, torque (nan if not measured), ..."""
-    velocities = [trial.velocity() for trial in trials]
-    others = [np.abs(np.delete(v, joint, axis=1)).max(axis=1, initial=0.0) for v in velocities]
-    return Samples(
-        error=np.concatenate([error[:, joint] for error in errors]),
-        position=np.concatenate([trial.position[:, joint] for trial in trials]),
-        velocity=np.concatenate([v[:, joint] for v in velocities]),
-        direction=np.concatenate([latest_direction(v[:, joint]) for v in velocities]),
-        torque=np.concatenate([_torque(trial)[:, joint] for trial in trials]),
-        neighbours=np.concatenate(others),
-        reversed=np.concatenate([after_reversal(v[:, joint], t.step) for t, v in zip(trials, velocities, strict=True)]),
-        phase=np.concatenate([trial.time / trial.duration for trial in trials]),
-        kind=np.concatenate([np.full(len(trial.time), trial.kind) for trial in trials]),
-    )
 
 
 def regimes(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> list[Regime]:
     """The table of regimes, joint by joint, from residuals (n, joints) of each trial."""
     table: list[Regime] = []
+    velocities = [trial.velocity() for trial in trials]
     for index, joint in enumerate(joints):
-        samples = joint_samples(trials, errors, index)
-        usable = np.isfinite(samples.error)
-        for dimension, classify in DIMENSIONS.items():
-            for name, mask in classify(samples).items():
-                if (mask & usable).sum() >= FEWEST:
-                    table.append(_row(joint, dimension, name, samples, mask & usable))
+        error = np.concatenate([one[:, index] for one in errors])
+        direction = np.concatenate([latest_direction(one[:, index]) for one in velocities])
+        for dimension, parts in _parts(trials, velocities, index).items():
+            for name, part in parts.items():
+                mask = part & np.isfinite(error)
+                if mask.sum() >= FEWEST:
+                    here = error[mask]
+                    rms, lag = float(np.sqrt(np.mean(here**2))), float(np.mean(here * direction[mask]))
+                    row = (rms, float(here.mean()), lag, float(mask.mean()), int(mask.sum()))
+                    table.append(Regime(joint, dimension, name, *row))
     return table
-
-
-def _row(joint: str, dimension: str, name: str, samples: Samples, mask: Mask) -> Regime:
-    error = samples.error[mask]
-    lag = float(np.mean(error * samples.direction[mask]))
-    rms, bias = float(np.sqrt(np.mean(error**2))), float(error.mean())
-    return Regime(joint, dimension, name, rms, bias, lag, float(mask.mean()), int(mask.sum()))
 
 
 def latest_direction(velocity: Array) -> Array:
@@ -113,39 +68,39 @@ def after_reversal(velocity: Array, step: float) -> Mask:
     return mask
 
 
-def _torque(trial: Trial) -> Array:
-    return np.full_like(trial.position, np.nan) if trial.torque is None else trial.torque
+def _parts(trials: Sequence[Trial], velocities: Sequence[Array], joint: int) -> dict[str, dict[str, Mask]]:
+    """Dimension -> regime -> the samples (of all trials end to end) of a joint that are in it."""
+    velocity = np.concatenate([one[:, joint] for one in velocities])
+    speed, edges = np.abs(velocity), [0.0, *SPEEDS.values()]
+    turned = np.concatenate(
+        [after_reversal(one[:, joint], trial.step) for trial, one in zip(trials, velocities, strict=True)]
+    )
+    kinds = np.concatenate([np.full(len(trial.time), trial.kind) for trial in trials])
+    position = np.concatenate([trial.position[:, joint] for trial in trials])
+    phase = np.concatenate([trial.time / trial.duration for trial in trials])
+    return {
+        "speed": {
+            name: (speed >= least) & (speed < most) for (name, most), least in zip(SPEEDS.items(), edges, strict=False)
+        },
+        "reversal": {"just after reversals": turned, "away from reversals": ~turned},
+        "direction": {"moving up": velocity > MOVING, "moving down": velocity < -MOVING},
+        "load": _load(trials, joint),
+        "posture": _thirds(position, "third of the range", ("low", "middle", "high")),
+        "time": _thirds(phase, "third of the trial", ("first", "second", "last")),
+        "neighbours": _neighbours(velocities, joint),
+        "kind": {f"{kind} trials": kinds == kind for kind in dict.fromkeys(kinds.tolist())},
+    }
 
 
-def _speed(samples: Samples) -> dict[str, Mask]:
-    parts, least = {}, 0.0
-    for name, most in SPEEDS.items():
-        parts[name] = (np.abs(samples.velocity) >= least) & (np.abs(samples.velocity) < most)
-        least = most
-    return parts
-
-
-def _reversal(samples: Samples) -> dict[str, Mask]:
-    return {"just after reversals": samples.reversed, "away from reversals": ~samples.reversed}
-
-
-def _direction(samples: Samples) -> dict[str, Mask]:
-    return {"moving up": samples.velocity > MOVING, "moving down": samples.velocity < -MOVING}
-
-
-def _load(samples: Samples) -> dict[str, Mask]:
-    if np.isnan(samples.torque).all():
+def _load(trials: Sequence[Trial], joint: int) -> dict[str, Mask]:
+    """By the size of the measured torque, as far as there is one."""
+    torque = np.abs(
+        np.concatenate([np.full(len(t.time), np.nan) if t.torque is None else t.torque[:, joint] for t in trials])
+    )
+    if np.isnan(torque).all():
         return {}
-    half = 0.5 * float(np.nanpercentile(np.abs(samples.torque), 98))
-    return {"low load": np.abs(samples.torque) < half, "high load": np.abs(samples.torque) >= half}
-
-
-def _posture(samples: Samples) -> dict[str, Mask]:
-    return _thirds(samples.position, "third of the range", ("low", "middle", "high"))
-
-
-def _time(samples: Samples) -> dict[str, Mask]:
-    return _thirds(samples.phase, "third of the trial", ("first", "second", "last"))
+    half = 0.5 * float(np.nanpercentile(torque, 98))
+    return {"low load": torque < half, "high load": torque >= half}
 
 
 def _thirds(values: Array, of: str, names: tuple[str, str, str]) -> dict[str, Mask]:
@@ -154,25 +109,10 @@ def _thirds(values: Array, of: str, names: tuple[str, str, str]) -> dict[str, Ma
     return {f"{name} {of}": part == index for index, name in enumerate(names)}
 
 
-def _neighbours(samples: Samples) -> dict[str, Mask]:
-    fast = samples.neighbours > SPEEDS["low speed"]
+def _neighbours(velocities: Sequence[Array], joint: int) -> dict[str, Mask]:
+    others = [np.abs(np.delete(one, joint, axis=1)).max(axis=1, initial=0.0) for one in velocities]
+    fast = np.concatenate(others) > SPEEDS["low speed"]
     return {"other joints moving": fast, "other joints slow or still": ~fast} if fast.any() else {}
-
-
-def _kind(samples: Samples) -> dict[str, Mask]:
-    return {f"{kind} trials": samples.kind == kind for kind in dict.fromkeys(samples.kind.tolist())}
-
-
-DIMENSIONS: dict[str, Callable[[Samples], dict[str, Mask]]] = {
-    "speed": _speed,
-    "reversal": _reversal,
-    "direction": _direction,
-    "load": _load,
-    "posture": _posture,
-    "time": _time,
-    "neighbours": _neighbours,
-    "kind": _kind,
-}
 
 
 WORTH_SAYING = 1.5  # error / noise floor of a joint below which nothing is said
@@ -181,6 +121,7 @@ ONE_SIDED = 0.5  # |mean| / RMS above which an error has a direction
 RARE = 0.01  # share of the samples below which a regime is no place to point at
 PLACES = ("reversal", "speed", "load", "posture", "time", "direction")
 COMPANY = ("kind", "neighbours")
+PREPOSITIONS = {"speed": "at", "load": "at", "posture": "in the", "time": "in the", "kind": "in", "neighbours": "with"}
 
 
 def where_it_fails(
@@ -206,7 +147,7 @@ def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor, u
     first, more = places[0], "".join(f", {_place(row)}" for row in places[1:])
     kind = next((row for row in _worst_of_each(standing_out, ("kind",)) if row is not first), None)
     mostly = f", most of all in {kind.regime}" if kind is not None else ""
-    return f"{joint} {_verb([first], error)} {_place(first)}, {milli(first.error, unit, 2)}{more}{mostly} {size}"
+    return f"{joint} {_verb([first], first.error)} {_place(first)}, {milli(first.error, unit, 2)}{more}{mostly} {size}"
 
 
 def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime]:
@@ -218,11 +159,10 @@ def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime
     return list(chosen.values())
 
 
-def _verb(rows: list[Regime], error: float) -> str:
+def _verb(rows: list[Regime], rms: float) -> str:
     samples = sum(row.samples for row in rows)
     lag = sum(row.lag * row.samples for row in rows) / samples
     bias = sum(row.bias * row.samples for row in rows) / samples
-    rms = max(row.error for row in rows) if len(rows) == 1 else error
     if abs(lag) > ONE_SIDED * rms:
         return "lags" if lag < 0 else "runs ahead"
     if abs(bias) > ONE_SIDED * rms:
@@ -231,12 +171,4 @@ def _verb(rows: list[Regime], error: float) -> str:
 
 
 def _place(row: Regime) -> str:
-    if row.dimension in ("speed", "load"):
-        return f"at {row.regime}"
-    if row.dimension in ("posture", "time"):
-        return f"in the {row.regime}"
-    if row.dimension == "kind":
-        return f"in {row.regime}"
-    if row.dimension == "neighbours":
-        return f"with {row.regime}"
-    return row.regime
+    return f"{PREPOSITIONS.get(row.dimension, '')} {row.regime}".strip()

@@ -16,36 +16,22 @@ LONGEST_DELAY = 0.1  # [s] between a cause and its trace in the residual
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Ljung-Box test of one joint's residual.
-
-    Attributes:
-        joint: its name.
-        p_value: probability of such autocorrelation in white noise; the smallest over the trials, times their number.
-        correlation_time: how long the residual remembers itself [s].
-    """
+    """Ljung-Box test of one joint's residual."""
 
     joint: str
-    p_value: float
-    correlation_time: float
+    p_value: float  # of such autocorrelation in white noise; the smallest over the trials, times their number
+    correlation_time: float  # how long the residual remembers itself [s]
 
 
 @dataclass(frozen=True)
 class CrossCorrelation:
-    """How much of a residual goes with one signal.
+    """How much of a residual goes with one signal."""
 
-    Attributes:
-        joint: whose residual.
-        cause: the signal, in words.
-        correlation: strongest within 0.1 s, averaged over the trials.
-        delay: how much later the residual shows it [s].
-        p_value: probability of such a correlation between unrelated signals that remember themselves as these do.
-    """
-
-    joint: str
-    cause: str
-    correlation: float
-    delay: float
-    p_value: float
+    joint: str  # whose residual
+    cause: str  # the signal, in words
+    correlation: float  # strongest within 0.1 s, averaged over the trials
+    delay: float  # how much later the residual shows it [s]
+    p_value: float  # of such a correlation between unrelated signals that remember themselves as these do
 
 
 def whiteness(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> list[Whiteness]:

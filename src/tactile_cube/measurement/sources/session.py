@@ -1,128 +1,115 @@
-"""A bench session: a simulated rig with its true constants, and the sensors that log it."""
+"""What simulated bench sessions share: settings, true constants, trials of free motion, and the sensors that log."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.excitation import excitation, safe_range
-from tactile_cube.measurement.recordings.description import Description, Touch, TrialEntry, per_joint
+from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Gains, Trial
 from tactile_cube.measurement.recordings.writing import TrialTable
-from tactile_cube.measurement.replay.model import Model, Term, terms_of
+from tactile_cube.measurement.replay.model import Model, terms_of
 from tactile_cube.measurement.replay.simulator import Simulated, Simulator
+from tactile_cube.measurement.sources.source import described
 
 Array = NDArray[np.float64]
 OBSTACLE = 500.0  # [N m/rad] stiffness of what a link touches
 SETTLING = 1.0  # [s] at the first command before a trial is logged
 
 
-class LogSensors(Protocol):
-    """What a log's sensors get wrong."""
-
-    @property
-    def rate(self) -> float:
-        """Samples per second [Hz]."""
-        ...
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the position [rad]."""
-        ...
-
-    @property
-    def resolution(self) -> float:
-        """Of the position [rad]; 0 for none."""
-        ...
-
-    @property
-    def torque_noise(self) -> float:
-        """Standard deviation of the torque [N m]."""
-        ...
-
-
-def logged(
-    entry: TrialEntry, command: Array, result: Simulated, sensors: LogSensors, rng: np.random.Generator
-) -> TrialTable:
-    """A simulated trial, (n, joints) each, as the sensors log it."""
-    position = result.position + rng.normal(0, sensors.noise, command.shape)
-    if sensors.resolution > 0:
-        position = np.round(position / sensors.resolution) * sensors.resolution
-    torque = result.torque + rng.normal(0, sensors.torque_noise, command.shape)
-    return TrialTable(entry, np.arange(len(command)) / sensors.rate, command, position, torque)
-
-
 @dataclass(frozen=True)
-class FreeSession:
-    """Plays trials of a rig that holds nothing.
+class SimulatedSession:
+    """Settings of every simulated bench session; conf/source/finger.yaml and grasp.yaml say what each of them means."""
 
-    Attributes:
-        sensors: that log it.
-        simulator: the rig.
-        constants: the true ones of the drivetrain, key -> (joints,).
-        effects: hidden ones, with their values.
-        rng: noise.
-    """
+    controller: Mapping[str, float] = field(default_factory=dict)
+    nominal: Mapping[str, float] = field(default_factory=dict)
+    true_spread: float = 0.1
+    hidden: Iterable[str] = ()
+    kinds: Iterable[str] = ("ramps", "multisine", "policy", "holds")
+    initialisations: int = 3
+    offset: float = 0.02
+    duration: float = 12.0
+    reach: float = 0.75
+    rate: float = 500.0
+    noise: float = 2e-4
+    resolution: float = 1e-4
+    torque_noise: float = 2e-3
+    step: float = 2.5e-4
+    validation: bool = True
 
-    sensors: LogSensors
-    simulator: Simulator
-    constants: dict[str, Array]
-    effects: tuple[Term, ...]
-    rng: np.random.Generator
+    def described(
+        self, gravity: Iterable[float], joints: list[str], coupled: Mapping[str, Coupling], **more: object
+    ) -> Description:
+        """What recording.yaml is to say of a rig with these joints."""
+        return described(
+            gravity=list(gravity), rate_hz=self.rate, joints=joints, coupled=coupled,
+            controller=dict(self.controller), nominal=dict(self.nominal),
+            sensors={"position_resolution": self.resolution}, **more,
+        )  # fmt: skip
 
-    def play(self, entry: TrialEntry, command: Array, offset: Array) -> TrialTable:
-        """Simulate one trial, settled at its first command before, and log it."""
-        settle = round(SETTLING * self.sensors.rate)
-        recording = self.simulator.recording
-        trial = _silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), recording, entry)
-        touched = terms_of([] if entry.touch is None else [_obstacle(entry.touch)], recording.joints)
-        model = Model(self.constants, (*self.effects, *touched), {trial.initialisation: -offset})
-        ((result,),) = self.simulator.free_runs([model], [trial])
+    def true_constants(self, joints: tuple[str, ...], rng: np.random.Generator) -> dict[str, Array]:
+        """Gains as stated; damping, friction and inertia differ from it by up to `true_spread`, joint by joint."""
+        stated = {**self.controller, **self.nominal}
+        constants = {key: per_joint(value, joints, key) for key, value in stated.items()}
+        for key in ("kd", "static_friction", "reflected_inertia"):
+            factor = rng.uniform(1 - self.true_spread, 1 + self.true_spread, len(joints))
+            constants[key] = constants[key] * factor
+        return constants
+
+    def free_command(self, kind: str, rig: Rig, joints: Iterable[str], rng: np.random.Generator) -> Array:
+        """Commands (duration * rate, joints) [rad] of free motion within the middle `reach` of each joint's range."""
+        low, high = np.array([safe_range(rig.joints[joint], self.reach) for joint in joints]).T
+        return excitation(kind, low, high, self.duration, self.rate, rng)
+
+    def played(
+        self, entry: TrialEntry, command: Array, offset: Array, rig: Simulator, true: Model, rng: np.random.Generator
+    ) -> TrialTable:
+        """Log a trial of a rig that holds nothing, settled at its first command before.
+
+        Args:
+            entry: of recording.yaml.
+            command: (n, joints) [rad].
+            offset: of the joints in this initialisation (joints,) [rad].
+            rig: simulates it.
+            true: constants and hidden effects.
+            rng: of the sensors' noise.
+        """
+        settle = round(SETTLING * self.rate)
+        trial = silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), rig.recording, entry)
+        terms = true.terms
+        if entry.touch is not None:  # the obstacle is a hard stop
+            stop = {"upper": entry.touch.angle, "stiffness": OBSTACLE, "damping": 0.5}
+            terms = (*terms, *terms_of([(f"joint_stop@{entry.touch.joint}", stop)], rig.recording.joints))
+        model = Model(true.constants, terms, {trial.initialisation: -offset})
+        ((result,),) = rig.free_runs([model], [trial])
         if entry.force is not None:  # a force pulls at the posture that it leads to
-            trial = replace(trial, position=result.position)
-            ((result,),) = self.simulator.free_runs([model], [trial])
-        seen = Simulated(result.position[settle:], result.torque[settle:])
-        return logged(entry, command, seen, self.sensors, self.rng)
+            ((result,),) = rig.free_runs([model], [replace(trial, position=result.position)])
+        return self.logged(entry, command, Simulated(result.position[settle:], result.torque[settle:]), rng)
+
+    def logged(self, entry: TrialEntry, command: Array, result: Simulated, rng: np.random.Generator) -> TrialTable:
+        """A simulated trial, (n, joints) each, as the sensors log it."""
+        position = result.position + rng.normal(0, self.noise, command.shape)
+        if self.resolution > 0:
+            position = np.round(position / self.resolution) * self.resolution
+        torque = result.torque + rng.normal(0, self.torque_noise, command.shape)
+        return TrialTable(entry, np.arange(len(command)) / self.rate, command, position, torque)
 
 
-def free_command(
-    kind: str, rig: Rig, joints: list[str], reach: float, duration: float, rate: float, rng: np.random.Generator
-) -> Array:
-    """Commands (duration * rate, joints) [rad] of free motion within the middle `reach` of each joint's range."""
-    ranges = np.array([safe_range(rig.joints[joint], reach) for joint in joints])
-    return excitation(kind, ranges[:, 0], ranges[:, 1], duration, rate, rng)
-
-
-def true_constants(
-    stated: Mapping[str, float], joints: tuple[str, ...], spread: float, rng: np.random.Generator
-) -> dict[str, Array]:
-    """Gains as stated; damping, friction and inertia differ from what is believed by up to `spread`, joint by joint."""
-    constants = {key: per_joint(value, joints, key) for key, value in stated.items()}
-    for key in ("kd", "static_friction", "reflected_inertia"):
-        constants[key] = constants[key] * rng.uniform(1 - spread, 1 + spread, len(joints))
-    return constants
-
-
-def unmeasured(description: Description, rig: Rig, constants: dict[str, Array]) -> Recording:
+def unmeasured(description: Description, rig: Rig, constants: Mapping[str, Array]) -> Recording:
     """The rig as a recording without trials, as the simulators want it."""
     gains = Gains(constants["kp"], constants["kd"], constants["torque_limit"])
     return Recording(Path(), description, rig, gains, {}, ())
 
 
-def _obstacle(touch: Touch) -> tuple[str, dict[str, float]]:
-    """A hard stop where the touching joint meets the obstacle."""
-    return f"joint_stop@{touch.joint}", {"upper": touch.angle, "stiffness": OBSTACLE, "damping": 0.5}
-
-
-def _silent_trial(command: Array, rig: Recording, entry: TrialEntry) -> Trial:
-    """A trial that starts at rest at its first command."""
+def silent_trial(command: Array, rig: Recording, entry: TrialEntry) -> Trial:
+    """A trial that starts at rest at its first command (joints,) [rad]."""
     time = np.arange(len(command)) / rig.rate
     still = np.broadcast_to(command[0], command.shape)
     valid = np.ones(len(command), dtype=bool)
