@@ -205,3 +205,32 @@ def test_what_cannot_be_understood_is_asked_for(
 def test_a_pattern_without_a_match_says_what_there_is(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nothing-\*\.csv matches no file; .* has log\.csv, rig\.urdf"):
         imported(tmp_path, {"log.csv": log(NUMBERED)}, files=[str(tmp_path / "nothing-*.csv")])
+
+
+@pytest.mark.parametrize(
+    "names", [("motor_angle_rad", "joint_angle_rad", "goal_rad"), ("motor_pos", "link_pos_deg", "motor_target")]
+)
+def test_a_geared_motor_is_counted_at_its_joint_by_the_sensor_on_the_link(
+    names: tuple[str, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    motor, link, command = names
+    gear, columns = -81.0, table(0)
+    angle = DEGREE if link.endswith("deg") else 1.0
+    logged = {
+        "time": columns["time"],
+        command: columns["a.command"] * (gear * angle if command.startswith("motor") else 1.0),
+        motor: columns["a.position"] * gear * angle,
+        link: (columns["a.position"] + 0.1) * angle,
+        "motor_torque": columns["a.torque"] / gear,
+        "tau_ff": np.full(300, 0.2),
+    }
+    recording = imported(tmp_path, {"log.csv": logged}, ONE_JOINT)
+    trial = recording.trials[0]
+    assert "-81 turns a turn of its link" in capsys.readouterr().out
+    for own, read in (("command", trial.command), ("position", trial.position), ("torque", trial.torque)):
+        assert read is not None
+        assert read[:, 0] == pytest.approx(columns[f"a.{own}"], abs=1e-5)
+    assert trial.link_position is not None
+    assert trial.feedforward is not None
+    assert trial.link_position[:, 0] == pytest.approx(columns["a.position"] + 0.1, abs=1e-5)
+    assert trial.feedforward[:, 0] == pytest.approx(0.2)

@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.sources.units import (
     Signal,
     joint_in,
     may_be_desired,
     number_of,
+    of_motor,
     signal_of,
     without_unit,
     words,
@@ -24,7 +26,7 @@ class ColumnMap:
 
     Attributes:
         time: None where the rows have no time of their own.
-        joints: joint -> {command, position, torque} -> column.
+        joints: joint -> {command, position, torque, link_position, feedforward} -> column.
         unused: columns that are left aside.
     """
 
@@ -65,12 +67,19 @@ def _guessed(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> 
     found: dict[str, dict[str, str]] = {}
     for name, signal in signals.items():
         entry = found.setdefault(owners[name], {})
+        if signal == "position" and signal in entry and of_motor(name) != of_motor(entry[signal]):
+            motor, link = sorted((name, entry[signal]), key=of_motor, reverse=True)
+            entry |= {"position": motor, "link_position": link}
+            continue
         if owners[name] and signal in entry and signal != "torque":
             raise InputError(
                 f"source.columns: '{entry[signal]}' and '{name}' could both be the {signal} of '{owners[name]}'; "
                 f"say which: {EXAMPLE}"
             )
         entry.setdefault(signal, name)
+    for entry in found.values():
+        if "link_position" in entry and "position" not in entry:
+            entry["position"] = entry.pop("link_position")  # the only sensor there is
     return {joint: found[joint] for joint in joints if len({"command", "position"} & set(found.get(joint, ()))) == 2}
 
 
@@ -88,7 +97,9 @@ def _signals(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> 
     if not torque_mode:
         return {name: signal for name, signal in signals.items() if signal != "torque_command"}
     asked = next((one for one in ("torque_command", "torque") if one in signals.values()), "command")
-    kept: dict[str, Signal] = {name: signal for name, signal in signals.items() if signal in ("position", asked)}
+    kept: dict[str, Signal] = {
+        name: signal for name, signal in signals.items() if signal in ("position", "link_position", asked)
+    }
     return {name: "command" if signal == asked else signal for name, signal in kept.items()}
 
 
@@ -129,5 +140,5 @@ def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str]
                 f"source.columns.{joint}: {' and '.join(missing)} missing, received {dict(entry)}; expected "
                 f"{{command: COLUMN, position: COLUMN}}, columns are {list(names)}"
             )
-        if unknown := set(entry) - {"command", "position", "torque"}:
-            raise InputError(f"source.columns.{joint}.{min(unknown)}: unknown; known are command, position, torque")
+        if unknown := set(entry) - set(SIGNALS):
+            raise InputError(f"source.columns.{joint}.{min(unknown)}: unknown; known are {', '.join(SIGNALS)}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.rig import RigJoint
 
-Signal = Literal["time", "command", "position", "torque", "torque_command"]
+Signal = Literal["time", "command", "position", "torque", "torque_command", "link_position", "feedforward"]
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 
 
@@ -24,6 +24,8 @@ COMMAND = _vocabulary(
     "command cmd commanded goal target desired des ref reference setpoint sp soll action demand demanded"
 )
 POSITION = _vocabulary("position pos angle q measured meas actual present state encoder enc ist theta feedback joint")
+MOTOR, LINK = _vocabulary("motor mot rotor"), _vocabulary("link load output secondary")
+FEEDFORWARD = _vocabulary("feedforward forward ff")
 TORQUE = _vocabulary("torque tau effort moment force nm mnm")
 NOT_USED = _vocabulary(  # load: of hobby servos, a share of something
     "velocity vel speed dq qdot qvel omega acc acceleration ddq current curr voltage volt temperature temp pwm "
@@ -52,8 +54,12 @@ def signal_of(name: str) -> Signal | None:
     if TIME & set(said) or (said[:1] == ["t"] and len(said) <= 2):
         return "time"
     commanded = bool(COMMAND & set(said))
+    if FEEDFORWARD & set(said):
+        return "feedforward" if TORQUE & set(said) else None
     if TORQUE & set(said):
         return "torque_command" if commanded else "torque"
+    if LINK & set(said) and POSITION & set(said) and not commanded:
+        return "link_position"
     if NOT_USED & set(said):
         return None
     if commanded:
@@ -70,6 +76,11 @@ def without_unit(name: str) -> list[str]:
     """The words of a name but for units."""
     known = {unit for spellings in UNITS.values() for unit in spellings}
     return [word for word in words(name) if word not in known]
+
+
+def of_motor(name: str) -> bool:
+    """Whether the name says that it is the motor's."""
+    return bool(MOTOR & set(words(name)))
 
 
 def joint_in(name: str, joints: Iterable[str]) -> str | None:
@@ -112,6 +123,7 @@ LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
 FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+GEARED = 1.5  # turns of a motor a turn of its link, from which on there is a gear between them
 SLOWEST = 0.1  # [s] between samples of a log that shows a drive
 NOT_ALIKE = 0.05  # range of a position over that of its command, below which they are in different units
 
@@ -160,6 +172,20 @@ def position_unit(said: str | None, name: str, values: Array, joint: RigJoint) -
             return Unit(unit, units[unit], f"values {values.min():.3g} .. {values.max():.3g} and the joint's limits")
     first = next(iter(units))
     return Unit(first, 1.0, "assumed: no unit fits the joint's limits")
+
+
+def at_the_joint(unit: Unit, gear: float) -> Unit:
+    """The unit of an angle, or a torque, of a motor as it is at its joint, so many turns of the motor a turn there."""
+    size = unit.size * gear if unit.name in {*TORQUE_UNITS, *FORCE_UNITS} else unit.size / gear
+    return Unit(f"{unit.name} of the motor", size, f"{gear:.5g} turns a turn of its link")
+
+
+def gear_of(motor: Array, link: Array) -> float:
+    """Turns of the motor a turn of the link, from their angles in one unit; 1 where they move alike."""
+    moved = link - link.mean()
+    size = float(moved @ moved)
+    gear = float(moved @ (motor - motor.mean())) / size if size > 0.0 else 1.0
+    return gear if abs(gear) > GEARED or gear < 0.0 else 1.0
 
 
 def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
