@@ -86,10 +86,12 @@ ONE_SIDED = {"difference": 0.02, "ratio": 0.3, "friction": 0.01}
 WARMING = {"change": -0.02, "time_constant": 0.1, "friction": 0.01}
 IMPULSE = (0.03 - 0.02) * T + 0.02 * 0.1 * (1.0 - np.exp(-T / 0.1))
 START = {"drive": SERVO, "q": 0.2}
+CASCADE = {"ki": 20.0, "lag": 0.06}
 LAGS = {"time_constant": 0.004, "second": 0.006}
 AS_FILTERED = [[0, 1, 0, 0], [-KP / INERTIA, 0, 0, -KD / INERTIA], [0, 250.0, -250.0, 0], [0, 0, 1 / 0.006, -1 / 0.006]]
 AS_LAGGED = [[0, 1, 0], [0, 0, 1 / INERTIA], [-KP / 0.01, -KD / 0.01, -1 / 0.01]]
 AS_INTEGRATED = [[0, 1, 0], [-KP / INERTIA, -KD / INERTIA, 1 / INERTIA], [-20.0, 0, 0]]
+AS_CASCADED = [[0, 1, 0], [-KP / INERTIA, -KD / INERTIA, 1 / INERTIA], [-20.0, -20.0 * 0.06, 0]]
 AS_FED = [[0, 1, 0], [-KP / INERTIA, -KD / INERTIA, -KD / 0.005 / INERTIA], [0, 0, -1 / 0.005]]
 FED = RAMP + linear(AS_FED, 0.0, -0.5, 0.5 * 0.005)  # error, its speed, and what the smoothed speed lacks
 FALLING = 9.0 * (1.0 - np.exp(-0.4 * PER_INERTIA / 9.0))
@@ -167,6 +169,7 @@ CLOSED_FORMS = (
     ("velocity_filter_lag", LAGS, START, POSITION, linear(AS_FILTERED, 0.2, 0.0, 0.0, 0.0), 2e-4),
     ("actuator_lag", {"time_constant": 0.01}, START, POSITION, linear(AS_LAGGED, 0.2, 0.0, -0.2 * KP), 2e-4),
     ("integral_action", {"ki": 20.0}, START, POSITION, linear(AS_INTEGRATED, 0.2, 0.0, 0.2 * KP), 2e-4),
+    ("integral_action", CASCADE, START, POSITION, linear(AS_CASCADED, 0.2, 0.0, 0.2 * KP), 2e-4),
     ("gravity_compensation", {"share": 0.8}, hanging(0.3, 0.2 * np.sin(0.3)), POSITION, 0.3, 1e-9),
     ("velocity_feedforward", {"gain": KD}, {"drive": SERVO, "command": RAMP}, POSITION, FED, 1e-4),
     ("back_emf", {"stall": 0.4, "no_load": 9.0}, asked(1.0), VELOCITY, FALLING, 1e-4),

@@ -17,8 +17,9 @@ from tests.identification.rigs_of_any_size import EFFECTS, NOISE, Size, simulate
 INTEGRAL = find_effect("integral_action")
 
 
-def test_windows_that_begin_later_know_what_the_integral_has_come_to(tmp_path: Path) -> None:
-    values, wound = {"ki": 2.0}, 0.04
+@pytest.mark.parametrize("values", [{"ki": 2.0}, {"ki": 2.0, "lag": 0.06}])
+def test_windows_that_begin_later_know_what_the_integral_has_come_to(values: dict[str, float], tmp_path: Path) -> None:
+    wound = 0.04
     recording = simulated(tmp_path, Size(), INTEGRAL, values, wound=wound)
     shooting = Shooting(recording, EFFECTS)
     problem = Problem(shooting, shooting.cut(recording, np.array([NOISE]), segment=100))

@@ -21,10 +21,10 @@ CLAMPS = (0.3, 1.0)
 
 
 class IntegralAction(Effect):
-    """Controller that integrates its position error (the I of a PID).
+    """Controller that integrates its error: the I of a PID, or of the speed loop in a cascade (P-PI).
 
-    tau += s with s' = ki * (q_d - q_m), kept within +-limit (anti-windup clamp) unless that is zero. The integral
-    begins at the torque that holds the joint where it starts.
+    tau += s with s' = ki * (q_d - q_m - lag * dq_m), kept within +-limit (anti-windup clamp) unless that is zero. The
+    lag is 0 in a PID, K_D / K_P in a cascade. The integral begins at the torque that holds the joint where it starts.
 
     In data: at rest the error creeps to zero, however heavy the load; motion overshoots and swings back slowly.
     Confused with: `gravity_compensation` in slow motion; `torque_bias`.
@@ -37,14 +37,15 @@ class IntegralAction(Effect):
     parameters = (
         Parameter("ki", "N m/(rad s)", 0.0, 0.0, 200.0, 5.0, "kp over 0.1 to 2 s"),
         Parameter("limit", "N m", 0.0, 0.0, 10.0, 0.0, "none, or a part of the torque limit", scale=0.02),
+        Parameter("lag", "s", 0.0, 0.0, 0.5, 0.0, "0 in a PID, K_D / K_P in a cascade", scale=0.01),
     )
-    forms = ({"ki": 5.0}, {"ki": 5.0, "limit": 0.15})
+    forms = ({"ki": 5.0}, {"ki": 5.0, "limit": 0.15}, {"ki": 5.0, "lag": 0.05})
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Return the integral without a clamp, and with clamps among the torques that the recording asks for."""
-        plain, _ = cls.forms_at(scales)
-        return [plain, *({**plain, "limit": share * scales.torque} for share in CLAMPS)]
+        """Return the integral alone, with clamps among the torques that the recording asks for, and in a cascade."""
+        plain, _, cascade = cls.forms_at(scales)
+        return [plain, *({**plain, "limit": share * scales.torque} for share in CLAMPS), cascade]
 
     state_size = 4  # 0 to begin in balance, 2 as it is, else 1; integral, last command and last reading
 
@@ -62,7 +63,7 @@ class IntegralAction(Effect):
         elif s[0] == 2.0:
             s[0] = 1.0
         else:
-            s[1] += 0.5 * p[0] * dt * (s[2] + x[COMMAND, j] - s[3] - reading)
+            s[1] += p[0] * (0.5 * dt * (s[2] + x[COMMAND, j] - s[3] - reading) - p[2] * (reading - s[3]))
         if p[1] > 0.0:
             s[1] = min(max(s[1], -p[1]), p[1])
         s[2], s[3] = x[COMMAND, j], reading

@@ -59,7 +59,8 @@ def wind_up(plant: Plant, model: Model, windows: Windows, memory: Array) -> None
         own = values[plant.joint_names[j]]
         for k in np.flatnonzero(later):
             start = balance[k, j] + windows.wound[k, j]
-            state[k, j, 1] = integrated(windows.errors[k][:, j].copy(), start, own["ki"], own.get("limit", 0.0))
+            errors = windows.errors[k][:, 0, j] - own.get("lag", 0.0) * windows.errors[k][:, 1, j]
+            state[k, j, 1] = integrated(errors, start, own["ki"], own.get("limit", 0.0))
         state[later, j, 0] = 2.0
 
 

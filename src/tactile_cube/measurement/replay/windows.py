@@ -75,7 +75,8 @@ class Windows:
             how much faster they are [rad/s]; see `initial_states`.
         trial_start: (S, 3, n) position, command [rad] and speed [rad/s] of the trial's first step.
         wound: (S, n) what the integral of a controller holds beyond balance as the trial begins [N m].
-        errors: of each window, (rows before it, n) errors of the trial's position times the sampling step [rad s].
+        errors: of each window, (rows before it, 2, n): errors of the trial's position times the sampling step [rad s],
+            and how far it moved [rad].
         forces: known forces on a link, or None.
         joint_of: (M,) joint that each sensor belongs to.
         history: H.
@@ -227,6 +228,7 @@ def _pieces(
     fine, jump = _as_simulated(recording, trial, substeps)
     command, after = _around(_as_positions(recording, trial), recording.read)
     errors = trial.step * (after[:-1] - 0.5 * (trial.position[:-1] + trial.position[1:]))
+    errors = np.stack([errors, np.diff(trial.position, axis=0)], axis=1)
     drive = _drive(recording, trial)
     half = _half_width(trial.step, noise, speed_known, time)
     kinks = np.flatnonzero(asks_for_much(jump, drive.kp, drive.limit).any(axis=1))
