@@ -30,7 +30,7 @@ from tactile_cube.measurement.recordings.plausibility import (
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.timing import check_time, on_grid
+from tactile_cube.measurement.recordings.timing import check_time, on_grid, rows_of
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.untrusted_file import below
 
@@ -145,16 +145,5 @@ def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key
         kept &= (trial.time < start) | (trial.time >= end)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(int)))
     pieces = [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= MINIMUM_SAMPLES]
-    return [_piece(trial, rows, f"{trial.name}_{number}") for number, rows in enumerate(pieces)]
-
-
-def _piece(trial: Trial, rows: slice, name: str) -> Trial:
-    return replace(
-        trial,
-        name=name,
-        time=trial.time[rows] - trial.time[rows.start],
-        command=trial.command[rows],
-        position=trial.position[rows],
-        torque=None if trial.torque is None else trial.torque[rows],
-        valid=trial.valid[rows],
-    )
+    parts = [rows_of(trial, rows) for rows in pieces]
+    return [replace(part, name=f"{trial.name}_{k}", time=part.time - part.time[0]) for k, part in enumerate(parts)]

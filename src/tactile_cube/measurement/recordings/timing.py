@@ -1,7 +1,8 @@
 """Time stamps of a trial: in order, at the stated rate, and put on a uniform grid."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,15 @@ LONGEST_GAP = 0.25  # [s] beyond this the command in between is anybody's guess
 JITTER = 0.1  # share of a period that is worth a warning
 TINY = 1e-12  # share of a period below which no rate fits
 ON_GRID = 0.02  # share of a period below which samples are taken as they are
+
+
+Signals = TypeVar("Signals")
+
+
+def rows_of(signals: Signals, rows: slice | NDArray[np.bool_]) -> Signals:
+    """Columns, a trial or a table to be written with these rows of its arrays alone."""
+    arrays = {one.name: getattr(signals, one.name) for one in fields(signals)}  # type: ignore[arg-type]
+    return replace(signals, **{name: a[rows] for name, a in arrays.items() if isinstance(a, np.ndarray)})  # type: ignore[type-var]
 
 
 def check_time(columns: TrialColumns, rate: float, path: Path) -> tuple[TrialColumns, list[str]]:
@@ -70,9 +80,7 @@ def _without_repeats(columns: TrialColumns, path: Path) -> tuple[TrialColumns, l
     keep = np.concatenate([[True], steps > 0])
     if keep.all():
         return columns, []
-    row = int(np.argmin(keep))
-    torque = None if columns.torque is None else columns.torque[keep]
-    shorter = TrialColumns(columns.time[keep], columns.command[keep], columns.position[keep], torque)
+    row, shorter = int(np.argmin(keep)), rows_of(columns, keep)
     if len(shorter.time) < 2:
         raise InputError(f"{path}: column 'time', row {row}: all rows have the same time {columns.time[0]:.6g} s")
     return shorter, [

@@ -4,7 +4,8 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.timing import rows_of
 from tactile_cube.untrusted_file import below
 
 Array = NDArray[np.float64]
@@ -89,6 +91,22 @@ def write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
         polars.DataFrame(columns).write_csv(path)
     else:
         polars.DataFrame(columns).write_parquet(path)
+
+
+def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
+    """Pieces of `length` [s] of a trial; a rest of less than half of that is dropped."""
+    duration = float(trial.time[-1] - trial.time[0])
+    if length is None or duration < 1.5 * length:
+        return [trial]
+    starts = np.arange(0.0, duration - 0.5 * length, length) + trial.time[0]
+    edges = [*np.searchsorted(trial.time, starts - 1e-9), len(trial.time)]
+    stem, _, ending = trial.entry.file.rpartition(".")
+    pieces = []
+    for number, (start, end) in enumerate(pairwise(edges)):
+        piece = rows_of(trial, slice(start, end))
+        entry = trial.entry.model_copy(update={"file": f"{stem}_part{number:02d}.{ending}"})
+        pieces.append(replace(piece, entry=entry, time=piece.time - piece.time[0]))
+    return pieces
 
 
 def require_free(out: Path) -> None:
