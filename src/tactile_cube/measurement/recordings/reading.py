@@ -15,9 +15,7 @@ from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
     check_joints,
     check_nominal,
-    check_rate,
     gains_of,
-    joints_where,
     swap_warning,
 )
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
@@ -52,7 +50,6 @@ def read_recording(folder: str | Path) -> Recording:
     urdf, not_drawn = with_own_files(rig.text, rig.path, folder)
     rig = replace(rig, text=urdf)
     check_joints(description, rig, file)
-    check_rate(description, file)
     try:
         recording = _assemble(folder, description, rig)
     except InputError:
@@ -60,40 +57,39 @@ def read_recording(folder: str | Path) -> Recording:
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
     recording.rigid_body()
-    more = [] if (swapped := swap_warning(recording)) is None else [swapped]
+    warnings = [*recording.warnings, *swap_warning(recording)]
     if not_drawn:
-        more.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
-    return replace(recording, warnings=(*recording.warnings, *more))
+        warnings.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
+    return replace(recording, warnings=tuple(warnings))
 
 
 def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
-    joints = tuple(description.joints)
+    file, joints = folder / DESCRIPTION, tuple(description.joints)
     nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
     check_nominal(nominal, joints)
-    warnings = [f"{folder / DESCRIPTION}: {line}" for line in check_coupling(description, rig)]
+    warnings = [f"{file}: {line}" for line in check_coupling(description, rig)]
     trials, gains, left = [], gains_of(description, None, "controller"), limits.NUMBERS
-    if description.controller.mode != "torque" and (gains.kd == 0).any():
-        warnings.append(
-            f"{folder / DESCRIPTION}: key 'controller.kd': 0 for {joints_where(gains.kd == 0, joints)}: no damping"
-        )
+    undamped = [joint for joint, kd in zip(joints, gains.kd, strict=True) if kd == 0]
+    if description.controller.mode != "torque" and undamped:
+        warnings.append(f"{file}: key 'controller.kd': 0 for {', '.join(undamped)}: no damping")
     for index, entry in enumerate(description.trials):
-        path = below(folder, entry.file, f"{folder / DESCRIPTION}: key 'trials.{index}.file'")
+        path = below(folder, entry.file, f"{file}: key 'trials.{index}.file'")
         trial = _trial(path, left, entry, description, rig, f"trials.{index}.controller")
         left -= trial.time.size + 3 * trial.position.size
         trial = trial.with_earlier_commands(description.sensors.commands_late)
-        trials += without_excluded(trial, entry.exclude, f"{folder / DESCRIPTION}: key 'trials.{index}.exclude'")
+        trials += without_excluded(trial, entry.exclude, f"{file}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
     if not trials:
-        raise InputError(f"{folder / DESCRIPTION}: key 'trials': 'exclude' leaves nothing of any trial")
+        raise InputError(f"{file}: key 'trials': 'exclude' leaves nothing of any trial")
     return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
 
 
 def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
     """One trial, checked and on the uniform grid of the recording's rate."""
-    joints = tuple(description.joints)
+    joints, rate = tuple(description.joints), description.rate_hz
     gains = gains_of(description, entry, key)
     columns, warnings = pick_columns(read_table(path, most), joints, path)
-    columns, time_warnings = check_time(columns, description.rate_hz, path)
+    columns, time_warnings = check_time(columns, rate, path)
     ranges = [rig.joints[joint] for joint in joints]
     columns, wrapped = without_wraps(columns, ranges, path)
     warnings += wrapped
@@ -102,26 +98,18 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         warnings += check_assignment(columns, ranges, path) if entry.object is None else []
         warnings += check_roles(columns, joints, path)
     columns, outlying, single = without_outliers(columns, joints, path)
-    grid, valid = on_grid(columns, description.rate_hz)
-    stamps = (columns.time[outlying] - columns.time[0]) * description.rate_hz
+    grid, valid = on_grid(columns, rate)
+    stamps = (columns.time[outlying] - columns.time[0]) * rate
     beside = np.concatenate([np.floor(stamps), np.ceil(stamps)]).astype(np.int64)
     valid[np.minimum(beside, len(valid) - 1)] = False
     return Trial(
-        path.stem,
-        entry.file,
-        entry.kind,
-        entry.initialisation,
-        grid.time,
-        grid.command,
-        grid.position,
-        grid.torque,
-        valid,
-        gains,
-        entry.force,
-        entry.clamped,
-        entry.touch,
-        tuple(warnings + time_warnings + single),
-        load_of(description.object, entry.object) if description.object and entry.object else None,
+        name=path.stem,
+        **{key: getattr(entry, key) for key in ("file", "kind", "initialisation", "force", "clamped", "touch")},
+        **vars(grid),
+        valid=valid,
+        gains=gains,
+        warnings=tuple(warnings + time_warnings + single),
+        load=load_of(description.object, entry.object) if description.object and entry.object else None,
     )
 
 
