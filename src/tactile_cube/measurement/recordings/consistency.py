@@ -21,7 +21,7 @@ SLOWER = 0.75  # share of the log's rate that rounding explains
 
 
 def check_joints(description: Description, rig: Rig, file: Path) -> None:
-    """Refuse joints that the URDF lacks, couplings to joints that are not actuated, a controller slower than the log."""
+    """Refuse joints that the URDF lacks, couplings to joints not actuated, a controller slower than the log."""
     named = [(joint, "joints") for joint in description.joints]
     named += [(joint, "coupled") for joint in description.coupled]
     named += [(coupling.joint, f"coupled.{joint}.joint") for joint, coupling in description.coupled.items()]
