@@ -126,20 +126,16 @@ def _known_force(bench: Bench, number: int) -> list[BenchTrial]:
     posture, direction = bench.posture(), bench.rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     last, point = bench.tip()
+    corners = np.cumsum([0.0, MOVE, MOVE, HOLD, MOVE, MOVE, HOLD])
+    sides = np.interp(bench.time(corners[-1]), corners, SIDE * np.array([0, 1, 0, 0, -1, 0, 0]))
     trials = []
     for weight in range(WEIGHTS):
         vector = (FORCE * weight / (WEIGHTS - 1) * direction).tolist()
         file = f"trials/known_force_{number}_{weight}.parquet"
         force = KnownForce(joint=last, point=point, vector=vector)
         entry = TrialEntry(file=file, initialisation=number, kind="known_force", force=force)
-        trials.append((entry, posture + _from_both_sides(bench)[:, None]))
+        trials.append((entry, posture + sides[:, None]))
     return trials
-
-
-def _from_both_sides(bench: Bench) -> Array:
-    """Offset (n,) [rad] of a command that comes to rest at zero from above and then from below."""
-    corners = np.cumsum([0.0, MOVE, MOVE, HOLD, MOVE, MOVE, HOLD])
-    return np.asarray(np.interp(bench.time(corners[-1]), corners, SIDE * np.array([0, 1, 0, 0, -1, 0, 0])))
 
 
 def _clamped(bench: Bench, number: int) -> list[BenchTrial]:

@@ -119,9 +119,9 @@ def on_grid(columns: TrialColumns, rate: float) -> tuple[TrialColumns, NDArray[n
     valid = (time[after] - time[after - 1]) * rate <= DROPPED
     valid |= np.minimum(np.abs(grid - time[after]), np.abs(grid - time[after - 1])) * rate < ON_GRID
     held = np.searchsorted(time, grid + ON_GRID / rate, side="right") - 1
-    torque = None if columns.torque is None else _interpolated(grid, time, columns.torque)
-    return TrialColumns(grid, columns.command[held], _interpolated(grid, time, columns.position), torque), valid
 
+    def interpolated(values: Array) -> Array:
+        return np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
 
-def _interpolated(grid: Array, time: Array, values: Array) -> Array:
-    return np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
+    torque = None if columns.torque is None else interpolated(columns.torque)
+    return TrialColumns(grid, columns.command[held], interpolated(columns.position), torque), valid
