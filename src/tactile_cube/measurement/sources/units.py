@@ -1,7 +1,7 @@
 """In which unit a column is: what the user says, or its name, or its values."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,11 +35,10 @@ def words(name: str) -> list[str]:
     return [word.lower() for word in WORD.findall(name)]
 
 
-def unit_of(name: str, units: Iterable[str]) -> str | None:
-    """The unit, one of `units`, that the name ends with or has in brackets."""
-    allowed = set(units)
+def _unit_of(name: str, allowed: Mapping[str, float]) -> str | None:
+    """The unit, one of those allowed, that the name ends with or has in brackets."""
     torque = TORQUE_UNIT.search(name)
-    if torque is not None and allowed & set(TORQUE_PREFIX.values()):
+    if torque is not None and set(allowed) & set(TORQUE_PREFIX.values()):
         return TORQUE_PREFIX[(torque.group(1) or torque.group(2) or "").lower()]
     if "°" in name and "deg" in allowed:
         return "deg"
@@ -69,7 +68,7 @@ def chosen_unit(said: str | None, name: str, units: Mapping[str, float], key: st
         if said not in units:
             raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}")
         return Unit(said, units[said], f"source.{key}")
-    found = unit_of(name, units)
+    found = _unit_of(name, units)
     return None if found is None else Unit(found, units[found], "its name")
 
 
@@ -99,10 +98,7 @@ def position_unit(said: str | None, name: str, values: Array, joint: RigJoint) -
 def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
     """Units of a command and its position, one for both where values alone told them and the motions are alike.
 
-    Args:
-        command: its unit.
-        position: its unit.
-        ratio: range of the position over that of the command, as logged.
+    `ratio` is the range of the position over that of the command, as logged.
     """
     guessed = not {"its name"} & {command.source, position.source}
     if command.name == position.name or not guessed or not NOT_ALIKE < ratio < 1 / NOT_ALIKE:
@@ -113,6 +109,5 @@ def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
 
 def torque_unit(said: str | None, name: str, prismatic: bool) -> Unit:
     """Unit of torques, or of a sliding joint's forces; N m or N where nothing is said."""
-    if prismatic:
-        return chosen_unit(said, name, FORCE_UNITS, "torque_unit") or Unit("N", 1.0, "assumed")
-    return chosen_unit(said, name, TORQUE_UNITS, "torque_unit") or Unit("Nm", 1.0, "assumed")
+    units = FORCE_UNITS if prismatic else TORQUE_UNITS
+    return chosen_unit(said, name, units, "torque_unit") or Unit(next(iter(units)), 1.0, "assumed")
