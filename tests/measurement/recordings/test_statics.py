@@ -4,23 +4,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.consistency import swap_warning
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tests.measurement.small_rig import write
+from tests.measurement.small_rig import setting, write
 
 
 @pytest.fixture
 def held(tmp_path: Path) -> Recording:
     """Two trials at rest in many postures, the torques those of the links' weight."""
-
-    def change(data: dict) -> None:
-        data["gravity"] = [6.0, 0.0, -7.8]
-
-    recording = read_recording(write(tmp_path, change))
-    tree = RigidBodyTree.from_urdf(recording.urdf, recording.joints)
-    trials = []
+    recording = read_recording(write(tmp_path, setting({"gravity": [6.0, 0.0, -7.8]})))
+    tree, trials = recording.rigid_body(), []
     for trial in recording.trials:
         position = np.repeat(np.random.default_rng(0).uniform(-0.4, 0.4, (6, 2)), 50, axis=0)
         weight = np.stack([tree.equations(q, np.zeros(2), recording.gravity)[1] for q in position])
