@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tactile_cube.measurement.recordings.description import TrialEntry
-from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.foreign_log import cut_trial
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.untrusted_file import read_npz
 

@@ -53,9 +53,26 @@ def table(seed: int = 0, samples: int = 300, noise: float = 2e-4, offset: float 
     return columns
 
 
+Change = Callable[[dict[str, Any]], None]
+
+
+def setting(values: dict[str, object]) -> Change:
+    """Set keys of recording.yaml, named as in errors: `trials.0.kind`."""
+
+    def change(data: dict[str, Any]) -> None:
+        for key, value in values.items():
+            place: Any = data
+            *groups, last = key.split(".")
+            for group in groups:
+                place = place[int(group) if group.isdigit() else group]
+            place[last] = value
+
+    return change
+
+
 def write(
     folder: Path,
-    change: Callable[[dict[str, Any]], None] = lambda data: None,
+    change: Change = lambda data: None,
     spoil: Callable[[Table], None] = lambda columns: None,
     urdf: str = URDF,
 ) -> Path:

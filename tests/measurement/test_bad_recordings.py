@@ -15,7 +15,8 @@ import pytest
 from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.measurement.small_rig import URDF, Table, table, write
+from tactile_cube.measurement.recordings.tables import read_table
+from tests.measurement.small_rig import URDF, Table, setting, table, write
 
 
 def error_of(folder: Path) -> str:
@@ -103,34 +104,20 @@ def test_missing_torque_of_one_joint_is_a_warning(tmp_path: Path) -> None:
 
 
 def test_text_in_a_csv_is_named_with_its_row(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["trials"][0]["file"] = "first.csv"
-
-    write(tmp_path, change)
     rows = ["time,a.command,a.position,b.command,b.position"] + [f"{k / 100},0,0,0,0" for k in range(40)]
     rows[8] = "0.07,0,oops,0,0"
-    (tmp_path / "first.csv").write_text("\n".join(rows))
+    with_first(tmp_path, "first.csv").write_text("\n".join(rows))
     assert "first.csv: column 'a.position', row 7: expected a number, received 'oops'" in error_of(tmp_path)
 
 
 def test_degrees_within_wide_limits_are_recognised_by_the_torque(tmp_path: Path) -> None:
-    def spoil(columns: Table) -> None:
-        for signal in ("command", "position"):
-            columns[f"a.{signal}"] *= 180 / np.pi
-
+    spoil = scale(180 / np.pi, "a.command", "a.position")
     wide = URDF.replace('lower="-0.5" upper="0.5"', 'lower="-50" upper="50"')
-
-    def change(data: dict) -> None:
-        data["controller"]["kd"] = 1e-9
-
-    assert "degrees" in error_of(write(tmp_path, change, spoil, wide))
+    assert "degrees" in error_of(write(tmp_path, setting({"controller.kd": 1e-9}), spoil, wide))
 
 
 def test_an_unknown_joint_is_named_with_those_of_the_rig(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["joints"] = ["a", "elbow"]
-
-    message = error_of(write(tmp_path, change))
+    message = error_of(write(tmp_path, setting({"joints": ["a", "elbow"]})))
     assert "joint 'elbow' is not in" in message
     assert "['a', 'b']" in message
 
@@ -164,15 +151,12 @@ def test_dropped_samples_are_a_warning_and_count_in_no_error(tmp_path: Path) -> 
 
 
 def test_a_wrong_rate_is_an_error_that_says_the_right_one(tmp_path: Path) -> None:
-    def change(data: dict) -> None:
-        data["rate_hz"] = 500
-
-    assert "set rate_hz to 100" in error_of(write(tmp_path, change))
+    assert "set rate_hz to 100" in error_of(write(tmp_path, setting({"rate_hz": 500})))
 
 
 def with_first(folder: Path, name: str) -> Path:
     """A recording whose first trial is in another file, and that file, which is not there yet."""
-    write(folder, lambda data: data["trials"][0].update(file=name))
+    write(folder, setting({"trials.0.file": name}))
     return folder / name
 
 
@@ -195,7 +179,7 @@ def test_an_npz_file_with_objects_is_never_unpickled(tmp_path: Path) -> None:
 
 
 def test_damping_of_zero_is_a_warning(tmp_path: Path) -> None:
-    folder = write(tmp_path, lambda data: data["controller"].update(kd=0.0))
+    folder = write(tmp_path, setting({"controller.kd": 0.0}))
     assert any("kd" in line and "no damping" in line for line in read_recording(folder).warnings)
 
 
@@ -206,11 +190,7 @@ GRASP = {"position": [0.0, 0.0, 0.0]}
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        (
-            "rate_hz",
-            "fast",
-            "key 'rate_hz': Input should be a valid number, unable to parse string as a number, received 'fast'",
-        ),
+        ("rate_hz", "fast", "key 'rate_hz': Input should be a valid number"),
         ("rate_hz", 1e9, "key 'rate_hz'"),
         ("controler", {}, "key 'controler'"),
         ("gravity", [np.nan, 0.0, -9.81], "key 'gravity.0'"),
@@ -229,23 +209,13 @@ GRASP = {"position": [0.0, 0.0, 0.0]}
         ("object", HELD | {"mass": -1.0}, "key 'object.mass'"),
         ("object", HELD | {"com": [0.0, 0.0, np.inf]}, "key 'object.com.2'"),
         ("trials.0.object", GRASP | {"quaternion": [0, 0, 0, 0]}, "key 'trials.0.object'"),
-        (
-            "trials.0.force",
-            {"joint": "a", "point": [0, 0, 0], "vector": [0, 0, np.nan]},
-            "key 'trials.0.force.vector.2'",
-        ),
+        ("trials.0.force", {"joint": "a", "point": [0] * 3, "vector": [0, 0, np.nan]}, "key 'trials.0.force.vector.2'"),
         ("trials.0.touch", {"joint": "a", "angle": np.inf}, "key 'trials.0.touch.angle'"),
         ("coupled", {"b": {"joint": "a", "ratio": np.nan}}, "key 'coupled.b.ratio'"),
     ],
 )
 def test_a_wrong_value_is_named_with_its_key(tmp_path: Path, key: str, value: object, said: str) -> None:
-    def change(data: dict) -> None:
-        *groups, last = key.split(".")
-        for group in groups:
-            data = data[int(group) if group.isdigit() else group]
-        data[last] = value
-
-    message = error_of(write(tmp_path, change))
+    message = error_of(write(tmp_path, setting({key: value})))
     assert said in message
     assert str(tmp_path / "recording.yaml") in message
 
@@ -322,12 +292,8 @@ def test_a_place_without_a_regular_file_in_the_folder_is_refused(tmp_path: Path,
 @pytest.mark.parametrize("file", ["rig.urdf", "first.parquet"])
 def test_a_name_that_leads_out_of_the_folder_is_refused(tmp_path: Path, name: str, file: str) -> None:
     write(tmp_path)
-
-    def change(data: dict) -> None:
-        where = data["trials"][0] if file == "first.parquet" else data
-        where["file" if file == "first.parquet" else "rig"] = name.format(file, outside=tmp_path)
-
-    message = error_of(write(tmp_path / "inner", change))
+    change = {"trials.0.file" if file == "first.parquet" else "rig": name.format(file, outside=tmp_path)}
+    message = error_of(write(tmp_path / "inner", setting(change)))
     assert "lies outside of" in message or "is no name of a file" in message
 
 
@@ -390,8 +356,20 @@ def test_a_name_with_an_asterisk_is_no_pattern(tmp_path: Path) -> None:
 def test_more_missing_samples_than_there_are_is_an_error(tmp_path: Path) -> None:
     """Gaps of 0.2 s at 100 kHz: 300 rows would become millions."""
 
-    def spoil(columns: Table) -> None:
-        columns["time"] = np.arange(300) * 1e-5 + 0.2 * (np.arange(300) // 4)
-
-    folder = write(tmp_path, lambda data: data.update(rate_hz=1e5), spoil)
+    times = np.arange(300) * 1e-5 + 0.2 * (np.arange(300) // 4)
+    folder = write(tmp_path, setting({"rate_hz": 1e5}), lambda columns: columns.update(time=times))
     assert "samples at rate_hz 100000 it has 300" in error_of(folder)
+
+
+@pytest.mark.parametrize(("file", "reader"), [("trial.parquet", "scan_parquet"), ("trial.csv", "read_csv")])
+def test_a_reader_that_panics_means_a_damaged_file(
+    file: str, reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def panic(*_: object, **__: object) -> None:
+        raise polars.exceptions.PanicException("Thrift out of range\nsecond line")
+
+    frame = polars.DataFrame({"time": [0.0]})
+    frame.write_parquet(tmp_path / file) if file.endswith("parquet") else frame.write_csv(tmp_path / file)
+    monkeypatch.setattr(polars, reader, panic)
+    with pytest.raises(InputError, match=rf"{file}: not a .*Thrift out of range$"):
+        read_table(tmp_path / file)

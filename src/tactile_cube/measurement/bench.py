@@ -7,18 +7,15 @@ Source: Sievers, Pitz, Bauml (ICRA 2022), section II-D.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.hand.rigid_body import Mimic, RigidBodyTree
 from tactile_cube.measurement.excitation import safe_range
-from tactile_cube.measurement.recordings.description import Description, KnownForce, Touch, TrialEntry
+from tactile_cube.measurement.recordings.description import KnownForce, Touch, TrialEntry
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Trial
 
 Array = NDArray[np.float64]
@@ -91,72 +88,57 @@ def with_object(recording: Recording) -> Recording:
     return recording.with_trials([trial for trial in recording.trials if trial.load is not None])
 
 
-@dataclass(frozen=True)
-class Bench:
-    """A rig on the bench: its description and a source of postures."""
-
-    rig: Rig
-    description: Description
-    rng: np.random.Generator
-
-    def posture(self) -> Array:
-        """Angles (joints,) [rad] in the middle half of every joint's range."""
-        low, high = np.array([safe_range(self.rig.joints[joint], 0.5) for joint in self.description.joints]).T
-        return np.asarray(self.rng.uniform(low, high))
-
-    def tip(self) -> tuple[str, list[float]]:
-        """The last joint and a point on its link, as far beyond its centre of mass as the joint is before it [m]."""
-        coupled = {name: Mimic(c.joint, c.ratio, c.offset) for name, c in self.description.coupled.items()}
-        tree = RigidBodyTree.from_urdf(self.rig.text, self.description.joints, coupled)
-        return tree.dof_names[-1], (2 * tree.com[-1]).tolist()
-
-    def time(self, duration: float) -> Array:
-        """Sample times [s]."""
-        return np.arange(round(duration * self.description.rate_hz)) / self.description.rate_hz
-
-
-def bench_trials(bench: Bench, kinds: Iterable[str], initialisations: int) -> list[BenchTrial]:
+def bench_trials(
+    rig: Recording, kinds: Iterable[str], initialisations: int, rng: np.random.Generator
+) -> list[BenchTrial]:
     """Entries and commands (n, joints) [rad] of the bench tests among `kinds`, for every initialisation."""
-    chosen = [kind for kind in kinds if kind in BENCH_KINDS]
-    return [trial for number in range(initialisations) for kind in chosen for trial in BENCH_KINDS[kind](bench, number)]
+    chosen = [BENCH_KINDS[kind] for kind in kinds if kind in BENCH_KINDS]
+    return [trial for number in range(initialisations) for test in chosen for trial in test(rig, number, rng)]
 
 
-def _known_force(bench: Bench, number: int) -> list[BenchTrial]:
+def _posture(rig: Recording, rng: np.random.Generator) -> Array:
+    """Angles (joints,) [rad] in the middle half of every joint's range."""
+    low, high = np.array([safe_range(rig.rig.joints[joint], 0.5) for joint in rig.joints]).T
+    return np.asarray(rng.uniform(low, high))
+
+
+def _time(rig: Recording, duration: float) -> Array:
+    return np.arange(round(duration * rig.rate)) / rig.rate
+
+
+def _known_force(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
     """One posture, approached from both sides under several weights that pull one way; a trial for each weight."""
-    posture, direction = bench.posture(), bench.rng.normal(size=3)
+    posture, direction = _posture(rig, rng), rng.normal(size=3)
     direction /= np.linalg.norm(direction)
-    last, point = bench.tip()
+    tree = rig.rigid_body()  # the force acts as far beyond the last link's centre of mass as the joint is before it
+    last, point = tree.dof_names[-1], (2 * tree.com[-1]).tolist()
+    corners = np.cumsum([0.0, MOVE, MOVE, HOLD, MOVE, MOVE, HOLD])
+    sides = np.interp(_time(rig, corners[-1]), corners, SIDE * np.array([0, 1, 0, 0, -1, 0, 0]))
     trials = []
     for weight in range(WEIGHTS):
         vector = (FORCE * weight / (WEIGHTS - 1) * direction).tolist()
         file = f"trials/known_force_{number}_{weight}.parquet"
         force = KnownForce(joint=last, point=point, vector=vector)
         entry = TrialEntry(file=file, initialisation=number, kind="known_force", force=force)
-        trials.append((entry, posture + _from_both_sides(bench)[:, None]))
+        trials.append((entry, posture + sides[:, None]))
     return trials
 
 
-def _from_both_sides(bench: Bench) -> Array:
-    """Offset (n,) [rad] of a command that comes to rest at zero from above and then from below."""
-    corners = np.cumsum([0.0, MOVE, MOVE, HOLD, MOVE, MOVE, HOLD])
-    return np.asarray(np.interp(bench.time(corners[-1]), corners, SIDE * np.array([0, 1, 0, 0, -1, 0, 0])))
-
-
-def _clamped(bench: Bench, number: int) -> list[BenchTrial]:
+def _clamped(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
     """Links held still while every command sweeps about the posture: the drive alone gives way."""
-    sweep = SWEEP * np.sin(2 * np.pi * bench.time(SWEEP_TIME) / SWEEP_TIME)
+    sweep = SWEEP * np.sin(2 * np.pi * _time(rig, SWEEP_TIME) / SWEEP_TIME)
     file = f"trials/clamped_{number}.parquet"
     entry = TrialEntry(file=file, initialisation=number, kind="clamped", clamped=True)
-    return [(entry, bench.posture() + sweep[:, None])]
+    return [(entry, _posture(rig, rng) + sweep[:, None])]
 
 
-def _touch(bench: Bench, number: int) -> list[BenchTrial]:
+def _touch(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
     """Every joint in turn is moved against an obstacle and pressed there a little."""
     trials = []
-    for index, joint in enumerate(bench.description.joints):
-        posture = bench.posture()
+    for index, joint in enumerate(rig.joints):
+        posture = _posture(rig, rng)
         angle = float(posture[index] + BEFORE_TOUCH)
-        way = np.clip(bench.time(APPROACH + HOLD) / APPROACH, 0.0, 1.0)
+        way = np.clip(_time(rig, APPROACH + HOLD) / APPROACH, 0.0, 1.0)
         command = np.tile(posture, (len(way), 1))
         command[:, index] += (BEFORE_TOUCH + PRESS) * way
         file, touch = f"trials/touch_{number}_{joint}.parquet", Touch(joint=joint, angle=angle)
@@ -165,7 +147,7 @@ def _touch(bench: Bench, number: int) -> list[BenchTrial]:
     return trials
 
 
-BENCH_KINDS: dict[str, Callable[[Bench, int], list[BenchTrial]]] = {
+BENCH_KINDS: dict[str, Callable[[Recording, int, np.random.Generator], list[BenchTrial]]] = {
     "known_force": _known_force,
     "clamped": _clamped,
     "touch": _touch,

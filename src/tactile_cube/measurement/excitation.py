@@ -47,20 +47,20 @@ def ramps(time: Array, rng: np.random.Generator) -> Array:
 
 def holds(time: Array, rng: np.random.Generator) -> Array:
     """Quick moves between postures that are held for a second or so, in 0..1: gravity, sticking, creep."""
-    corners, values = [0.0], [float(rng.uniform())]
-    while corners[-1] < time[-1]:
-        corners += [corners[-1] + rng.uniform(0.6, 1.4), 0.0]
-        corners[-1] = corners[-2] + 0.15
-        values += [values[-1], float(rng.uniform())]
-    return np.asarray(np.interp(time, corners, values))
+    return _held(time, (0.6, 1.4), 0.15, rng)
 
 
 def steps(time: Array, rng: np.random.Generator) -> Array:
     """Postures commanded within two hundredths of a second and held, in 0..1: all the torque that a motor has."""
+    return _held(time, (0.4, 0.8), 0.02, rng)
+
+
+def _held(time: Array, rest: tuple[float, float], move: float, rng: np.random.Generator) -> Array:
+    """Random values that are each held for some `rest` [s] and reached within `move` [s]."""
     corners, values = [0.0], [float(rng.uniform())]
     while corners[-1] < time[-1]:
-        corners += [corners[-1] + rng.uniform(0.4, 0.8), 0.0]
-        corners[-1] = corners[-2] + 0.02
+        end = corners[-1] + rng.uniform(*rest)
+        corners += [end, end + move]
         values += [values[-1], float(rng.uniform())]
     return np.asarray(np.interp(time, corners, values))
 
@@ -86,9 +86,5 @@ def policy(time: Array, rng: np.random.Generator) -> Array:
 
 
 KINDS: dict[str, Callable[[Array, np.random.Generator], Array]] = {
-    "ramps": ramps,
-    "holds": holds,
-    "steps": steps,
-    "multisine": multisine,
-    "policy": policy,
+    one.__name__: one for one in (ramps, holds, steps, multisine, policy)
 }

@@ -9,15 +9,10 @@ from tactile_cube.measurement.recordings.recording import Recording
 
 
 def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> tuple[Recording, Recording]:
-    """The trials to fit and the trials to judge by.
+    """The trials to fit, and a `share` of all trials to judge by, chosen by `seed`.
 
     Whole robot initialisations are held out where there are several, so that no joint offset is on both sides;
     otherwise whole trials: of each kind that was repeated all but one at most, or, if none was, of all kinds together.
-
-    Args:
-        recording: at least two trials.
-        share: part of the trials that is held out.
-        seed: which ones.
 
     Raises:
         InputError: there is one trial alone.
@@ -35,8 +30,13 @@ def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> 
         chosen = [trial.initialisation in held for trial in recording.trials]
     else:
         kinds = [trial.kind for trial in recording.trials]
-        repeated = len(set(kinds)) < len(kinds)
-        chosen = _trials_of_each_kind(kinds if repeated else ["any"] * len(kinds), share, rng)
+        kinds = kinds if len(set(kinds)) < len(kinds) else ["any"] * len(kinds)
+        chosen = [False] * len(kinds)
+        for kind in dict.fromkeys(kinds):
+            members = [index for index, other in enumerate(kinds) if other == kind]
+            count = min(len(members) - 1, max(1, round(share * len(members))))
+            for index in rng.permutation(members)[:count]:
+                chosen[int(index)] = True
     trials = list(zip(recording.trials, chosen, strict=True))
     return (
         recording.with_trials([trial for trial, held_out in trials if not held_out]),
@@ -52,14 +52,7 @@ def with_test_part(fitted: Recording, trials: int, seed: int = 0) -> tuple[Recor
     """The trials to fit without some that only test: nothing is fitted to them and nothing chosen by them.
 
     They come from the trials to fit, for those that choose are few already; of each kind at least one stays there.
-
-    Args:
-        fitted: trials to fit.
-        trials: how many the recording has in all.
-        seed: which ones.
-
-    Returns:
-        The trials to fit, and those to test by; None where there are too few.
+    None where there are too few. `trials` is how many the recording has in all, `seed` chooses.
     """
     kinds = Counter(trial.kind for trial in fitted.trials)
     repeated = max(kinds.values()) > 1
@@ -97,13 +90,3 @@ def turned(fitted: Recording, held_out: Recording, parts: int = 3) -> list[tuple
         for part in others
         if part
     ]
-
-
-def _trials_of_each_kind(kinds: list[str], share: float, rng: np.random.Generator) -> list[bool]:
-    chosen = [False] * len(kinds)
-    for kind in dict.fromkeys(kinds):
-        members = [index for index, other in enumerate(kinds) if other == kind]
-        count = min(len(members) - 1, max(1, round(share * len(members))))
-        for index in rng.permutation(members)[:count]:
-            chosen[int(index)] = True
-    return chosen

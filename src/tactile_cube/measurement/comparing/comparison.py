@@ -196,14 +196,7 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         "error": asdict(comparison.errors),
         "raw_error": asdict(comparison.raw[0]),
         "normalised_fit_percent": comparison.fit,
-        "noise_floor": {
-            "overall": floor.overall,
-            "joints": floor.joints,
-            "source": "repeats" if floor.source == "repeats" else "guess",  # scripts know these two
-            "repeats": floor.repeats,
-            "sensor": floor.sensor,
-            "step_size": floor.step_size,
-        },
+        "noise_floor": asdict(floor) | ({} if floor.source == "repeats" else {"source": "guess"}),  # scripts know two
         "step": comparison.step,
         "regimes": [asdict(one) for one in comparison.regimes],
         "trials": [
@@ -215,8 +208,6 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         "failing_intervals": [asdict(one) for one in comparison.failing_intervals],
         "whiteness": [asdict(one) for one in comparison.whiteness],
         "cross_correlations": [asdict(one) for one in comparison.cross_correlations],
-        "band": None
-        if band is None
-        else {"simulations": band.simulations, "inside": band.inside, "joints": band.joints},
+        "band": band and {"simulations": band.simulations, "inside": band.inside, "joints": band.joints},
         "warnings": list(recording.warnings),
     }

@@ -66,17 +66,11 @@ def lag_between(first: Array, other: Array, step: float) -> int | None:
     longest = round(LONGEST_LAG / step)
     best, difference = 0, np.inf
     for lag in range(-longest, longest + 1):
-        a, b = _overlap(first, other, lag)
-        if len(a) >= SHORTEST * min(len(first), len(other)) and (d := _differs(a, b)) < difference:
+        a, b = first[max(lag, 0) :], other[max(-lag, 0) :]
+        n = min(len(a), len(b))
+        if n >= SHORTEST * min(len(first), len(other)) and (d := _differs(a[:n], b[:n])) < difference:
             best, difference = lag, d
     return best if difference < SAME else None
-
-
-def _overlap(first: Array, other: Array, lag: int) -> tuple[Array, Array]:
-    """The parts of two signals that lie at the same time if `other` is shifted by `lag` samples."""
-    a, b = first[max(lag, 0) :], other[max(-lag, 0) :]
-    n = min(len(a), len(b))
-    return a[:n], b[:n]
 
 
 def _differs(first: Array, other: Array) -> float:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +31,6 @@ class TrialColumns:
     torque: Array | None
     link_position: Array | None = None
     feedforward: Array | None = None
-
-    def rows(self, chosen: NDArray[np.bool_]) -> TrialColumns:
-        """Some of the rows."""
-        signals = {field.name: getattr(self, field.name) for field in fields(self)}
-        chosen_rows: dict[str, Any] = {name: None if one is None else one[chosen] for name, one in signals.items()}
-        return TrialColumns(**chosen_rows)
 
 
 def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[TrialColumns, list[str]]:

@@ -14,14 +14,14 @@ from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
-from tactile_cube.measurement.recordings.trial import Gains, Trial
+from tactile_cube.measurement.recordings.trial import Gains
 
 Array = NDArray[np.float64]
 SLOWER = 0.75  # share of the log's rate that rounding explains
 
 
 def check_joints(description: Description, rig: Rig, file: Path) -> None:
-    """Refuse joints that the URDF does not have, and couplings to joints that are not actuated."""
+    """Refuse joints that the URDF lacks, couplings to joints not actuated, a controller slower than the log."""
     named = [(joint, "joints") for joint in description.joints]
     named += [(joint, "coupled") for joint in description.coupled]
     named += [(coupling.joint, f"coupled.{joint}.joint") for joint, coupling in description.coupled.items()]
@@ -37,10 +37,6 @@ def check_joints(description: Description, rig: Rig, file: Path) -> None:
             )
         if joint in description.joints:
             raise InputError(f"{file}: key 'coupled.{joint}': the joint is actuated too (joints {description.joints})")
-
-
-def check_rate(description: Description, file: Path) -> None:
-    """Refuse a controller that is slower than the log."""
     own = description.controller.rate_hz
     if own is not None and own < SLOWER * description.rate_hz:
         raise InputError(
@@ -73,29 +69,22 @@ def gains_of(description: Description, entry: TrialEntry | None, key: str) -> Ga
         ValueError: gains with which no command could move a joint.
     """
     controller, joints = description.controller, tuple(description.joints)
-    change = entry.controller if entry is not None else None
-    values = {}
-    for name in ("kp", "kd", "torque_limit"):
-        own = getattr(change, name) if change is not None else None
-        values[name] = per_joint(getattr(controller, name) if own is None else own, joints, f"{key}.{name}")
-    gains = Gains(**values)
+    change = entry.controller.model_dump(exclude_none=True) if entry is not None and entry.controller else {}
+    values = controller.model_dump() | change
+    kp, kd, limit = (per_joint(values[name], joints, f"{key}.{name}") for name in ("kp", "kd", "torque_limit"))
     if controller.mode == "position":
-        _require_gains(gains, joints, key)
-    return gains
-
-
-def _require_gains(gains: Gains, joints: tuple[str, ...], key: str) -> None:
-    for name, values in (("kp", gains.kp), ("torque_limit", gains.torque_limit)):
-        if not (values > 0).all():
-            wrong = int(np.argmin(values > 0))
+        for name, gains in (("kp", kp), ("torque_limit", limit)):
+            if not (gains > 0).all():
+                wrong = int(np.argmin(gains > 0))
+                raise ValueError(
+                    f"key '{key}.{name}': received {gains[wrong]:g} for {joints[wrong]}: with it no command can "
+                    "move the joint; give the gain of the controller that made the recording"
+                )
+        if not (kd >= 0).all() or not np.isfinite(kp).all() or not np.isfinite(kd).all():
             raise ValueError(
-                f"key '{key}.{name}': received {values[wrong]:g} for {joints[wrong]}: with it no command can "
-                "move the joint; give the gain of the controller that made the recording"
+                f"key '{key}': received kp {kp.tolist()}, kd {kd.tolist()}; expected finite gains, kd >= 0"
             )
-    if not (gains.kd >= 0).all() or not np.isfinite(gains.kp).all() or not np.isfinite(gains.kd).all():
-        raise ValueError(
-            f"key '{key}': received kp {gains.kp.tolist()}, kd {gains.kd.tolist()}; expected finite gains, kd >= 0"
-        )
+    return Gains(kp, kd, limit)
 
 
 def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
@@ -109,11 +98,6 @@ def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
         raise ValueError("key 'nominal.stiffness': received 0: the drive would transmit nothing; .inf means rigid")
 
 
-def joints_where(mask: NDArray[np.bool_], joints: tuple[str, ...]) -> str:
-    """The names of the joints that a mask marks."""
-    return ", ".join(joint for joint, wrong in zip(joints, mask, strict=True) if wrong)
-
-
 SLOW = 0.1  # [rad/s] below which a torque holds weight and friction alone
 MOST_SAMPLES = 200  # postures change slowly
 FEWEST = 30
@@ -121,40 +105,34 @@ BETTER = 0.72  # a swap must leave less than this share of the missing torque
 NEGLIGIBLE = 0.01  # [N m] of missing torque that friction explains
 
 
-def swap_warning(recording: Recording) -> str | None:
-    """A warning if the torques fit the weight of the links far better with two joints swapped, else None."""
-    if recording.torque_controlled or len(recording.joints) < 2:
-        return None
-    still = [
-        _still(trial, trial.torque) for trial in recording.trials if trial.torque is not None and not trial.is_bench
-    ]
-    position = np.concatenate([one[0] for one in still]) if still else np.zeros((0, len(recording.joints)))
+def swap_warning(recording: Recording) -> list[str]:
+    """A warning if the torques fit the weight of the links far better with two joints swapped."""
+    trials = [trial for trial in recording.trials if trial.torque is not None and not trial.is_bench]
+    if recording.torque_controlled or len(recording.joints) < 2 or not trials:
+        return []
+    slow = [(np.abs(trial.velocity()) < SLOW).all(axis=1) & trial.valid for trial in trials]
+    position = np.concatenate([trial.position[still] for trial, still in zip(trials, slow, strict=True)])
+    torque = np.concatenate([t.torque[still] for t, still in zip(trials, slow, strict=True) if t.torque is not None])
     if len(position) < FEWEST:
-        return None
+        return []
     stride = max(1, len(position) // MOST_SAMPLES)
-    position, torque = position[::stride], np.concatenate([one[1] for one in still])[::stride]
-    tree = recording.rigid_body()
+    position, torque = position[::stride], torque[::stride]
+    tree, named = recording.rigid_body(), list(range(len(recording.joints)))
     as_named = _missing(tree, recording.gravity, position, torque)
-    best, swap = as_named, None
-    for pair in combinations(range(len(recording.joints)), 2):
-        order = list(range(len(recording.joints)))
-        order[pair[0]], order[pair[1]] = pair[1], pair[0]
+    best, swap = as_named, (0, 0)
+    for first, second in combinations(named, 2):
+        order = named.copy()
+        order[first], order[second] = second, first
         missing = _missing(tree, recording.gravity, position[:, order], torque[:, order])
         if missing < best:
-            best, swap = missing, pair
-    if swap is None or best > BETTER * as_named or as_named - best < NEGLIGIBLE:
-        return None
+            best, swap = missing, (first, second)
+    if best > BETTER * as_named or as_named - best < NEGLIGIBLE:
+        return []
     one, two = (recording.joints[index] for index in swap)
-    return (
+    return [
         f"{recording.folder}: columns '{one}.torque' and '{two}.torque' miss the weight of the links by "
         f"{as_named:.3f} N m, and by {best:.3f} N m with the two joints exchanged: are they swapped?"
-    )
-
-
-def _still(trial: Trial, torque: Array) -> tuple[Array, Array]:
-    """Positions and torques (samples, joints) while every joint is slow."""
-    slow = (np.abs(trial.velocity()) < SLOW).all(axis=1) & trial.valid
-    return trial.position[slow], torque[slow]
+    ]
 
 
 def _missing(tree: RigidBodyTree, gravity: Array, position: Array, torque: Array) -> float:

@@ -35,8 +35,7 @@ def check_units(columns: TrialColumns, joints: list[RigJoint], gains: Gains, pat
         for signal, values in (("position", columns.position), ("command", columns.command)):
             warnings += _check_reach(f"{joint.name}.{signal}", values[:, index], joint, path)
         _check_one_in_degrees(joint.name, columns.command[:, index], columns.position[:, index], path)
-        if columns.torque is not None:
-            warnings += _check_gain(joint.name, columns, index, gains, path)
+        warnings += _check_gain(joint.name, columns, index, gains, path)
     return warnings
 
 
@@ -100,8 +99,7 @@ def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) 
     """
     warnings: list[str] = []
     for index, joint in enumerate(joints):
-        position = columns.position[:, index]
-        command = columns.command[:, index]
+        position, command = columns.position[:, index], columns.command[:, index]
         if np.ptp(command) > 5 * MOVES and np.ptp(position) == 0:
             warnings.append(
                 f"{path}: column '{joint.name}.position' never changes (row 0: {position[0]:.4g}) although "
@@ -129,12 +127,15 @@ def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) 
 
 def check_roles(columns: TrialColumns, joints: tuple[str, ...], path: Path) -> list[str]:
     """Warnings about a command that scatters as a sensor beside a position that does not: exchanged columns."""
+    if len(columns.time) < 4:
+        return []
+    # third differences: zero of what is held, next to nothing of a smooth curve
+    asked, moved = (np.median(np.abs(np.diff(one, 3, axis=0)), axis=0) for one in (columns.command, columns.position))
     return [
-        f"{path}: column '{joint}.command' scatters by {asked:.2g} from row to row and '{joint}.position' by "
-        f"{moved:.2g}, as if the one was measured and the other commanded: are they exchanged?"
+        f"{path}: column '{joint}.command' scatters by {asked[j]:.2g} from row to row and '{joint}.position' by "
+        f"{moved[j]:.2g}, as if the one was measured and the other commanded: are they exchanged?"
         for j, joint in enumerate(joints)
-        if (moved := _scatter(columns.position[:, j])) < SMOOTH * (asked := _scatter(columns.command[:, j]))
-        and np.ptp(columns.position[:, j]) > 0
+        if moved[j] < SMOOTH * asked[j] and np.ptp(columns.position[:, j]) > 0
     ]
 
 
@@ -154,11 +155,6 @@ def without_wraps(columns: TrialColumns, joints: list[RigJoint], path: Path) -> 
         turns = np.cumsum(np.where(wraps, -np.sign(steps), 0.0), axis=0)
         unwrapped[key] = values + 2.0 * math.pi * np.vstack([np.zeros(values.shape[1]), turns])
     return replace(columns, **unwrapped), warnings
-
-
-def _scatter(values: Array) -> float:
-    """Usual size of the third differences: zero of what is held, next to nothing of a smooth curve."""
-    return float(np.median(np.abs(np.diff(values, 3)))) if len(values) > 3 else 0.0
 
 
 def _correlation(first: Array, second: Array) -> float:

@@ -15,9 +15,7 @@ from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
     check_joints,
     check_nominal,
-    check_rate,
     gains_of,
-    joints_where,
     swap_warning,
 )
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
@@ -32,7 +30,7 @@ from tactile_cube.measurement.recordings.plausibility import (
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, read_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.timing import check_time, on_grid
+from tactile_cube.measurement.recordings.timing import check_time, on_grid, rows_of
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.untrusted_file import below
 
@@ -54,7 +52,6 @@ def read_recording(folder: str | Path) -> Recording:
     urdf, not_drawn = with_own_files(rig.text, rig.path, folder)
     rig = replace(rig, text=urdf)
     check_joints(description, rig, file)
-    check_rate(description, file)
     try:
         recording = _assemble(folder, description, rig)
     except InputError:
@@ -62,40 +59,39 @@ def read_recording(folder: str | Path) -> Recording:
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
     recording.rigid_body()
-    more = [] if (swapped := swap_warning(recording)) is None else [swapped]
+    warnings = [*recording.warnings, *swap_warning(recording)]
     if not_drawn:
-        more.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
-    return replace(recording, warnings=(*recording.warnings, *more))
+        warnings.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
+    return replace(recording, warnings=tuple(warnings))
 
 
 def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
-    joints = tuple(description.joints)
+    file, joints = folder / DESCRIPTION, tuple(description.joints)
     nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
     check_nominal(nominal, joints)
-    warnings = [f"{folder / DESCRIPTION}: {line}" for line in check_coupling(description, rig)]
+    warnings = [f"{file}: {line}" for line in check_coupling(description, rig)]
     trials, gains, left = [], gains_of(description, None, "controller"), limits.NUMBERS
-    if description.controller.mode != "torque" and (gains.kd == 0).any():
-        warnings.append(
-            f"{folder / DESCRIPTION}: key 'controller.kd': 0 for {joints_where(gains.kd == 0, joints)}: no damping"
-        )
+    undamped = [joint for joint, kd in zip(joints, gains.kd, strict=True) if kd == 0]
+    if description.controller.mode != "torque" and undamped:
+        warnings.append(f"{file}: key 'controller.kd': 0 for {', '.join(undamped)}: no damping")
     for index, entry in enumerate(description.trials):
-        path = below(folder, entry.file, f"{folder / DESCRIPTION}: key 'trials.{index}.file'")
+        path = below(folder, entry.file, f"{file}: key 'trials.{index}.file'")
         trial = _trial(path, left, entry, description, rig, f"trials.{index}.controller")
         left -= trial.time.size + 3 * trial.position.size
         trial = trial.with_earlier_commands(description.sensors.commands_late)
-        trials += without_excluded(trial, entry.exclude, f"{folder / DESCRIPTION}: key 'trials.{index}.exclude'")
+        trials += without_excluded(trial, entry.exclude, f"{file}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
     if not trials:
-        raise InputError(f"{folder / DESCRIPTION}: key 'trials': 'exclude' leaves nothing of any trial")
+        raise InputError(f"{file}: key 'trials': 'exclude' leaves nothing of any trial")
     return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
 
 
 def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
     """One trial, checked and on the uniform grid of the recording's rate."""
-    joints = tuple(description.joints)
+    joints, rate = tuple(description.joints), description.rate_hz
     gains = gains_of(description, entry, key)
     columns, warnings = pick_columns(read_table(path, most), joints, path)
-    columns, time_warnings = check_time(columns, description.rate_hz, path)
+    columns, time_warnings = check_time(columns, rate, path)
     ranges = [rig.joints[joint] for joint in joints]
     columns, wrapped = without_wraps(columns, ranges, path)
     warnings += wrapped
@@ -107,28 +103,18 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
     if description.controller.mode == "position":
         check_feedforward(columns, joints, gains, path)
     columns, outlying, single = without_outliers(columns, joints, path)
-    grid, valid = on_grid(columns, description.rate_hz)
-    stamps = (columns.time[outlying] - columns.time[0]) * description.rate_hz
+    grid, valid = on_grid(columns, rate)
+    stamps = (columns.time[outlying] - columns.time[0]) * rate
     beside = np.concatenate([np.floor(stamps), np.ceil(stamps)]).astype(np.int64)
     valid[np.minimum(beside, len(valid) - 1)] = False
     return Trial(
-        path.stem,
-        entry.file,
-        entry.kind,
-        entry.initialisation,
-        grid.time,
-        grid.command,
-        grid.position,
-        grid.torque,
-        valid,
-        gains,
-        entry.force,
-        entry.clamped,
-        entry.touch,
-        tuple(warnings + time_warnings + single),
-        load_of(description.object, entry.object) if description.object and entry.object else None,
-        grid.link_position,
-        grid.feedforward,
+        name=path.stem,
+        **{key: getattr(entry, key) for key in ("file", "kind", "initialisation", "force", "clamped", "touch")},
+        **vars(grid),
+        valid=valid,
+        gains=gains,
+        warnings=tuple(warnings + time_warnings + single),
+        load=load_of(description.object, entry.object) if description.object and entry.object else None,
     )
 
 
@@ -152,4 +138,5 @@ def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key
         kept &= (trial.time < start) | (trial.time >= end)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(int)))
     pieces = [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= MINIMUM_SAMPLES]
-    return [trial.cut(rows, f"{trial.name}_{number}") for number, rows in enumerate(pieces)]
+    parts = [rows_of(trial, rows) for rows in pieces]
+    return [replace(part, name=f"{trial.name}_{k}", time=part.time - part.time[0]) for k, part in enumerate(parts)]

@@ -22,25 +22,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Recording:
-    """What was measured on a rig.
+    """What was measured on a rig."""
 
-    Attributes:
-        folder: where it lies.
-        description: recording.yaml.
-        rig: the mechanism.
-        gains: the controller, each gain of shape (joints,).
-        nominal: what the owner believes, key -> (joints,).
-        trials: in the order of recording.yaml.
-        warnings: what was odd but could be used, one line each.
-    """
-
-    folder: Path
-    description: Description
-    rig: Rig
-    gains: Gains
-    nominal: dict[str, Array]
-    trials: tuple[Trial, ...]
-    warnings: tuple[str, ...] = ()
+    folder: Path  # where it lies
+    description: Description  # recording.yaml
+    rig: Rig  # the mechanism
+    gains: Gains  # of the controller, each of shape (joints,)
+    nominal: dict[str, Array]  # what the owner believes, key -> (joints,)
+    trials: tuple[Trial, ...]  # in the order of recording.yaml
+    warnings: tuple[str, ...] = ()  # what was odd but could be used, one line each
 
     @property
     def name(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.urdf_elements import MOVABLE, Joint
+from tactile_cube.hand.urdf_elements import MOVABLE
 from tactile_cube.hand.urdf_tree import read_joints
 from tactile_cube.untrusted_file import read_text
 
@@ -18,25 +18,15 @@ WRONG_ZERO = 0.35  # [rad] a servo that was mounted some teeth off
 
 @dataclass(frozen=True)
 class RigJoint:
-    """One movable joint of a URDF.
-
-    Attributes:
-        name: in the URDF.
-        lower: limit [rad] ([m] where it slides), -inf where it has none.
-        upper: likewise.
-        mimics: the joint that it follows.
-        prismatic: it slides.
-        velocity: limit of its speed [rad/s] ([m/s]), inf where it has none.
-        effort: limit of its torque [N m] ([N]), likewise.
-    """
+    """One movable joint of a URDF; where it slides, angles are lengths [m] and torques forces [N]."""
 
     name: str
-    lower: float
-    upper: float
-    mimics: str | None
+    lower: float  # limit [rad], -inf where it has none
+    upper: float  # likewise
+    mimics: str | None  # the joint that it follows
     prismatic: bool = False
-    velocity: float = math.inf
-    effort: float = math.inf
+    velocity: float = math.inf  # limit [rad/s], inf where it has none
+    effort: float = math.inf  # limit [N m], likewise
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -58,17 +48,11 @@ class RigJoint:
 
 @dataclass(frozen=True)
 class Rig:
-    """The mechanism of a recording.
+    """The mechanism of a recording."""
 
-    Attributes:
-        text: the URDF.
-        path: the file it was read from.
-        joints: movable joints by name.
-    """
-
-    text: str
-    path: Path
-    joints: dict[str, RigJoint]
+    text: str  # the URDF
+    path: Path  # the file it was read from
+    joints: dict[str, RigJoint]  # movable joints by name
 
 
 def read_rig(path: Path) -> Rig:
@@ -92,9 +76,12 @@ def parse_rig(text: str, path: Path) -> Rig:
         raise InputError(f"{path}: {error}") from None
     if not joints:
         raise InputError(f"{path}: not a URDF with movable joints")
-    return Rig(text, path, {joint.name: _rig_joint(joint) for joint in joints})
-
-
-def _rig_joint(joint: Joint) -> RigJoint:
-    leader = None if joint.coupling is None else joint.coupling.joint
-    return RigJoint(joint.name, joint.lower, joint.upper, leader, joint.prismatic, joint.velocity, joint.effort)
+    leaders = {joint.name: joint.coupling.joint for joint in joints if joint.coupling is not None}
+    return Rig(
+        text,
+        path,
+        {
+            j.name: RigJoint(j.name, j.lower, j.upper, leaders.get(j.name), j.prismatic, j.velocity, j.effort)
+            for j in joints
+        },
+    )

@@ -72,20 +72,21 @@ def _csv(path: Path, most: int, only_numbers: bool) -> Table:
         rows = sum(block.count(b"\n") for block in iter(lambda: stream.read(1 << 20), b""))
     _require_size(path, rows * columns, columns, most)
     frame = polars.read_csv(
-        path,
-        glob=False,
-        infer_schema_length=None,
-        comment_prefix="#",
-        separator=separator,
-        decimal_comma=decimal_comma,
-        encoding="utf8-lossy",
-    )
+        path, glob=False, infer_schema_length=None, comment_prefix="#", separator=separator,
+        decimal_comma=decimal_comma, encoding="utf8-lossy",
+    )  # fmt: skip
     frame = frame.rename({name: name.strip().strip("\ufeff") for name in frame.columns})
     return _numbers(frame if only_numbers else _without_words(frame), path)
 
 
 def _npz(path: Path, most: int, only_numbers: bool) -> Table:
-    return {name: _one_dimension(array, name, path) for name, array in read_npz(path, most).items()}
+    table = read_npz(path, most)
+    for name, array in table.items():
+        if array.ndim != 1 or array.dtype.kind not in "fiu":
+            raise InputError(
+                f"{path}: column '{name}' is {array.ndim}-dimensional {array.dtype}, expected (samples,) numbers"
+            )
+    return {name: np.asarray(array, dtype=np.float64) for name, array in table.items()}
 
 
 def _require_size(path: Path, numbers: int, columns: int, most: int) -> None:
@@ -132,14 +133,6 @@ def _date(column: polars.Series) -> polars.Series:
         return column.str.to_datetime(time_unit="us", time_zone="UTC", strict=True)
     except polars.exceptions.PolarsError:
         return column
-
-
-def _one_dimension(array: NDArray[np.generic], name: str, path: Path) -> NDArray[np.float64]:
-    if array.ndim != 1 or array.dtype.kind not in "fiu":
-        raise InputError(
-            f"{path}: column '{name}' is {array.ndim}-dimensional {array.dtype}, expected (samples,) numbers"
-        )
-    return np.asarray(array, dtype=np.float64)
 
 
 def _numbers(frame: polars.DataFrame, path: Path) -> Table:

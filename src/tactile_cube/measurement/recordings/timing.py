@@ -1,7 +1,8 @@
 """Time stamps of a trial: in order, at the stated rate, and put on a uniform grid."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,15 @@ LONGEST_GAP = 0.25  # [s] beyond this the command in between is anybody's guess
 JITTER = 0.1  # share of a period that is worth a warning
 TINY = 1e-12  # share of a period below which no rate fits
 ON_GRID = 0.02  # share of a period below which samples are taken as they are
+
+
+Signals = TypeVar("Signals")
+
+
+def rows_of(signals: Signals, rows: slice | NDArray[np.bool_]) -> Signals:
+    """Columns, a trial or a table to be written with these rows of its arrays alone."""
+    arrays = {one.name: getattr(signals, one.name) for one in fields(signals)}  # type: ignore[arg-type]
+    return replace(signals, **{name: a[rows] for name, a in arrays.items() if isinstance(a, np.ndarray)})  # type: ignore[type-var]
 
 
 def check_time(columns: TrialColumns, rate: float, path: Path) -> tuple[TrialColumns, list[str]]:
@@ -70,8 +80,7 @@ def _without_repeats(columns: TrialColumns, path: Path) -> tuple[TrialColumns, l
     keep = np.concatenate([[True], steps > 0])
     if keep.all():
         return columns, []
-    row = int(np.argmin(keep))
-    shorter = columns.rows(keep)
+    row, shorter = int(np.argmin(keep)), rows_of(columns, keep)
     if len(shorter.time) < 2:
         raise InputError(f"{path}: column 'time', row {row}: all rows have the same time {columns.time[0]:.6g} s")
     return shorter, [
@@ -99,7 +108,7 @@ def _require_rate(gaps: Array, rate: float, path: Path) -> None:
 def on_grid(columns: TrialColumns, rate: float) -> tuple[TrialColumns, NDArray[np.bool_]]:
     """Columns at uniform time steps from 0, and which samples are not bridged over a gap.
 
-    Positions and measured torques are interpolated; commands are held until the next ones, as a controller does.
+    Positions and torques are interpolated; a command is held until the next one, as a controller does.
     """
     time = columns.time - columns.time[0]
     grid = np.arange(int(np.floor(time[-1] * rate + 0.5)) + 1) / rate
@@ -110,12 +119,10 @@ def on_grid(columns: TrialColumns, rate: float) -> tuple[TrialColumns, NDArray[n
     valid = (time[after] - time[after - 1]) * rate <= DROPPED
     valid |= np.minimum(np.abs(grid - time[after]), np.abs(grid - time[after - 1])) * rate < ON_GRID
     held = np.searchsorted(time, grid + ON_GRID / rate, side="right") - 1
-    measured = (columns.position, columns.torque, columns.link_position)
-    position, torque, link_position = (_interpolated(grid, time, one) for one in measured)
-    assert position is not None
+
+    def interpolated(values: Array | None) -> Any:
+        return None if values is None else np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
+
+    position, torque, links = (interpolated(x) for x in (columns.position, columns.torque, columns.link_position))
     feedforward = None if columns.feedforward is None else columns.feedforward[held]
-    return TrialColumns(grid, columns.command[held], position, torque, link_position, feedforward), valid
-
-
-def _interpolated(grid: Array, time: Array, values: Array | None) -> Array | None:
-    return None if values is None else np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
+    return TrialColumns(grid, columns.command[held], position, torque, links, feedforward), valid

@@ -1,7 +1,7 @@
 """One trial on a uniform time grid: what was commanded and what was measured."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,9 +132,3 @@ class Trial:
         feedforward = None if self.feedforward is None else self.feedforward[later]
         known = np.arange(len(self.valid)) < len(self.valid) - rows
         return replace(self, command=self.command[later], feedforward=feedforward, valid=self.valid & known)
-
-    def cut(self, rows: slice, name: str) -> Self:
-        """Some of the trial's rows as a trial that starts at 0."""
-        signals = ("command", "position", "torque", "valid", "link_position", "feedforward")
-        parts: dict[str, Any] = {key: None if (one := getattr(self, key)) is None else one[rows] for key in signals}
-        return replace(self, name=name, time=self.time[rows] - self.time[rows.start], **parts)

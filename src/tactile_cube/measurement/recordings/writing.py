@@ -4,7 +4,8 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.timing import rows_of
 from tactile_cube.untrusted_file import below
 
 Array = NDArray[np.float64]
@@ -24,32 +26,26 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TrialTable:
-    """One trial to be written: its entry, time (n,) [s] and signals (n, joints); only the first two must be there.
-
-    `link_position` has nan where a joint has no sensor there. `origin` is the file that it was read from.
-    """
+    """One trial to be written: its entry, time (n,) [s] and signals (n, joints)."""
 
     entry: TrialEntry
     time: Array
     command: Array
     position: Array
     torque: Array | None = None
-    origin: Path | None = None
-    link_position: Array | None = None
+    origin: Path | None = None  # the file that it was read from
+    link_position: Array | None = None  # nan where a joint has no sensor on its link
     feedforward: Array | None = None
 
 
 @dataclass(frozen=True)
 class RecordingTables:
-    """A recording to be written: recording.yaml (its trials come from the tables), the URDF's text, the trials.
+    """A recording to be written."""
 
-    `understood` says how an importer read another program's files: rows of what, how, and what told it.
-    """
-
-    description: Description
-    urdf: str
+    description: Description  # its trials come from the tables
+    urdf: str  # the text
     tables: Sequence[TrialTable]
-    understood: Sequence[tuple[str, str, str]] = ()
+    understood: Sequence[tuple[str, str, str]] = ()  # how an importer read files: what, how, and what told it
 
 
 def write_recording(folder: Path, recording: RecordingTables) -> None:
@@ -62,22 +58,20 @@ def write_recording(folder: Path, recording: RecordingTables) -> None:
     files = [below(folder, table.entry.file, "trials.file") for table in tables]
     folder.mkdir(parents=True, exist_ok=True)
     (folder / description.rig).write_text(recording.urdf, encoding="utf-8")
-    entries = [table.entry for table in tables]
     data = description.model_dump(exclude_defaults=True, exclude_none=True, exclude={"trials"})
-    ordered = {"format": 1, "rig": description.rig} | data | {"trials": [_entry(entry) for entry in entries]}
+    entries = [  # file, initialisation and kind always, the rest where it was said
+        table.entry.model_dump(include={"file", "initialisation", "kind"})
+        | table.entry.model_dump(exclude_defaults=True, exclude_none=True)
+        for table in tables
+    ]
+    ordered = {"format": 1, "rig": description.rig} | data | {"trials": entries}
     text = yaml.safe_dump(ordered, sort_keys=False, allow_unicode=True)
     (folder / "recording.yaml").write_text(text, encoding="utf-8")
     for file, table in zip(files, tables, strict=True):
-        write_table(file, table, description.joints)
+        _write_table(file, table, description.joints)
 
 
-def _entry(entry: TrialEntry) -> dict[str, object]:
-    """File, initialisation and kind always, the rest where it was said."""
-    always = {"file": entry.file, "initialisation": entry.initialisation, "kind": entry.kind}
-    return always | entry.model_dump(exclude_defaults=True, exclude_none=True)
-
-
-def write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
+def _write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
     """Write one trial as Parquet, CSV or NPZ, by the ending of `path`; signals as 32-bit numbers, time as 64-bit."""
     columns: dict[str, NDArray[np.floating]] = {"time": table.time}
     for index, joint in enumerate(joints):
@@ -92,6 +86,22 @@ def write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
         polars.DataFrame(columns).write_csv(path)
     else:
         polars.DataFrame(columns).write_parquet(path)
+
+
+def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
+    """Pieces of `length` [s] of a trial; a rest of less than half of that is dropped."""
+    duration = float(trial.time[-1] - trial.time[0])
+    if length is None or duration < 1.5 * length:
+        return [trial]
+    starts = np.arange(0.0, duration - 0.5 * length, length) + trial.time[0]
+    edges = [*np.searchsorted(trial.time, starts - 1e-9), len(trial.time)]
+    stem, _, ending = trial.entry.file.rpartition(".")
+    pieces = []
+    for number, (start, end) in enumerate(pairwise(edges)):
+        piece = rows_of(trial, slice(start, end))
+        entry = trial.entry.model_copy(update={"file": f"{stem}_part{number:02d}.{ending}"})
+        pieces.append(replace(piece, entry=entry, time=piece.time - piece.time[0]))
+    return pieces
 
 
 def require_free(out: Path) -> None:
@@ -118,29 +128,15 @@ def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
         for name, tables in parts.items():
             _say_understood(tables.understood)
             write_recording(aside / name, tables)
-            _say_content(out / name, _read_back(aside / name, tables, out / name))
+            recording = _read_back(aside / name, tables, out / name)
+            seconds = sum(trial.duration for trial in recording.trials)
+            kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
+            count = "1 trial" if len(recording.trials) == 1 else f"{len(recording.trials)} trials"
+            print(f"{out / name}: {count} ({kinds}), {seconds:.0f} s, joints {', '.join(recording.joints)}")
         aside.chmod(0o755)
         aside.replace(out)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
-
-
-def _read_back(folder: Path, tables: RecordingTables, place: Path) -> Recording:
-    try:
-        recording = read_recording(folder)
-    except InputError as error:
-        raise InputError(_with_origins(str(error), folder, tables, place)) from None
-    for line in recording.warnings:
-        print(f"warning: {_with_origins(line, folder, tables, place)}", file=sys.stderr)
-    return recording
-
-
-def _with_origins(message: str, folder: Path, tables: RecordingTables, place: Path) -> str:
-    """The message with the user's files in place of those that were made from them."""
-    for table in tables.tables:
-        if table.origin is not None:
-            message = message.replace(str(folder / table.entry.file), str(table.origin))
-    return message.replace(str(folder), str(place))
 
 
 def _say_understood(rows: Sequence[tuple[str, str, str]]) -> None:
@@ -150,8 +146,19 @@ def _say_understood(rows: Sequence[tuple[str, str, str]]) -> None:
         print("\n".join(["understood, and what told it:", *lines]))
 
 
-def _say_content(place: Path, recording: Recording) -> None:
-    seconds = sum(trial.duration for trial in recording.trials)
-    kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
-    count = "1 trial" if len(recording.trials) == 1 else f"{len(recording.trials)} trials"
-    print(f"{place}: {count} ({kinds}), {seconds:.0f} s, joints {', '.join(recording.joints)}")
+def _read_back(folder: Path, tables: RecordingTables, place: Path) -> Recording:
+    """Read what was written; messages name the user's files in place of those that were made from them."""
+
+    def with_origins(message: str) -> str:
+        for table in tables.tables:
+            if table.origin is not None:
+                message = message.replace(str(folder / table.entry.file), str(table.origin))
+        return message.replace(str(folder), str(place))
+
+    try:
+        recording = read_recording(folder)
+    except InputError as error:
+        raise InputError(with_origins(str(error))) from None
+    for line in recording.warnings:
+        print(f"warning: {with_origins(line)}", file=sys.stderr)
+    return recording

@@ -5,33 +5,36 @@ from dataclasses import dataclass
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.columns import SIGNALS
-from tactile_cube.measurement.sources.units import (
-    Signal,
-    joint_in,
-    may_be_desired,
-    number_of,
-    of_motor,
-    signal_of,
-    without_unit,
-    words,
-)
+from tactile_cube.measurement.sources.units import UNITS, of_motor, words
 
 Given = Mapping[str, str | Mapping[str, str]]
 EXAMPLE = "source.columns='{time: TIME, JOINT: {command: COLUMN, position: COLUMN, torque: COLUMN}}'"
 
 
+def _vocabulary(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+TIME = _vocabulary("time timestamp stamp elapsed clock zeit millis micros secs sec seconds")
+COMMAND = _vocabulary(
+    "command cmd commanded goal target desired des ref reference setpoint sp soll action demand demanded"
+)
+POSITION = _vocabulary("position pos angle q measured meas actual present state encoder enc ist theta feedback joint")
+LINK, FEEDFORWARD = _vocabulary("link load output secondary"), _vocabulary("feedforward forward ff")
+TORQUE = _vocabulary("torque tau effort moment force nm mnm")
+NOT_USED = _vocabulary(  # load: of hobby servos, a share of something
+    "velocity vel speed dq qdot qvel omega acc acceleration ddq current curr voltage volt temperature temp pwm "
+    "error err status index frame load link"
+)
+DESIRED = (["q", "d"], ["qd"])  # desired position in some papers, speed in others
+
+
 @dataclass(frozen=True)
 class ColumnMap:
-    """Column names.
+    """Column names."""
 
-    Attributes:
-        time: None where the rows have no time of their own.
-        joints: joint -> {command, position, torque, link_position, feedforward} -> column.
-        unused: columns that are left aside.
-    """
-
-    time: str | None
-    joints: dict[str, dict[str, str]]
+    time: str | None  # None where the rows have no time of their own
+    joints: dict[str, dict[str, str]]  # joint -> one of SIGNALS -> column
     unused: tuple[str, ...]
 
 
@@ -50,20 +53,21 @@ def map_columns(names: Sequence[str], joints: Sequence[str], given: Given, torqu
     said = {joint: dict(entry) for joint, entry in given.items() if isinstance(entry, Mapping)}
     chosen = said or _guessed(names, joints, torque_mode)
     _require_whole(chosen, names, torque_mode)
-    time = given.get("time", _time(names))
+    stamps = [name for name in names if _signal_of(name) == "time"]
+    time = given.get("time", min(stamps, key=lambda name: len(words(name)), default=None))
     used = {time, *(column for entry in chosen.values() for column in entry.values())}
     return ColumnMap(str(time) if time is not None else None, chosen, tuple(n for n in names if n not in used))
-
-
-def _time(names: Sequence[str]) -> str | None:
-    found = [name for name in names if signal_of(name) == "time"]
-    return min(found, key=lambda name: len(words(name)), default=None)
 
 
 def _guessed(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> dict[str, dict[str, str]]:
     signals = _signals(names, joints, torque_mode)
     owners = _owners(list(signals), joints)
-    _say_which_joint(signals, owners, joints)
+    free = {signal: name for name, signal in signals.items() if not owners[name]}
+    if {"command", "position"} <= set(free) and not any(owners.values()):
+        raise InputError(
+            f"source.columns: '{free['command']}' looks like a command and '{free['position']}' like a position, but "
+            f"of which joint? The URDF has {', '.join(joints)}: say it by {EXAMPLE}"
+        )
     found: dict[str, dict[str, str]] = {}
     for name, signal in signals.items():
         entry = found.setdefault(owners[name], {})
@@ -83,46 +87,35 @@ def _guessed(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> 
     return {joint: found[joint] for joint in joints if len({"command", "position"} & set(found.get(joint, ()))) == 2}
 
 
-def _signals(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> dict[str, Signal]:
+def _signals(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> dict[str, str]:
     """Column -> command, position or torque."""
-    signals: dict[str, Signal] = {}
+    signals: dict[str, str] = {}
     for name in names:
-        signal = signal_of(name)
-        if signal is None and any(without_unit(name) == words(joint) for joint in joints):
+        signal = _signal_of(name)
+        if signal is None and any(_without_unit(name) == words(joint) for joint in joints):
             signal = "position"
         if signal is not None and signal != "time":
             signals[name] = signal
     if "command" not in signals.values():
-        signals |= {name: "command" for name in names if may_be_desired(name)}
+        plain = {name: [word for word in _without_unit(name) if not word.isdigit()] for name in names}
+        signals |= {name: "command" for name in names if plain[name] in DESIRED}
     if not torque_mode:
         return {name: signal for name, signal in signals.items() if signal != "torque_command"}
     asked = next((one for one in ("torque_command", "torque") if one in signals.values()), "command")
-    kept: dict[str, Signal] = {
-        name: signal for name, signal in signals.items() if signal in ("position", "link_position", asked)
-    }
+    kept = {name: signal for name, signal in signals.items() if signal in ("position", "link_position", asked)}
     return {name: "command" if signal == asked else signal for name, signal in kept.items()}
 
 
 def _owners(names: Sequence[str], joints: Sequence[str]) -> dict[str, str]:
     """Column -> joint: by the joint's name, by a number, or because there is only one joint."""
-    named = {name: joint_in(name, joints) for name in names}
+    named = {n: max((joint for joint in joints if _names(n, joint)), key=len, default="") for n in names}
     if any(named.values()):
-        return {name: joint or "" for name, joint in named.items()}
-    numbers = {name: number_of(name) for name in names}
-    known = [number for number in numbers.values() if number is not None]
+        return named
+    numbers = {name: [int(word) for word in words(name) if word.isdigit()][-1:] for name in names}
+    known = [number for last in numbers.values() for number in last]
     if known and min(known) <= 1 and max(known) - min(known) < len(joints):
-        return {n: joints[k - min(known)] if k is not None else "" for n, k in numbers.items()}
+        return {name: joints[last[0] - min(known)] if last else "" for name, last in numbers.items()}
     return dict.fromkeys(names, joints[0] if len(joints) == 1 else "")
-
-
-def _say_which_joint(signals: Mapping[str, Signal], owners: Mapping[str, str], joints: Sequence[str]) -> None:
-    """Refuse signals that nothing ties to one of several joints."""
-    free = {signal: name for name, signal in signals.items() if not owners[name]}
-    if {"command", "position"} <= set(free) and not any(owners.values()):
-        raise InputError(
-            f"source.columns: '{free['command']}' looks like a command and '{free['position']}' like a position, but "
-            f"of which joint? The URDF has {', '.join(joints)}: say it by {EXAMPLE}"
-        )
 
 
 def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str], torque_mode: bool) -> None:
@@ -142,3 +135,34 @@ def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str]
             )
         if unknown := set(entry) - set(SIGNALS):
             raise InputError(f"source.columns.{joint}.{min(unknown)}: unknown; known are {', '.join(SIGNALS)}")
+
+
+def _signal_of(name: str) -> str | None:
+    """What a column's name promises: time, one of SIGNALS, torque_command or None."""
+    said = words(name)
+    if TIME & set(said) or (said[:1] == ["t"] and len(said) <= 2):
+        return "time"
+    commanded = bool(COMMAND & set(said))
+    if FEEDFORWARD & set(said):
+        return "feedforward" if TORQUE & set(said) else None
+    if TORQUE & set(said):
+        return "torque_command" if commanded else "torque"
+    if LINK & set(said) and POSITION & set(said) and not commanded:
+        return "link_position"
+    if NOT_USED & set(said):
+        return None
+    if commanded:
+        return "command"
+    return "position" if POSITION & set(said) else None
+
+
+def _without_unit(name: str) -> list[str]:
+    """The words of a name but for units."""
+    known = {unit for spellings in UNITS.values() for unit in spellings}
+    return [word for word in words(name) if word not in known]
+
+
+def _names(name: str, joint: str) -> bool:
+    """Whether a column's name has that of a joint in it."""
+    said, part = words(name), words(joint)
+    return "".join(part) in said or any(said[k : k + len(part)] == part for k in range(len(said) - len(part) + 1))

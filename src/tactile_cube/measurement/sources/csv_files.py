@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from glob import glob
 from pathlib import Path
@@ -13,41 +13,24 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import lag_between
+from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.recordings.description import TrialEntry
-from tactile_cube.measurement.recordings.rig import Rig, read_rig
+from tactile_cube.measurement.recordings.rig import Rig, RigJoint, read_rig
 from tactile_cube.measurement.recordings.tables import Table, read_table
-from tactile_cube.measurement.recordings.writing import RecordingTables
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
-from tactile_cube.measurement.sources.foreign_log import SaidUnits, cut_trial, understand
 from tactile_cube.measurement.sources.source import described, known, median_rate
+from tactile_cube.measurement.sources.units import Unit, position_unit, same_unit, time_unit, torque_unit
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")
+Units = dict[str, dict[str, Unit]]
+"""Joint -> signal -> unit."""
 
 
 @dataclass(frozen=True)
 class CsvFiles:
-    """Imports tables.
-
-    Attributes:
-        files: paths or patterns; one trial each.
-        urdf: path of the rig's URDF.
-        columns: `time` -> its column, and joint -> {command, position, torque} -> column; by default by their names.
-        controller: kp, kd, torque_limit, mode.
-        nominal: stiffness, static_friction, reflected_inertia, as far as known.
-        gravity: (3,) in the base frame [m/s^2].
-        rate: samples per second; null: the median of the first file.
-        angle_unit: rad, deg, turn or mrad; null: by the columns' names or the joints' limits.
-        length_unit: m, mm or um, of sliding joints; null: likewise.
-        time_unit: s, ms, us or ns; null: by the column's name or its steps.
-        torque_unit: Nm, mNm or Ncm (N, mN or kN of sliding joints); null: by the columns' names.
-        read: `after` or `before` the control period, see recording.yaml's sensors.
-        resolution: of the position [rad].
-        length: cut each file into trials of this length [s]; null: one trial a file.
-        initialisation: of each file, by default 0 for all.
-        kind: of each file; by default files are of one kind if their names differ in a number or date only and their
-            commands agree.
-    """
+    """Imports tables; conf/source/csv.yaml says what each setting means, and its units."""
 
     files: Iterable[str]
     urdf: str
@@ -73,29 +56,69 @@ class CsvFiles:
         paths, rig = self._paths(), read_rig(Path(self.urdf))
         tables = {path: read_table(path, only_numbers=False) for path in paths}
         columns = self._columns(tables[paths[0]], paths[0], rig, torque_mode)
-        said = SaidUnits(self.time_unit, self.angle_unit, self.length_unit, self.torque_unit)
-        reading = understand(tables, columns, rig.joints, said, torque_mode)
+        units = self._units(tables, columns, rig.joints, torque_mode)
+        stamps = None
+        if columns.time is not None:
+            stamps = time_unit(self.time_unit, columns.time, _column(tables[paths[0]], columns.time, paths[0]))
         starts = _one_each(self.initialisation, paths, "initialisation", [0] * len(paths))
-        entries = [
-            TrialEntry(file=f"trials/{name}.parquet", initialisation=start, note=f"from {path.name}")
-            for path, name, start in zip(paths, _distinct(paths), starts, strict=True)
+        trials = [
+            self._trial(path, table, columns, units, stamps, f"trials/{name}.parquet", start)
+            for (path, table), name, start in zip(tables.items(), _distinct(paths), starts, strict=True)
         ]
-        trials = [reading.trial(tables[p], p, entry, self.rate) for p, entry in zip(paths, entries, strict=True)]
         rate = self.rate if self.rate is not None else median_rate(trials[0].time, 3, str(paths[0]))
         guessed = kinds_of([path.stem for path in paths], [trial.command for trial in trials], 1 / rate)
         kinds = _one_each(self.kind, paths, "kind", guessed)
-        named = [
-            replace(trial, entry=trial.entry.model_copy(update={"kind": kind}))
-            for trial, kind in zip(trials, kinds, strict=True)
-        ]
         description = described(
             gravity=list(self.gravity), rate_hz=rate, joints=list(columns.joints), controller=controller,
             nominal=known(self.nominal), sensors={"read": self.read, "position_resolution": self.resolution},
         )  # fmt: skip
-        pieces = [piece for trial in named for piece in cut_trial(trial, self.length)]
+        pieces = []
+        for trial, kind in zip(trials, kinds, strict=True):
+            entry = trial.entry.model_copy(update={"kind": kind})
+            pieces += cut_trial(replace(trial, entry=entry), self.length)
         by = "source.kind" if self.kind is not None else "file names and commands"
-        understood = [*reading.rows(rate), ("kinds", _repeats(kinds), by)]
+        count = Counter(kinds)
+        repeats = ", ".join(f"{kind} x {n}" if n > 1 else kind for kind, n in count.items())
+        understood = [*_rows(columns, units, stamps, rate), ("kinds", repeats, by)]
         return {"": RecordingTables(description, rig.text, pieces, [row for row in understood if row[1]])}
+
+    def _units(
+        self, tables: Mapping[Path, Table], columns: ColumnMap, joints: Mapping[str, RigJoint], torque_mode: bool
+    ) -> Units:
+        """The units of the signals, told by the values of all tables together."""
+        units: Units = {}
+        for name, entry in columns.joints.items():
+            if name not in joints:
+                raise InputError(f"source.columns.{name}: no such joint in the URDF; it has {', '.join(joints)}")
+            joint, found = joints[name], units.setdefault(name, {})
+            said = self.length_unit if joint.prismatic else self.angle_unit
+            values = {s: np.concatenate([_column(t, c, p) for p, t in tables.items()]) for s, c in entry.items()}
+            for signal, column in entry.items():
+                if signal == "torque" or (torque_mode and signal == "command"):
+                    found[signal] = torque_unit(self.torque_unit, column, joint.prismatic)
+                else:
+                    found[signal] = position_unit(said, column, values[signal], joint)
+            spread = float(np.ptp(values["command"]))
+            if not torque_mode and said is None and spread > 0:
+                ratio = float(np.ptp(values["position"])) / spread
+                found["command"], found["position"] = same_unit(found["command"], found["position"], ratio)
+        return units
+
+    def _trial(
+        self, path: Path, table: Table, columns: ColumnMap, units: Units, stamps: Unit | None, file: str, start: int
+    ) -> TrialTable:
+        signals = [signal for signal in SIGNALS if all(signal in entry for entry in columns.joints.values())]
+        values: dict[str, Array] = {}
+        for signal in signals:
+            one = [_column(table, c[signal], path) * units[joint][signal].size for joint, c in columns.joints.items()]
+            values[signal] = np.stack(one, axis=1)
+        if stamps is not None and columns.time is not None:
+            time = _column(table, columns.time, path)
+            time = (time - time[0]) * stamps.size
+        else:
+            time = np.arange(len(values["position"])) / (self.rate or 1.0)
+        entry = TrialEntry(file=file, initialisation=start, note=f"from {path.name}")
+        return TrialTable(entry, time, values["command"], values["position"], values.get("torque"), path)
 
     def _controller(self) -> dict[str, float | str]:
         said: dict[str, float | str] = known(self.controller)
@@ -134,6 +157,22 @@ class CsvFiles:
         return list(dict.fromkeys(found))
 
 
+def _rows(columns: ColumnMap, units: Units, stamps: Unit | None, rate: float) -> Iterator[tuple[str, str, str]]:
+    """What was understood, for people: what, how, and what told it."""
+    if stamps is not None:
+        yield "time", f"{columns.time} [{stamps.name}], {rate:g} Hz", stamps.source
+    for joint, entry in columns.joints.items():
+        for signal, column in entry.items():
+            yield f"{joint} {signal}", f"{column} [{units[joint][signal].name}]", units[joint][signal].source
+    yield "not used", ", ".join(columns.unused), ""
+
+
+def _column(table: Table, name: str, path: Path) -> Array:
+    if name not in table:
+        raise InputError(f"{path}: column '{name}' is missing; the columns of numbers are {list(table)}")
+    return table[name]
+
+
 def _beside(pattern: Path) -> str:
     """What there is where a pattern looks."""
     folder = pattern.parent
@@ -148,11 +187,6 @@ def _distinct(paths: list[Path]) -> list[str]:
     count = Counter(path.stem for path in paths)
     names = [path.stem if count[path.stem] == 1 else f"{path.parent.name}_{path.stem}" for path in paths]
     return [name if names.count(name) == 1 else f"{name}_{k}" for k, name in enumerate(names)]
-
-
-def _repeats(kinds: list[str]) -> str:
-    count = Counter(kinds)
-    return ", ".join(f"{kind} x {n}" if n > 1 else kind for kind, n in count.items())
 
 
 def _one_each(values: Iterable[Value] | None, paths: list[Path], key: str, default: list[Value]) -> list[Value]:
@@ -181,21 +215,14 @@ def kinds_of(names: Sequence[str], commands: Sequence[Array], step: float) -> li
     coarse = [command[::stride] for command in commands]
     kinds = [""] * len(names)
     for word in dict.fromkeys(words):
-        members = [k for k, other in enumerate(words) if other == word]
-        groups = _alike(members, coarse, stride * step)
+        groups: list[list[int]] = []  # of one command each
+        for k in (k for k, other in enumerate(words) if other == word):
+            alike = (g for g in groups if lag_between(coarse[g[0]], coarse[k], stride * step) is not None)
+            if (same := next(alike, None)) is not None:
+                same.append(k)
+            else:
+                groups.append([k])
         for group in groups:
             for k in group:
                 kinds[k] = word if len(groups) == 1 else names[group[0]]
     return kinds
-
-
-def _alike(members: Sequence[int], commands: Sequence[Array], step: float) -> list[list[int]]:
-    groups: list[list[int]] = []
-    for k in members:
-        known = (group for group in groups if lag_between(commands[group[0]], commands[k], step) is not None)
-        same = next(known, None)
-        if same is None:
-            groups.append([k])
-        else:
-            same.append(k)
-    return groups

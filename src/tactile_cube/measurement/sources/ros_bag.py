@@ -22,20 +22,9 @@ SAME_STAMP = 1e-6  # [s]
 
 @dataclass(frozen=True)
 class RosBag:
-    """Imports bags, one trial each.
+    """Imports bags, one trial each; conf/source/mcap.yaml says what each setting means, and its units.
 
-    Attributes:
-        files: MCAP files.
-        urdf: path of the rig's URDF.
-        joints: actuated joints, named as in the joint states.
-        controller: kp, kd, torque_limit.
-        states: topic of sensor_msgs/JointState; effort, where there is one, becomes torque.
-        commands: topic of sensor_msgs/JointState, trajectory_msgs/JointTrajectory or std_msgs/Float64MultiArray (in the
-            order of `joints`).
-        nominal: stiffness, static_friction, reflected_inertia, as far as known.
-        gravity: (3,) in the base frame [m/s^2].
-        rate: samples per second; null: the median of the first bag.
-        read: `after` or `before` the control period; a state that arrives before its command is `before`.
+    Efforts of the joint states become torques. A Float64MultiArray of commands is in the order of `joints`.
     """
 
     files: Iterable[str]
@@ -52,11 +41,7 @@ class RosBag:
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all bags."""
         rig, joints = read_rig(Path(self.urdf)), list(self.joints)
-        tables = []
-        for name in self.files:
-            path = Path(name)
-            entry = TrialEntry(file=f"trials/{path.stem}.parquet", kind=path.stem, note=f"from {path.name}")
-            tables.append(self._trial(path, joints, entry))
+        tables = [self._trial(Path(name), joints) for name in self.files]
         rate = self.rate if self.rate is not None else median_rate(tables[0].time, 2, str(tables[0].entry.note))
         description = described(
             gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=known(self.controller),
@@ -64,18 +49,18 @@ class RosBag:
         )  # fmt: skip
         return {"": RecordingTables(description, rig.text, tables)}
 
-    def _trial(self, path: Path, joints: list[str], entry: TrialEntry) -> TrialTable:
+    def _trial(self, path: Path, joints: list[str]) -> TrialTable:
         messages = _messages(path, (self.states, self.commands))
-        states = [(time, _by_joint(m, joints, path, "position")) for time, m in messages[self.states]]
-        efforts = [_effort(m, joints) for _, m in messages[self.states]]
-        orders = [(time, _by_joint(m, joints, path, "command")) for time, m in messages[self.commands]]
-        time, position = np.array([t for t, _ in states]), np.stack([values for _, values in states])
-        when, command = np.array([t for t, _ in orders]), np.stack([values for _, values in orders])
-        first = max(time[0], when[0])
-        keep = time + SAME_STAMP >= first
+        states, orders = messages[self.states], messages[self.commands]
+        time, when = (np.array([stamp for stamp, _ in one]) for one in (states, orders))
+        position = np.stack([_by_joint(message, joints, path, "position") for _, message in states])
+        command = np.stack([_by_joint(message, joints, path, "command") for _, message in orders])
+        keep = time + SAME_STAMP >= max(time[0], when[0])
         held = np.searchsorted(when, time[keep] + SAME_STAMP, side="right") - 1
-        measured = [effort for effort in efforts if effort is not None]
-        torque = np.stack(measured)[keep] if len(measured) == len(time) else None
+        torque = None
+        if all(len(message.effort) == len(message.name) for _, message in states):
+            torque = np.stack([_ordered(message.name, message.effort, joints) for _, message in states])[keep]
+        entry = TrialEntry(file=f"trials/{path.stem}.parquet", kind=path.stem, note=f"from {path.name}")
         return TrialTable(entry, time[keep] - time[keep][0], command[held], position[keep], torque)
 
 
@@ -120,15 +105,12 @@ def _by_joint(message: Any, joints: list[str], path: Path, signal: str) -> Array
         names, values = message.name, message.position
     else:
         names, values = joints, message.data
-    table = dict(zip(names, values, strict=False))
-    missing = [joint for joint in joints if joint not in table]
+    missing = [joint for joint in joints if joint not in list(names)[: len(values)]]
     if missing:
         raise InputError(f"{path}: {signal} of joint '{missing[0]}' is missing; the messages have {list(names)}")
-    return np.array([table[joint] for joint in joints], dtype=np.float64)
+    return _ordered(names, values, joints)
 
 
-def _effort(message: Any, joints: list[str]) -> Array | None:
-    if len(message.effort) != len(message.name):
-        return None
-    table = dict(zip(message.name, message.effort, strict=True))
+def _ordered(names: Iterable[str], values: Iterable[float], joints: list[str]) -> Array:
+    table = dict(zip(names, values, strict=False))
     return np.array([table[joint] for joint in joints], dtype=np.float64)

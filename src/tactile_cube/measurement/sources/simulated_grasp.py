@@ -90,10 +90,8 @@ class SimulatedGrasp(SimulatedSession):
         hidden = [parse_effect(text, find_any_effect) for text in self.hidden]
         drive = terms_of([one for one in hidden if not is_contact_effect(one[0])], joints)
         contact = ContactModel({name: values for name, values in hidden if is_contact_effect(name)})
-        recording, true = (
-            unmeasured(description, parse_rig(urdf, Path("hand.urdf")), constants),
-            Model(constants, drive, {}),
-        )
+        true = Model(constants, drive, {})
+        recording = unmeasured(description, parse_rig(urdf, Path("hand.urdf")), constants)
         free = Simulator(recording, [term.effect for term in drive], self.step)
         return _Session(self, free, HandReplay(recording, true, self.step, engine=self.engine), true, contact, rng)
 

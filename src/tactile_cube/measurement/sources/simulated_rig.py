@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
-from tactile_cube.measurement.bench import BENCH_KINDS, Bench, bench_trials
+from tactile_cube.measurement.bench import BENCH_KINDS, bench_trials
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig, read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
@@ -52,7 +52,7 @@ class SimulatedRig(SimulatedSession):
             for number in range(self.initialisations)
             for kind, command in commands.items()
         )
-        made += played(bench_trials(Bench(rig, description, rng), self.kinds, self.initialisations))
+        made += played(bench_trials(rig_only, self.kinds, self.initialisations, rng))
         result = {"": RecordingTables(description, rig.text, made)}
         if self.validation:
             last = self.initialisations - 1

@@ -36,12 +36,7 @@ def known(values: Mapping[str, Value | None]) -> dict[str, Value]:
 
 
 def median_rate(time: NDArray[np.float64], digits: int, where: str) -> float:
-    """Samples per second, from the median of the steps between rows.
-
-    Args:
-        time: of the rows (samples,) [s].
-        digits: to round to.
-        where: the rows are from, for the error.
+    """Samples per second, to some digits, from the median step of the rows' time (samples,) [s] of the file `where`.
 
     Raises:
         InputError: time does not go forward.
@@ -62,12 +57,8 @@ def require_settings(source: DictConfig, option: str) -> None:
     missing = sorted(OmegaConf.missing_keys(source))
     if missing:
         text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
-        said = [f"{key}={_meaning(key, text)}" for key in missing]
+        found = [re.search(rf"^ *{key.rpartition('.')[2]}: \?\?\? *# *(.*)$", text, re.MULTILINE) for key in missing]
+        said = [
+            f"{key}=..." + (f" ({meaning[1]})" if meaning else "") for key, meaning in zip(missing, found, strict=True)
+        ]
         raise InputError(f"source={option} needs {'; '.join(said)}")
-
-
-def _meaning(key: str, text: str) -> str:
-    """What stands behind a key in its file."""
-    found = re.search(rf"^ *{key.rpartition('.')[2]}: \?\?\? *(?:# *(.*))?$", text, re.MULTILINE)
-    said = found.group(1) if found else None
-    return f"... ({said})" if said else "..."
