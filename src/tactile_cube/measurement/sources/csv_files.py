@@ -20,12 +20,14 @@ from tactile_cube.measurement.recordings.tables import Table, read_table
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
 from tactile_cube.measurement.sources.source import described, known, median_rate
-from tactile_cube.measurement.sources.units import Unit, position_unit, same_unit, time_unit, torque_unit
+from tactile_cube.measurement.sources.units import Unit, geared, position_unit, same_unit, time_unit, torque_unit
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")
 Units = dict[str, dict[str, Unit]]
 """Joint -> signal -> unit."""
+OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
+"""Signals that some joints may have, and what stands for those of the others."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class CsvFiles:
             said = self.length_unit if joint.prismatic else self.angle_unit
             values = {s: np.concatenate([_column(t, c, p) for p, t in tables.items()]) for s, c in entry.items()}
             for signal, column in entry.items():
-                if signal == "torque" or (torque_mode and signal == "command"):
+                if signal in ("torque", "feedforward") or (torque_mode and signal == "command"):
                     found[signal] = torque_unit(self.torque_unit, column, joint.prismatic)
                 else:
                     found[signal] = position_unit(said, column, values[signal], joint)
@@ -102,23 +104,30 @@ class CsvFiles:
             if not torque_mode and said is None and spread > 0:
                 ratio = float(np.ptp(values["position"])) / spread
                 found["command"], found["position"] = same_unit(found["command"], found["position"], ratio)
+            if "link_position" in entry:
+                found |= geared(found, values, entry)
         return units
 
     def _trial(
         self, path: Path, table: Table, columns: ColumnMap, units: Units, stamps: Unit | None, file: str, start: int
     ) -> TrialTable:
-        signals = [signal for signal in SIGNALS if all(signal in entry for entry in columns.joints.values())]
         values: dict[str, Array] = {}
-        for signal in signals:
-            one = [_column(table, c[signal], path) * units[joint][signal].size for joint, c in columns.joints.items()]
-            values[signal] = np.stack(one, axis=1)
+        for signal in SIGNALS:
+            has = [signal in entry for entry in columns.joints.values()]
+            if all(has) or (any(has) and signal in OF_SOME):
+                lacking = np.full(len(next(iter(table.values()))), OF_SOME.get(signal, 0.0))
+                one = [
+                    _column(table, c[signal], path) * units[joint][signal].size if signal in c else lacking
+                    for joint, c in columns.joints.items()
+                ]
+                values[signal] = np.stack(one, axis=1)
         if stamps is not None and columns.time is not None:
             time = _column(table, columns.time, path)
             time = (time - time[0]) * stamps.size
         else:
             time = np.arange(len(values["position"])) / (self.rate or 1.0)
         entry = TrialEntry(file=file, initialisation=start, note=f"from {path.name}")
-        return TrialTable(entry, time, values["command"], values["position"], values.get("torque"), path)
+        return TrialTable(entry, time, origin=path, **values)
 
     def _controller(self) -> dict[str, float | str]:
         said: dict[str, float | str] = known(self.controller)

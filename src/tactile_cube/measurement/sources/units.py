@@ -26,6 +26,8 @@ LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
 FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+SAID = ("its name", "source.angle_unit", "source.length_unit")
+"""What tells a unit for certain."""
 GEARED = 1.5  # turns of a motor a turn of its link, from which on there is a gear between them
 SLOWEST = 0.1  # [s] between samples of a log that shows a drive
 NOT_ALIKE = 0.05  # range of a position over that of its command, below which they are in different units
@@ -101,18 +103,34 @@ def position_unit(said: str | None, name: str, values: Array, joint: RigJoint) -
     return Unit(first, 1.0, "assumed: no unit fits the joint's limits")
 
 
-def at_the_joint(unit: Unit, gear: float) -> Unit:
-    """The unit of an angle, or a torque, of a motor as it is at its joint, so many turns of the motor a turn there."""
-    size = unit.size * gear if unit.name in {*TORQUE_UNITS, *FORCE_UNITS} else unit.size / gear
-    return Unit(f"{unit.name} of the motor", size, f"{gear:.5g} turns a turn of its link")
+def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapping[str, str]) -> dict[str, Unit]:
+    """Units of what is logged on the motor's side of a gear, as it is at the joint.
 
+    The motor's angle and the link's tell the gear. Commands are on the motor's side where they reach that far,
+    torques where their column says so.
 
-def gear_of(motor: Array, link: Array) -> float:
-    """Turns of the motor a turn of the link, from their angles in one unit; 1 where they move alike."""
-    moved = link - link.mean()
-    size = float(moved @ moved)
-    gear = float(moved @ (motor - motor.mean())) / size if size > 0.0 else 1.0
-    return gear if abs(gear) > GEARED or gear < 0.0 else 1.0
+    Args:
+        units: of the signals of one joint, `link_position` among them.
+        logged: what the columns have.
+        columns: their names.
+    """
+    angles = [signal for signal in units if units[signal].name in {*ANGLE_UNITS, *LENGTH_UNITS}]
+    # no joint's limits tell the unit of a motor's angle; its link's is the best guess
+    told = {signal: units[signal if units[signal].source in SAID else "link_position"] for signal in angles}
+    moved = {signal: (logged[signal] - logged[signal].mean()) * told[signal].size for signal in angles}
+    link = moved["link_position"]
+    gear = float(link @ moved["position"]) / max(float(link @ link), 1e-30)
+    if 0.0 <= gear < GEARED:
+        return {}
+    beside = [signal for signal in units if signal not in ("position", "link_position") and of_motor(columns[signal])]
+    if "command" in angles and np.ptp(moved["command"]) > np.sqrt(abs(gear)) * np.ptp(link):
+        beside.append("command")
+    found = {}
+    for signal in {"position", *beside}:
+        unit = told.get(signal, units[signal])
+        size = unit.size / gear if signal in angles else unit.size * gear
+        found[signal] = Unit(f"{unit.name} of the motor", size, f"{gear:.5g} turns a turn of its link")
+    return found
 
 
 def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
