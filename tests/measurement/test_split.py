@@ -35,12 +35,9 @@ def test_a_single_trial_cannot_be_split(tmp_path: Path) -> None:
 
 
 def twelve(tmp_path: Path, initialisations: int) -> Recording:
-    def change(data: dict) -> None:
-        data["trials"] = [
-            {"file": "first.parquet", "initialisation": k % initialisations, "kind": f"log{k % 4}"} for k in range(12)
-        ]
-
-    read = read_recording(write(tmp_path, change))
+    names = [{"initialisation": k % initialisations, "kind": f"log{k % 4}"} for k in range(12)]
+    trials = [{"file": "first.parquet"} | one for one in names]
+    read = read_recording(write(tmp_path, setting({"trials": trials})))
     return read.with_trials([replace(trial, name=f"t{k}") for k, trial in enumerate(read.trials)])
 
 

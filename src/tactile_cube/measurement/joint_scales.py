@@ -41,7 +41,7 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     limits = np.full(len(own), np.inf) if recording.torque_controlled else recording.gains.torque_limit
     return tuple(
         Scales(
-            torque=float(max(usual[j], SMALL * accelerating[j])),
+            torque=float(usual[j]),
             often=float(often[j]),
             seldom=float(seldom[j]),
             low=float(low[j]),

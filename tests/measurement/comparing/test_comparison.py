@@ -1,13 +1,12 @@
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tactile_cube.measurement.comparing import comparison as module
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.measurement.small_rig import Table, table, write
+from tests.measurement.small_rig import setting, table, write
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +36,8 @@ def test_the_band_holds_a_share_of_the_samples(comparison: Comparison) -> None:
 def test_steps_are_shorter_where_the_sensors_would_show_their_error(
     noise: float, step: float | None, used: float, tmp_path: Path
 ) -> None:
-    def fine_encoder(data: dict[str, Any]) -> None:
-        data["sensors"]["position_resolution"] = noise
-
-    def quiet(columns: Table) -> None:
-        columns.update(table(noise=noise))
-
-    recording = read_recording(write(tmp_path, fine_encoder, quiet))
+    fine_encoder = setting({"sensors.position_resolution": noise})
+    recording = read_recording(write(tmp_path, fine_encoder, lambda columns: columns.update(table(noise=noise))))
     comparison, usual = compare_recording(recording, step=step), compare_recording(recording, step=USUAL_STEP)
     assert comparison.step == pytest.approx(used)
     smaller = comparison.floor.step_size["a"] / usual.floor.step_size["a"]

@@ -6,7 +6,17 @@ import pytest
 
 from tactile_cube.measurement.comparing.noise_floor import aligned_repeats, noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.measurement.small_rig import table, write
+from tactile_cube.measurement.recordings.recording import Recording
+from tests.measurement.small_rig import setting, table, write
+
+
+def spoiled(folder: Path, rows: slice, by: float | np.ndarray) -> Recording:
+    """The small recording with joint a's position in the first trial changed."""
+
+    def spoil(columns: dict) -> None:
+        columns["a.position"][rows] += by
+
+    return read_recording(write(folder, spoil=spoil))
 
 
 @pytest.mark.parametrize("repeats", [2, 5])
@@ -34,10 +44,7 @@ def test_a_repeat_that_starts_later_is_aligned(tmp_path: Path) -> None:
 
 
 def test_the_wait_at_the_start_is_no_noise(tmp_path: Path) -> None:
-    def spoil(columns: dict) -> None:
-        columns["a.position"][:5] += 0.005
-
-    assert noise_floor(read_recording(write(tmp_path, spoil=spoil))).joints["a"] < 3e-4
+    assert noise_floor(spoiled(tmp_path, slice(5), 0.005)).joints["a"] < 3e-4
 
 
 def test_another_command_is_no_repeat_and_the_floor_is_a_guess(tmp_path: Path) -> None:
@@ -51,18 +58,13 @@ def test_another_command_is_no_repeat_and_the_floor_is_a_guess(tmp_path: Path) -
 
 
 def test_the_sensors_noise_is_that_of_the_positions_whatever_jumps_there_are(tmp_path: Path) -> None:
-    def spoil(columns: dict) -> None:
-        columns["a.position"][::30] += 0.05
-
-    assert sensor_noise(read_recording(write(tmp_path, spoil=spoil))) == pytest.approx([2e-4, 2e-4], rel=0.1)
+    assert sensor_noise(spoiled(tmp_path, slice(None, None, 30), 0.05)) == pytest.approx([2e-4, 2e-4], rel=0.1)
 
 
 def test_a_sensor_is_no_better_than_its_owner_says_or_than_a_millionth_of_the_motion(tmp_path: Path) -> None:
     def noise(name: str, **sensors: float) -> np.ndarray:
-        def spoil(columns: dict) -> None:
-            columns.update(table(noise=0.0))
-
-        recording = read_recording(write(tmp_path / name, lambda data: data.update(sensors=sensors), spoil))
+        change = setting({"sensors": sensors})
+        recording = read_recording(write(tmp_path / name, change, lambda columns: columns.update(table(noise=0.0))))
         return sensor_noise(recording.with_trials(recording.trials[:1]))
 
     stated = noise("stated", position_resolution=0.012, position_noise=0.004)
@@ -80,10 +82,7 @@ def test_the_floor_is_the_recordings_alone_and_the_step_size_error_stands_beside
 
 
 def test_the_sensors_noise_stands_beside_the_scatter_of_repeats(tmp_path: Path) -> None:
-    def spoil(columns: dict) -> None:
-        columns["a.position"] += 0.003 * np.sin(np.arange(len(columns["time"])) / 20)  # this repeat went another way
-
-    floor = noise_floor(read_recording(write(tmp_path, spoil=spoil)))
+    floor = noise_floor(spoiled(tmp_path, slice(None), 0.003 * np.sin(np.arange(300) / 20)))  # went another way
     assert floor.source == "repeats"
     assert floor.joints["a"] > 1e-3
     assert floor.sensor["a"] == pytest.approx(2e-4, rel=0.5)

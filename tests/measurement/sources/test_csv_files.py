@@ -1,5 +1,6 @@
 """Logs as people have them: other names, units, separators and folders; what is understood, and what is asked."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,14 +12,12 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recordings
+from tactile_cube.measurement.sources import units
 from tactile_cube.measurement.sources.csv_files import CsvFiles
 from tests.measurement.small_rig import URDF, table
 
 DEGREE = 180 / np.pi
-ONE_JOINT = (
-    URDF[: URDF.index('<link name="lower">')] + URDF[URDF.index('<joint name="a"') : URDF.index('<joint name="b"')]
-)
-ONE_JOINT += "</robot>"
+ONE_JOINT = re.sub(r'<link name="lower">.*?</link>|<joint name="b".*?</joint>', "", URDF, flags=re.DOTALL)
 GAINS = {"kp": 3.0, "kd": 0.2, "torque_limit": 1.0}
 COLUMNS = {"time": "t", "a": {"command": "goal1", "position": "pos1"}, "b": {"command": "goal2", "position": "pos2"}}
 Frame = dict[str, np.ndarray]
@@ -83,6 +82,13 @@ def test_torques_are_taken_where_all_joints_have_one_and_converted_by_their_name
     trial = imported(tmp_path, {"log.csv": log(names)}).trials[0]
     assert trial.torque is not None
     assert np.allclose(trial.torque[:, 1], size * table()["b.torque"], atol=1e-6)
+
+
+def test_units_have_their_size_in_the_si() -> None:
+    known = units.ANGLE_UNITS | units.LENGTH_UNITS | units.TIME_UNITS | units.TORQUE_UNITS | units.FORCE_UNITS
+    sizes = {"rad": 1.0, "deg": 0.0174532925, "turn": 6.28318531, "mrad": 1e-3, "m": 1.0, "mm": 1e-3, "um": 1e-6}
+    sizes |= {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
+    assert known == pytest.approx(sizes | {"N": 1.0, "mN": 1e-3, "kN": 1e3}, rel=1e-8)
 
 
 def test_command_and_position_may_be_in_different_units(tmp_path: Path) -> None:

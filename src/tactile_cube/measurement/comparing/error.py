@@ -25,14 +25,9 @@ class ErrorSummary:
 
 
 def residuals(trials: Sequence[Trial], simulated: Sequence[Array]) -> list[Array]:
-    """Measured - simulated without its mean, the joint offset, over all trials of a robot initialisation.
+    """Measured - simulated (n, joints) [rad] of each trial, without the mean over its robot initialisation's trials.
 
-    Args:
-        trials: what was measured.
-        simulated: (n, joints) positions of each trial [rad].
-
-    Returns:
-        (n, joints) of each trial [rad]; nan where a dropped sample was bridged.
+    The mean is the joint offset. nan where a sample was bridged; `simulated` are positions (n, joints) [rad].
     """
     raw = raw_residuals(trials, simulated)
     offsets = {

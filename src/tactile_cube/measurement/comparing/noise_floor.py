@@ -54,13 +54,7 @@ def _comparable(first: Trial, other: Trial) -> bool:
 
 
 def lag_between(first: Array, other: Array, step: float) -> int | None:
-    """Samples by which `other` starts later in the same command (n, joints), or None where it is another command.
-
-    Args:
-        first: a command.
-        other: a command at the same rate.
-        step: time between samples [s].
-    """
+    """Samples (one a `step` [s]) by which `other` starts later in the same command (n, joints); None: another one."""
     if len(first) == len(other) and _differs(first, other) < SAME:
         return 0
     longest = round(LONGEST_LAG / step)

@@ -48,12 +48,11 @@ def check_joints(description: Description, rig: Rig, file: Path) -> None:
 def check_coupling(description: Description, rig: Rig) -> list[str]:
     """Warnings where the URDF and recording.yaml disagree on which joint follows which."""
     mimics = {name: joint.mimics for name, joint in rig.joints.items() if joint.mimics is not None}
-    warnings = []
-    for name, leader in mimics.items():
-        said = description.coupled.get(name)
-        if said is None or said.joint == leader or name in description.joints:  # the URDF's word holds
-            continue
-        warnings.append(f"key 'coupled': the URDF lets '{name}' mimic '{leader}', recording.yaml says {said.joint}")
+    warnings = [
+        f"key 'coupled': the URDF lets '{name}' mimic '{mimics[name]}', recording.yaml says {said.joint}"
+        for name, said in description.coupled.items()
+        if mimics.get(name, said.joint) != said.joint
+    ]
     free = [name for name in rig.joints if name not in {*description.joints, *description.coupled, *mimics}]
     if free:
         warnings.append(

@@ -121,11 +121,6 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
 def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key: str) -> list[Trial]:
     """What lies before, between and after the intervals, as trials that start at 0; shorter rests are dropped.
 
-    Args:
-        trial: on its uniform grid.
-        intervals: start and end [s].
-        key: what an error names.
-
     Raises:
         InputError: an interval that ends before it starts.
     """

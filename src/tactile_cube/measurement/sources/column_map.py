@@ -39,13 +39,7 @@ class ColumnMap:
 
 
 def map_columns(names: Sequence[str], joints: Sequence[str], given: Given, torque_mode: bool) -> ColumnMap:
-    """The map of a table's columns.
-
-    Args:
-        names: of the columns.
-        joints: of the URDF, those that may be actuated.
-        given: what the user said: `time` and any joint; what is said of no joint is guessed.
-        torque_mode: commands are torques.
+    """The map of a table's columns: joints as `given`, or else all of `joints` that the names of columns show.
 
     Raises:
         InputError: something is missing or can be read in two ways.

@@ -212,13 +212,7 @@ COARSE = 0.005  # [s] between samples is enough to tell two commands apart
 
 
 def kinds_of(names: Sequence[str], commands: Sequence[Array], step: float) -> list[str]:
-    """The kind of each log: logs of one name but for a number or a date, if their commands (n, joints) agree.
-
-    Args:
-        names: of the files, without endings.
-        commands: as logged.
-        step: time between samples [s].
-    """
+    """The kind of each log: logs of one name but for a number or a date, if their commands (n, joints) agree."""
     words = [COUNT.sub("", DATE.sub("_", name)).strip("_ .-") or NO_NAME for name in names]
     stride = max(1, round(COARSE / step))
     coarse = [command[::stride] for command in commands]

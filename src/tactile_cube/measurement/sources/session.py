@@ -71,15 +71,9 @@ class SimulatedSession:
     def played(
         self, entry: TrialEntry, command: Array, offset: Array, rig: Simulator, true: Model, rng: np.random.Generator
     ) -> TrialTable:
-        """Log a trial of a rig that holds nothing, settled at its first command before.
+        """Log a trial of a `rig` that holds nothing, with its `true` constants and effects, after it has settled.
 
-        Args:
-            entry: of recording.yaml.
-            command: (n, joints) [rad].
-            offset: of the joints in this initialisation (joints,) [rad].
-            rig: simulates it.
-            true: constants and hidden effects.
-            rng: of the sensors' noise.
+        `command` is (n, joints) [rad], `offset` that of the joints in this initialisation (joints,) [rad].
         """
         settle = round(SETTLING * self.rate)
         trial = silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), rig.recording, entry)
