@@ -1,6 +1,6 @@
 """Collect experience: in this process, or in workers while the learner works.
 
-All give the same numbers for the same seed and division of worlds: everything random in a worker comes from torch's
+Both give the same numbers for the same seed and division of worlds: everything random in a worker comes from torch's
 generator and the worlds' own, and `restart` sets both.
 """
 
@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 import torch
 from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import Collector
 from torchrl.envs import EnvBase
 
-from tactile_cube.agent.behaviour import Behaviour
 from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
 
@@ -48,6 +48,33 @@ class Collection(Protocol):
 
     def close(self) -> None:
         """End the workers."""
+
+
+class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
+    """Policy of the collectors: reads "observation", writes "action".
+
+    Whether actions are random travels with the weights as a buffer, so that it reaches every worker in the same
+    iteration and survives a resume. Noise comes from torch's global generator of the worker.
+
+    Args:
+        actor: its own copy, never the learner's.
+    """
+
+    in_keys = ["observation"]  # noqa: RUF012 - the name and type TorchRL asks for
+    out_keys = ["action"]  # noqa: RUF012
+
+    def __init__(self, actor: Actor):
+        super().__init__()
+        self.actor = actor.requires_grad_(False)
+        self.register_buffer("random", torch.zeros(()))
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Sample an action for each world."""
+        mean, scale = self.actor(tensordict["observation"])
+        action = torch.tanh(mean + scale * torch.randn_like(mean))
+        if self.random:
+            action = torch.rand_like(action) * 2.0 - 1.0
+        return tensordict.set("action", action)
 
 
 class SingleCollection:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -83,23 +83,6 @@ class WandbLogger:
     def close(self) -> None:
         """Finish the upload."""
         self._run.finish()
-
-
-class Loggers:
-    """Several loggers as one."""
-
-    def __init__(self, loggers: Sequence[MetricLogger]):
-        self._loggers = list(loggers)
-
-    def log(self, steps: int, metrics: Mapping[str, float]) -> None:
-        """Write one row everywhere."""
-        for logger in self._loggers:
-            logger.log(steps, metrics)
-
-    def close(self) -> None:
-        """Close all."""
-        for logger in self._loggers:
-            logger.close()
 
 
 def _whole_rows(path: Path) -> list[list[str]]:

@@ -1,23 +1,60 @@
 """Collect experience in worker processes of this machine, by TorchRL's MultiSyncCollector."""
 
 import contextlib
+import copy
 import multiprocessing
 import os
+import queue
 import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, TimeoutError
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from torchrl.collectors import MultiSyncCollector
 
 from tactile_cube.agent.networks import Actor
-from tactile_cube.training.collection import MakeEnv
-from tactile_cube.training.worker_collection import WorkerCollection
+from tactile_cube.env import Conditions
+from tactile_cube.training.collection import Behaviour, CollectionError, MakeEnv, Progress
+
+T = TypeVar("T")
 
 
-class MultiSyncCollection(WorkerCollection):
+class Background:
+    """A daemon thread that runs submitted calls one after another, so that none is waited for without a time limit.
+
+    Daemonic, because a call may be stuck in a pipe to a dead process, and that must not keep the program from ending.
+    One for all calls, because a worker ends with the thread that started it (`_prepare_worker`).
+    """
+
+    def __init__(self) -> None:
+        self._calls: queue.SimpleQueue[tuple[Future[object], Callable[[], object]] | None] = queue.SimpleQueue()
+        threading.Thread(target=self._run, daemon=True, name="collection").start()
+
+    def submit(self, call: Callable[[], T]) -> "Future[T]":
+        """Queue a call; its result or exception arrives in the future."""
+        future: Future[T] = Future()
+        self._calls.put((future, call))  # type: ignore[arg-type]
+        return future
+
+    def close(self) -> None:
+        """End the thread after the calls already queued."""
+        self._calls.put(None)
+
+    def _run(self) -> None:
+        while (entry := self._calls.get()) is not None:
+            future, call = entry
+            try:
+                future.set_result(call())
+            except BaseException as error:  # noqa: BLE001, RUF100 - handed to whoever asks for the result
+                future.set_exception(error)
+
+
+class MultiSyncCollection:
     """Worker processes that host several worlds each and step them while the learner updates.
 
     Args:
@@ -29,6 +66,9 @@ class MultiSyncCollection(WorkerCollection):
         timeout: longest wait for a block [s]; then the workers count as stuck.
         start_timeout: the same up to the end of the first block: workers that start may have to compile first.
         start_method: "fork" (Linux, fast) or "spawn".
+
+    Raises:
+        CollectionError: a worker failed, died or got stuck, here or in any method.
     """
 
     def __init__(
@@ -42,23 +82,25 @@ class MultiSyncCollection(WorkerCollection):
         start_timeout: float,
         start_method: str,
     ):
-        super().__init__(actor, processes, timeout, start_timeout)
+        self._workers, self._timeout, self._start_timeout = processes, timeout, start_timeout
+        self._started = False
+        self._behaviour = Behaviour(copy.deepcopy(actor))
+        self._thread = Background()
+        self._block: Future[TensorDictBase] | None = None
         self._final_cpu: float | None = None
         self._processes: list[Any] = []
         self._others = set(multiprocessing.active_children())
-        build = partial(self._build, make_env, worlds // processes, processes, worlds * steps, start_method)
+        build = partial(self._build, make_env, worlds // processes, worlds * steps, start_method)
         self._collector, self._blocks = self._call(build, "start")
         self._processes = self._collector.procs
 
-    def _build(
-        self, make_env: MakeEnv, worlds: int, processes: int, frames: int, start_method: str
-    ) -> tuple[MultiSyncCollector, Any]:
+    def _build(self, make_env: MakeEnv, worlds: int, frames: int, start_method: str) -> tuple[MultiSyncCollector, Any]:
         torch.multiprocessing.set_start_method(start_method, force=True)
         threads = torch.get_num_threads()
         collector = MultiSyncCollector(
-            [make_env] * processes,
+            [make_env] * self._workers,
             self._behaviour,
-            create_env_kwargs=[{"worlds": worlds, "seed": index} for index in range(processes)],
+            create_env_kwargs=[{"worlds": worlds, "seed": index} for index in range(self._workers)],
             frames_per_batch=frames,
             total_frames=-1,
             cat_results="stack",
@@ -71,13 +113,25 @@ class MultiSyncCollection(WorkerCollection):
         torch.set_num_threads(threads)
         return collector, iter(collector)
 
-    def _restart(self, seed: int) -> None:
-        self._collector.set_seed(seed)
+    def restart(self, seed: int, progress: Progress) -> None:
+        """Reset all worlds and seed everything random in them."""
+        self._set_progress(progress)
+        self._call(partial(self._collector.set_seed, seed), "restart")
 
-    def _collect(self, weights: TensorDictBase) -> TensorDictBase:
-        self._check_alive()
-        self._collector.update_policy_weights_(weights)
-        block: TensorDictBase = next(self._blocks).flatten(0, 1).clone()
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
+        """Hand the weights to the workers and let them collect one block."""
+        conditions = self._set_progress(progress)
+        self._behaviour.actor.load_state_dict(actor.state_dict())
+        self._behaviour.random.fill_(float(random))
+        weights = TensorDict.from_module(self._behaviour).data.clone()
+        self._block = self._thread.submit(partial(self._collect, weights))
+        return conditions
+
+    def take(self) -> TensorDictBase:
+        """Wait for the block begun last."""
+        assert self._block is not None, "launch first"
+        block: TensorDictBase = self._wait(self._block, "collect")
+        self._started = True
         return block
 
     def cpu_seconds(self) -> float:
@@ -95,11 +149,34 @@ class MultiSyncCollection(WorkerCollection):
             closing.result(timeout=3.0)
         self._thread.close()
 
-    def _check_alive(self) -> None:
-        # torchrl would hang sending weights to a dead worker
-        for index, process in enumerate(self._processes):
+    def _set_progress(self, progress: Progress) -> Conditions:
+        call = partial(self._collector.map_fn, "env.set_progress", [progress] * self._workers)
+        conditions: Conditions = self._call(call, "set the curriculum")[0]
+        return conditions
+
+    def _collect(self, weights: TensorDictBase) -> TensorDictBase:
+        for index, process in enumerate(self._processes):  # torchrl would hang sending weights to a dead worker
             if not process.is_alive():
                 raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
+        self._collector.update_policy_weights_(weights)
+        block: TensorDictBase = next(self._blocks).flatten(0, 1).clone()
+        return block
+
+    def _call(self, call: Callable[[], Any], doing: str) -> Any:
+        return self._wait(self._thread.submit(call), doing)
+
+    def _wait(self, future: "Future[Any]", doing: str) -> Any:
+        name, seconds = ("timeout", self._timeout) if self._started else ("start_timeout", self._start_timeout)
+        try:
+            return future.result(timeout=seconds)
+        except TimeoutError:
+            self._kill()
+            raise CollectionError(
+                f"no simulation worker answered within collector.{name}={seconds:g} s (to {doing})"
+            ) from None
+        except Exception as error:
+            self._kill()
+            raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
 
     def _kill(self) -> None:
         self._kill_children()

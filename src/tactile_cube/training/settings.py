@@ -7,12 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveFloat
 
 
 class RunSettings(BaseModel):
-    """What tells runs apart.
-
-    Attributes:
-        name: of the run, part of its folder's name.
-        seed: of everything random.
-    """
+    """What tells runs apart: the name is part of the folder's, the seed is that of everything random."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -24,25 +19,22 @@ class CollectorSettings(BaseModel):
     """How many worlds are stepped where.
 
     Attributes:
-        kind: "multi_sync" (worker processes beside the learner), "ray" (workers of a Ray cluster) or "single" (this
-            process, in turns with the learner).
+        kind: "multi_sync" (worker processes beside the learner) or "single" (this process, in turns with the learner).
         worlds: worlds in all. Source: the paper's 12 workers.
         processes: worker processes; None takes one for each core beside the learner's, as far as it divides `worlds`.
         timeout: longest wait for the workers [s].
         start_timeout: the same until their first block, before which they may compile.
         start_method: how worker processes start; fork takes under a second, spawn about 3 s a worker.
-        address: host:port of a Ray cluster that this machine is a node of; None: one of its own on this machine.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    kind: Literal["multi_sync", "ray", "single"] = "multi_sync"
+    kind: Literal["multi_sync", "single"] = "multi_sync"
     worlds: PositiveInt = 12
     processes: PositiveInt | None = None
     timeout: PositiveFloat = 120.0
     start_timeout: PositiveFloat = 600.0
     start_method: Literal["fork", "spawn", "forkserver"] = "fork"
-    address: str | None = None
 
     @model_validator(mode="after")
     def _divides(self) -> Self:
@@ -110,7 +102,7 @@ class TrainingSettings(BaseModel):
     regrasp_angle: PositiveFloat = 2.0
     stop_when_angle_above: PositiveFloat | None = None
     stop_when_kept_above: PositiveFloat | None = None
-    threads: PositiveInt = Field(default=1)
+    threads: PositiveInt = 1
 
     @property
     def goal(self) -> str:
