@@ -1,9 +1,10 @@
 """Every number of the learning algorithm, checked once."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
+from torch import Tensor
 
 from tactile_cube.agent.policy_file import DEEPEST, Width
 from tactile_cube.errors import InputError
@@ -72,7 +73,11 @@ class AgentSettings(BaseModel):
             return torch.bfloat16 if self.device != "cpu" or multiplies_bfloat16() else torch.float32
         return torch.bfloat16 if self.precision == "bf16" else torch.float32
 
-    @property
-    def temperature_learning_rate(self) -> float:
-        """Learning rate of log alpha."""
-        return self.alpha_learning_rate or self.learning_rate
+    def optimizer(self, networks: list[Tensor], log_alpha: Tensor) -> torch.optim.AdamW:
+        """One fused AdamW for networks and temperature, whose weight decay spares the temperature."""
+        rate = self.alpha_learning_rate or self.learning_rate
+        groups: list[dict[str, Any]] = [
+            {"params": networks},
+            {"params": [log_alpha], "lr": rate, "weight_decay": 0.0},
+        ]
+        return torch.optim.AdamW(groups, lr=self.learning_rate, weight_decay=self.weight_decay, fused=True)

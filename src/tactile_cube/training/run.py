@@ -121,7 +121,7 @@ class Run:
         assert learner.conditions is not None, "iterate first"
         conditions = learner.conditions.columns()
         summary = learner.episodes.summary()
-        self.line.show(learner.steps, learner.updates, summary, conditions, learner.episodes.worlds.hardest)
+        self.line.show(learner.steps, learner.updates, summary, conditions)
         if learner.iteration % learner.settings.log_iterations == 0:
             losses = {key: float(value) for key, value in learner.metrics.items()}
             costs = self.ledger.costs()

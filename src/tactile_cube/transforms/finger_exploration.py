@@ -12,7 +12,7 @@ from torchrl.envs.transforms import Transform
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.gait import GaitRanges
-from tactile_cube.transforms.partial_reset import reset_mask
+from tactile_cube.transforms.disturbances import reset_mask
 
 
 def finger_groups(fingers: int, single: bool = False) -> Tensor:

@@ -21,10 +21,8 @@ from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import GraspStarts, GraspTable, Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.health import unresolved
+from tactile_cube.transforms.disturbances import JointOffset, SensorNoise, StickyAction
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
-from tactile_cube.transforms.joint_offset import JointOffset
-from tactile_cube.transforms.sensor_noise import SensorNoise
-from tactile_cube.transforms.sticky_action import StickyAction
 
 ALMOST_ALL = 1.0 - 1e-9
 """The fraction of draws below what counts as a distribution's largest value."""
