@@ -72,7 +72,7 @@ class Sac:
         sizes: widths of the signals.
         loss: makes a loss of TorchRL from a stochastic `actor_network` and a list `qvalue_network`.
         critics: how many of them.
-        quantiles: outputs of each, for losses that learn the distribution of the return.
+        quantiles: outputs of each critic, for losses that learn the distribution of the return.
         settings: see `AgentSettings`.
 
     Raises:

@@ -16,13 +16,12 @@ from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
-from tactile_cube.training.collection import Collection, SingleCollection
+from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
-from tactile_cube.training.multi_sync_collection import MultiSyncCollection
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt, ValidationError
+from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
 from torch import Tensor
 
 from tactile_cube.drivetrain.plain_yaml import describe
@@ -130,8 +130,6 @@ class _Ring(BaseModel):
 
 
 class _Learner(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
     agent: dict[str, Any]
     replay: _Ring
 
@@ -143,7 +141,7 @@ class _State(BaseModel):
 
 
 def load_checkpoint(path: Path) -> dict[str, Any]:
-    """Read one file, weights only: nothing in it is run. Its replay's rows lie in files of their own.
+    """Read one file, weights only: nothing in it is run.
 
     Raises:
         InputError: the file is missing or damaged, claims more than it holds, or has numbers that are not finite.

@@ -15,8 +15,7 @@ from concurrent.futures import TimeoutError
 from typing import Any, TypeVar
 
 from tactile_cube.errors import InputError
-from tactile_cube.training.collection import CollectionError
-from tactile_cube.training.multi_sync_collection import Background
+from tactile_cube.training.collection import Background, CollectionError
 
 STORE = 256 * 2**20
 """Bytes of shared memory for what is sent: a recording is a few megabytes."""

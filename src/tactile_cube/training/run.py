@@ -28,13 +28,8 @@ class Run:
     """Drives a learner from barrier to barrier.
 
     Attributes:
-        learner: what learns.
-        folder: run folder.
         config: resolved configuration, kept in checkpoints and policy files.
-        loggers: where metrics go.
-        ledger: what it costs.
         lock: keeps other processes out of the folder.
-        checkpoints: where its state goes.
         barrier_steps: environment steps from one barrier, and so one checkpoint, to the next.
         approximations: which shortcuts are on, in words.
         best_angle: largest mean final angle at a barrier so far [rad].

@@ -93,14 +93,7 @@ class FingerExploration(Transform):  # type: ignore[misc]
         fingers: int = 4,
         joints_per_finger: int = 3,
     ) -> None:
-        """Explores as `exploration` says.
-
-        Args:
-            exploration: how much of it.
-            gaits: actions (gaits, steps, joints) that demonstrations play.
-            fingers: of the hand.
-            joints_per_finger: of it.
-        """
+        """Explores as `exploration` says; demonstrations play `gaits`, actions (gaits, steps, joints)."""
         super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
         self._groups, self._per_finger = finger_groups(fingers, exploration.single), joints_per_finger
@@ -113,15 +106,10 @@ class FingerExploration(Transform):  # type: ignore[misc]
         mask = reset_mask(tensordict, tensordict_reset)
         worlds = mask.shape[:-1]
         if self._exploring.shape != mask.shape:
-            self._exploring = torch.zeros_like(mask)
-            self._demonstrating = torch.zeros_like(mask)
-            self._demonstrated = torch.zeros_like(mask)
-            self._held = torch.zeros_like(mask, dtype=torch.int64)
-            self._gait = torch.zeros_like(mask, dtype=torch.int64)
-            self._clock = torch.zeros_like(mask, dtype=torch.int64)
-            self._target = torch.zeros(*worlds, self._joints)
+            self._exploring = self._demonstrating = self._demonstrated = torch.zeros_like(mask)
+            self._held = self._gait = self._clock = torch.zeros_like(mask, dtype=torch.int64)
+            self._target = self._taken = torch.zeros(*worlds, self._joints)
             self._fingers = torch.zeros(*worlds, self._joints, dtype=torch.bool)
-            self._taken = torch.zeros(*worlds, self._joints)
         draw = torch.rand(mask.shape)
         demonstrating = (draw >= self.settings.episodes) & (draw < self.settings.extra)
         self._exploring = torch.where(mask, draw < self.settings.extra, self._exploring)

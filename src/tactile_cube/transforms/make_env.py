@@ -47,15 +47,10 @@ class EnvConfig:
     """Everything that defines the environment; plain data that can be sent to another process.
 
     Attributes:
-        task: what to do.
         hand: who does it; its number of joints gives the sizes of observations and actions.
-        reward: weights.
-        randomization: what differs between episodes.
-        start: start poses.
         exploration: extra exploration in training.
         curriculum: how conditions change in training; None: they do not.
         constants: nominal constants, which the task and the randomization change.
-        simulation: numerical options of the world.
         effects: effects of the drivetrain beyond the basic model: instances, or text such as `backlash@q2: play=0.02`.
         model: an identified model, as the path of its file, its contents or a ModelFile: its values, intervals and
             effects replace those of the drive in `constants` and `randomization`. None once that is done.
