@@ -15,9 +15,8 @@ from benchmarks.speed.timing import in_turns
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.gymnasium_env import GymnasiumRotation
-from tactile_cube.training.collection import Collection, SingleCollection
+from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
-from tactile_cube.training.multi_sync_collection import MultiSyncCollection
 from tactile_cube.transforms.make_env import rotation_env
 
 YARDSTICK = "the bare task, one world"

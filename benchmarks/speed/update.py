@@ -18,7 +18,7 @@ from tactile_cube.agent.interface import Agent
 from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import Sac
 from tactile_cube.agent.sac_fast import FastSac
-from tactile_cube.training.heap import keep_freed_memory
+from tactile_cube.training.build import keep_freed_memory
 from tactile_cube.training.replay import Replay
 
 SIZES = Sizes(observation=120, privileged=25, action=12)

@@ -7,9 +7,9 @@ import torch
 from tensordict import TensorDict
 from torchrl.modules import TanhNormal
 
-from tactile_cube.agent.behaviour import Behaviour
 from tactile_cube.agent.networks import Actor, Critic, Sizes, squashed_log_prob
 from tactile_cube.agent.sac import stochastic_actor
+from tactile_cube.training.collection import Behaviour
 
 SIZES = Sizes(observation=10, privileged=4, action=3)
 

@@ -175,12 +175,6 @@ COMMANDS = {
     "deploy": ["policy=evil.safetensors", "seconds=0.1"],
     "average": ["run=run", "last=1"],
     "train": ["+experiment=smoke", "training.init_from=evil.safetensors", *RUN],
-    "train with a teacher": [
-        "+experiment=smoke",
-        "exploration=teacher",
-        "exploration.teacher=evil.safetensors",
-        "hydra.run.dir=next",
-    ],
 }
 MAKING = ("evaluate", "view", "export", "deploy")
 """Commands that make something of a policy's configuration; the others only keep it."""

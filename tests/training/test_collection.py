@@ -9,8 +9,7 @@ import torch
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
-from tactile_cube.training.collection import CollectionError, SingleCollection
-from tactile_cube.training.multi_sync_collection import MultiSyncCollection
+from tactile_cube.training.collection import CollectionError, MultiSyncCollection, SingleCollection
 from tests.training.tiny_env import LENGTH, SIZES, TinyEnv, tiny_environment
 
 

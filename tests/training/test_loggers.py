@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.training.loggers import CsvLogger, Loggers, TensorBoardLogger, WandbLogger
+from tactile_cube.training.loggers import CsvLogger, TensorBoardLogger, WandbLogger
 
 
 def rows(folder: Path) -> list[dict[str, str]]:
@@ -37,9 +37,9 @@ def test_rows_after_the_checkpoint_are_replaced(tmp_path: Path) -> None:
 def test_tensorboard_gets_every_curve(tmp_path: Path) -> None:
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    loggers = Loggers([TensorBoardLogger(tmp_path, resumed_at=0)])
-    loggers.log(10, {"angle": 0.5, "length": 7.0})
-    loggers.close()
+    logger = TensorBoardLogger(tmp_path, resumed_at=0)
+    logger.log(10, {"angle": 0.5, "length": 7.0})
+    logger.close()
     events = EventAccumulator(str(tmp_path / "tensorboard"))
     events.Reload()
     assert sorted(events.Tags()["scalars"]) == ["angle", "length"]

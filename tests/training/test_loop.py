@@ -1,5 +1,7 @@
 """Same seed, same weights: for two runs, for other ways of collecting, and for a run that was interrupted."""
 
+import os
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -66,6 +68,31 @@ def test_resumed_worker_processes_equal_an_uninterrupted_run(tmp_path: Path) -> 
     expected = finish(tiny_run(tmp_path / "whole", collector=collector))
     finish(tiny_run(tmp_path / "parts", collector=collector, steps=80))
     assert torch.equal(finish(tiny_run(tmp_path / "parts", collector=collector)), expected)
+
+
+@pytest.mark.parametrize(("at", "number"), [(0, signal.SIGINT), (6, signal.SIGINT), (6, signal.SIGTERM)])
+def test_ctrl_c_ends_a_run_at_once_and_it_goes_on_from_the_last_barrier(
+    tmp_path: Path, reference: torch.Tensor, at: int, number: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tiny_run(tmp_path)
+    iterate = run.learner.iterate
+
+    def interrupted() -> None:
+        if run.learner.iteration == at:
+            os.kill(os.getpid(), number)
+        iterate()
+
+    run.learner.iterate = interrupted  # type: ignore[method-assign]
+    reason = run.train()
+    run.conclude(reason)
+    run.close()
+    assert (reason, run.learner.iteration) == ("interrupted", at)
+    again = "; the 40 steps since then are done again" if at else ""
+    assert f"saved at {run.saved_at} steps: the same command goes on from there{again}\n" in capsys.readouterr().out
+    assert (tmp_path / "checkpoint.pt").is_file()
+    resumed = tiny_run(tmp_path)
+    assert resumed.learner.iteration == at // 4 * 4
+    assert torch.equal(finish(resumed), reference)
 
 
 def test_fast_agent_resumes_bit_for_bit_too(tmp_path: Path) -> None:
@@ -143,7 +170,7 @@ def test_an_actor_without_its_critics_waits_unless_told_otherwise(tmp_path: Path
     assert frozen == {"policy.safetensors": FROZEN, "checkpoint.pt": None}
 
 
-def test_a_run_says_how_long_it_takes_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(
+def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     finish(tiny_run(tmp_path / "first", steps=80))
@@ -151,7 +178,7 @@ def test_a_run_says_how_long_it_takes_how_much_ctrl_c_costs_and_whose_networks_i
     capsys.readouterr()
     tiny_run(tmp_path / "next", init_from=policy).announce()
     first, saved, second = capsys.readouterr().out.splitlines()[:3]
-    assert first.endswith("starts, 160 steps in all, about 0 min 00 s on two idle cores")
+    assert first.endswith("starts, 160 steps in all")
     assert saved.startswith("saved every 80 steps; after Ctrl-C the same command goes on from the last time")
     assert second == f"networks of {policy}; critics begin anew, the actor waits for {FROZEN} updates"
 

@@ -4,7 +4,6 @@ import pickle
 from pathlib import Path
 
 import pytest
-import torch
 from hydra.errors import InstantiationException
 from hydra.utils import instantiate
 
@@ -41,16 +40,11 @@ def test_critics_may_be_blind() -> None:
     assert data["next", "observation"].any()
 
 
-def idle(observation: torch.Tensor) -> torch.Tensor:
-    """A teacher that never moves; training reads the one that is named from its file."""
-    return torch.zeros(*observation.shape[:-1], 12)
-
-
 @pytest.mark.parametrize(("group", "option"), OPTIONS, ids=lambda name: name)
 def test_option_makes_an_environment_that_runs(group: str, option: str) -> None:
     task = {"task": "full"} if option == "grasps" else {}  # they hold the cube in the air
     config = pickle.loads(pickle.dumps(configured(**task, **{group: option})))
-    env = make_env(config, worlds=1, seed=0, teacher=idle if option == "teacher" else None)
+    env = make_env(config, worlds=1, seed=0)
     data = env.rollout(2)
     assert not data["next", "faulty"].any()
     assert set(env.set_progress(3_000_000, 2.5).columns()) == {"T_s", "gravity", "penalty"}

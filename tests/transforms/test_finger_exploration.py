@@ -6,10 +6,8 @@ import torch
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import step_mdp
 
-from tactile_cube.env import Task
 from tactile_cube.errors import InputError
-from tactile_cube.hand.gait import GaitRanges
-from tactile_cube.transforms import EnvConfig, Exploration, FingerExploration, make_env
+from tactile_cube.transforms import Exploration, FingerExploration
 
 MakeEnv = Callable[..., TransformedEnv]
 
@@ -125,32 +123,12 @@ def test_a_gait_begins_anew_in_the_worlds_that_are_reset(transformed: MakeEnv) -
     torch.testing.assert_close(taken, torch.tensor([[0.0], [0.3]]).expand(2, 12))
 
 
-def test_a_teacher_acts_on_what_it_observes() -> None:
-    seen: list[torch.Tensor] = []
-
-    def teacher(observation: torch.Tensor) -> torch.Tensor:
-        seen.append(observation)
-        return torch.full((*observation.shape[:-1], 12), 0.25)
-
-    settings = Exploration(episodes=0.0, demonstrations=1.0, noise=0.0, probability=0.0)
-    env = make_env(EnvConfig(Task("full", episode_steps=5), exploration=settings), 2, seed=0, teacher=teacher)
-    rollout = env.rollout(3, lambda td: td.set("action", torch.zeros(2, 12)))
-    env.close()
-    assert torch.equal(rollout["next", "action_taken"], torch.full((2, 3, 12), 0.25))
-    assert rollout["next", "demonstrated"].all()
-    assert torch.equal(torch.stack(seen, 1), rollout["observation"])
-
-
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         ({"episodes": 1.5}, r"exploration\.episodes is 1\.5"),
         ({"episodes": 0.6, "demonstrations": 0.5}, "more than all"),
         ({"shortest": 8}, "shortest"),
-        (
-            {"gaits": GaitRanges(low={}, high={}), "teacher": "default"},
-            r"exploration\.teacher=default beside exploration\.gaits",
-        ),
     ],
 )
 def test_impossible_settings_are_refused(wrong: dict[str, Any], message: str) -> None:

@@ -10,13 +10,11 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
+from tactile_cube.agent.networks import linear_layers
 from tactile_cube.agent.settings import multiplies_bfloat16
 
 LAYER_NORM_EPS = 1e-5
-
-MULTIPLIES_BF16 = multiplies_bfloat16()
-
-FUSES = MULTIPLIES_BF16 and hasattr(torch.ops.mkldnn, "_linear_pointwise")
+FUSES = multiplies_bfloat16() and hasattr(torch.ops.mkldnn, "_linear_pointwise")
 """Whether oneDNN's product with bias and ReLU in one is there; torch's compiler calls it, no public function does."""
 
 Activation = tuple[Tensor, Tensor, Tensor | None, Tensor | None]
@@ -33,23 +31,8 @@ def affine(x: Tensor, weight: Tensor, bias: Tensor, rectify: bool) -> Tensor:
     if x.dtype == torch.bfloat16 and FUSES and not x.is_cuda:
         result: Tensor = torch.ops.mkldnn._linear_pointwise(x, weight.t(), bias, "relu" if rectify else "none", [], "")
         return result
-    if _detours(x):
-        product = torch.addmm(bias.float(), x.float(), weight.float()).bfloat16()
-    else:
-        product = torch.addmm(bias, x, weight)
+    product = torch.addmm(bias, x, weight)
     return product.relu_() if rectify else product
-
-
-def multiply(a: Tensor, b: Tensor, out: Tensor | None = None) -> Tensor:
-    """Matrix product; bfloat16 goes by float32, rounded at the end, where the CPU has no such product."""
-    if not _detours(a):
-        return torch.mm(a, b, out=out)
-    product = (a.float() @ b.float()).bfloat16()
-    return product if out is None else out.copy_(product)
-
-
-def _detours(x: Tensor) -> bool:
-    return x.dtype == torch.bfloat16 and not MULTIPLIES_BF16 and not x.is_cuda
 
 
 def rectify_gradient_(gradient: Tensor, after_relu: Tensor) -> Tensor:
@@ -101,17 +84,17 @@ class FlatPerceptron:
         """
         for index in range(len(self.layers) - 1, -1, -1):
             weight_gradient, bias_gradient = self.gradients[index]
-            multiply(kept[index][0][rows].t(), gradient[rows], out=weight_gradient)
+            torch.mm(kept[index][0][rows].t(), gradient[rows], out=weight_gradient)
             torch.sum(gradient[rows], 0, out=bias_gradient)
             if index > 0:
                 after_relu = kept[index][0]
-                gradient = rectify_gradient_(multiply(gradient, self.layers[index][0].t()), after_relu)
+                gradient = rectify_gradient_(torch.mm(gradient, self.layers[index][0].t()), after_relu)
                 gradient = self._normalise_backward(gradient, kept[index - 1])
         return gradient
 
     def input_gradient(self, first_product_gradient: Tensor, columns: slice) -> Tensor:
         """Gradient with respect to some columns of the input, from what `backward` gave."""
-        return multiply(first_product_gradient, self.layers[0][0][columns].t())
+        return torch.mm(first_product_gradient, self.layers[0][0][columns].t())
 
     def _normalise(self, product: Tensor) -> tuple[Tensor, Tensor | None, Tensor | None]:
         if not self.layer_norm:
@@ -128,21 +111,19 @@ class FlatPerceptron:
         result: Tensor = backward(gradient, product, (product.shape[1],), mean, inverse, None, None, wanted)[0]
         return result
 
+    @torch.no_grad()
     def copy_from(self, module: nn.Sequential) -> None:
         """Take the parameters of a torch perceptron of the same widths."""
-        linears = [layer for layer in module if isinstance(layer, nn.Linear)]
-        with torch.no_grad():
-            for (weight, bias), linear in zip(self.layers, linears, strict=True):
-                weight.copy_(linear.weight.t())
-                bias.copy_(linear.bias)
+        for (weight, bias), linear in zip(self.layers, linear_layers(module), strict=True):
+            weight.copy_(linear.weight.t())
+            bias.copy_(linear.bias)
 
+    @torch.no_grad()
     def copy_to(self, module: nn.Sequential) -> None:
         """Give the parameters to a torch perceptron of the same widths."""
-        linears = [layer for layer in module if isinstance(layer, nn.Linear)]
-        with torch.no_grad():
-            for (weight, bias), linear in zip(self.layers, linears, strict=True):
-                linear.weight.copy_(weight.t())
-                linear.bias.copy_(bias)
+        for (weight, bias), linear in zip(self.layers, linear_layers(module), strict=True):
+            linear.weight.copy_(weight.t())
+            linear.bias.copy_(bias)
 
 
 def _layer_views(sizes: tuple[int, ...], flat: Tensor) -> list[tuple[Tensor, Tensor]]:

@@ -10,10 +10,7 @@ from tactile_cube.agent.settings import AgentSettings
 
 
 class Agent(Protocol):
-    """Networks, targets, temperature and optimisers of soft actor-critic.
-
-    Construct as `Agent(sizes, **settings)`; parameters are drawn from torch's global generator.
-    """
+    """Soft actor-critic: `Agent(sizes, **settings)`; parameters are drawn from torch's global generator."""
 
     sizes: Sizes
     settings: AgentSettings

@@ -32,10 +32,14 @@ def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:
     for fan_in, fan_out in itertools.pairwise(sizes[:-1]):
         layers.append(nn.Linear(fan_in, fan_out))
         if layer_norm:
-            # No scale and shift: the next layer has both.
-            layers.append(nn.LayerNorm(fan_out, elementwise_affine=False))
+            layers.append(nn.LayerNorm(fan_out, elementwise_affine=False))  # the next layer scales and shifts
         layers.append(nn.ReLU())
     return nn.Sequential(*layers, nn.Linear(sizes[-2], sizes[-1]))
+
+
+def linear_layers(body: nn.Sequential) -> list[nn.Linear]:
+    """The linear layers of a perceptron, the first one first."""
+    return [layer for layer in body if isinstance(layer, nn.Linear)]
 
 
 def log_scale(raw: Tensor) -> Tensor:
@@ -64,7 +68,7 @@ class Actor(nn.Module):
 
     def layers(self) -> list[nn.Linear]:
         """The linear layers, the first one first."""
-        return [layer for layer in self.body if isinstance(layer, nn.Linear)]
+        return linear_layers(self.body)
 
     def deterministic(self, observation: Tensor) -> Tensor:
         """The policy without exploration: tanh of the mean, (batch, action)."""

@@ -47,9 +47,7 @@ class PolicyInfo(BaseModel):
 
     Attributes:
         observation_size: width of the stacked observation.
-        action_size: number of joints commanded.
-        action_low: lower end of the action range.
-        action_high: upper end of the action range.
+        action_size: number of joints commanded; their range is action_low to action_high.
         hidden: widths of the hidden layers.
         time_constant: T_s [s] of the target filter it was last trained with; None if unknown.
         seed: of the training run.
@@ -107,7 +105,7 @@ def save_policy(path: Path, actor: Actor, info: PolicyInfo) -> None:
 def sealed(tensors: Mapping[str, Array], info: str) -> bytes:
     """The contents of a policy file: tensors, and metadata with the checksum of all of it."""
     content = save(dict(tensors), {"sha256": NO_DIGEST.decode(), "format": FORMAT, "info": info})
-    return content.replace(NO_DIGEST, _digest(content), 1)
+    return content.replace(NO_DIGEST, hashlib.sha256(content).hexdigest().encode(), 1)
 
 
 def read_policy(path: Path) -> tuple[PolicyInfo, list[Layer]]:
@@ -172,10 +170,6 @@ def _content(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def _digest(content: bytes) -> bytes:
-    return hashlib.sha256(content).hexdigest().encode()
-
-
 def _verified(path: Path, content: bytes) -> dict[str, Any]:
     """The metadata, after making sure that their format is this one and that the checksum in them fits the file."""
     size = int.from_bytes(content[:8], "little")
@@ -191,7 +185,8 @@ def _verified(path: Path, content: bytes) -> dict[str, Any]:
         raise InputError(
             f"{path}: not a policy file (format {str(metadata.get('format'))[:40]!r}, expected {FORMAT!r})"
         )
-    if len(stated) != len(NO_DIGEST) or _digest(content.replace(stated, NO_DIGEST, 1)) != stated:
+    found = hashlib.sha256(content.replace(stated, NO_DIGEST, 1)).hexdigest().encode()
+    if len(stated) != len(NO_DIGEST) or found != stated:
         raise InputError(f"{path}: damaged, its checksum does not fit its contents; take another copy of the file")
     return metadata
 

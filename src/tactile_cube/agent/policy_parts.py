@@ -21,7 +21,7 @@ from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
 
-DISTRIBUTIONS = ("Choice", "Constant", "LogUniform", "Normal", "Uniform", "UniformPerJoint")
+DISTRIBUTIONS = ("Choice", "Constant", "LogUniform", "Uniform", "UniformPerJoint")
 PARTS = {
     "tactile_cube.env": ("Reward", "Task"),
     "tactile_cube.hand": ("hand_from_urdf", "published_hand"),

@@ -15,7 +15,6 @@ from torchrl.modules import ProbabilisticActor, TanhNormal, ValueOperator
 from torchrl.objectives import LossModule, SACLoss, SoftUpdate
 
 from tactile_cube.agent.networks import Actor, Critic, Sizes, build_networks
-from tactile_cube.agent.optimizer import build_optimizer
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.errors import InputError
 
@@ -66,9 +65,6 @@ class ImitatingLoss(SACLoss):  # type: ignore[misc]
         return lower
 
 
-IMITATING = partial(ImitatingLoss, loss_function="l2")
-
-
 class Sac:
     """Soft actor-critic from TorchRL's parts.
 
@@ -76,7 +72,7 @@ class Sac:
         sizes: widths of the signals.
         loss: makes a loss of TorchRL from a stochastic `actor_network` and a list `qvalue_network`.
         critics: how many of them.
-        quantiles: outputs of each, for losses that learn the distribution of the return.
+        quantiles: outputs of each critic, for losses that learn the distribution of the return.
         settings: see `AgentSettings`.
 
     Raises:
@@ -86,7 +82,7 @@ class Sac:
     def __init__(
         self,
         sizes: Sizes,
-        loss: Callable[..., LossModule] = IMITATING,
+        loss: Callable[..., LossModule] = partial(ImitatingLoss, loss_function="l2"),  # noqa: B008
         critics: int = 2,
         quantiles: int = 1,
         **settings: Any,
@@ -103,7 +99,7 @@ class Sac:
                 f"agent.loss: {error}; give a soft actor-critic loss of TorchRL, as conf/agent/tqc.yaml does"
             ) from error
         parameters = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
-        self.optimizer = build_optimizer(parameters, self.loss.log_alpha, self.settings)
+        self.optimizer = self.settings.optimizer(parameters, self.loss.log_alpha)
 
     def _build_loss(self, make: Callable[..., LossModule], critics: list[Critic]) -> LossModule:
         loss = make(

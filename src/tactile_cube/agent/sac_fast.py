@@ -10,7 +10,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from tactile_cube.agent.flat_perceptron import Activation, FlatPerceptron, parameter_count
+from tactile_cube.agent.flat_perceptron import FlatPerceptron, parameter_count
 from tactile_cube.agent.networks import (
     LOG_SCALE_HIGH,
     LOG_SCALE_LOW,
@@ -20,7 +20,6 @@ from tactile_cube.agent.networks import (
     log_scale,
     squashed_log_prob,
 )
-from tactile_cube.agent.optimizer import build_optimizer
 from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.agent.single_pass import SinglePass
 
@@ -73,23 +72,15 @@ class FastSac:
         self.networks.refresh()
         self._actor_module = copy.deepcopy(actor).requires_grad_(False)
         self.log_alpha = torch.tensor(self.settings.alpha_init, device=self.device).log()
-        self._give_gradients()
-        self.optimizer = build_optimizer([self.networks.master], self.log_alpha, self.settings)
-        self._single_pass = self._build_single_pass()
-
-    def _give_gradients(self) -> None:
-        networks = self.networks
-        # a float32 gradient is the working gradient itself; a bfloat16 one is cast before the step
-        same = networks.master.dtype == networks.gradient.dtype
-        networks.master.grad = networks.gradient if same else torch.zeros_like(networks.master)
         self.log_alpha.grad = torch.zeros_like(self.log_alpha)
-
-    def _build_single_pass(self) -> SinglePass | None:
-        networks = self.networks
-        if self.settings.product_dtype != torch.bfloat16 or self.device.type != "cpu":
-            return None
-        vectors = (networks.master, networks.working, networks.gradient, networks.target_master)
-        return SinglePass(self.optimizer, *vectors, networks.target_working, self.settings.tau)
+        master, gradient = self.networks.master, self.networks.gradient
+        # a float32 gradient is the working gradient itself; a bfloat16 one is cast before the step
+        master.grad = gradient if master.dtype == gradient.dtype else torch.zeros_like(master)
+        self.optimizer = self.settings.optimizer([master], self.log_alpha)
+        self._single_pass: SinglePass | None = None
+        if master.dtype != gradient.dtype and self.device.type == "cpu":
+            vectors = (master, self.networks.working, gradient, self.networks.target_master)
+            self._single_pass = SinglePass(self.optimizer, *vectors, self.networks.target_working, self.settings.tau)
 
     @torch.no_grad()
     def update(self, batch: TensorDictBase) -> dict[str, Tensor]:
@@ -143,7 +134,9 @@ class FastSac:
         sigma_gradient = pre_gradient * deviation[second] - share
         mean_gradient = pre_gradient + self._imitation_gradient(batch, torch.tanh(mean[second]), better)
         slope = 0.5 * (LOG_SCALE_HIGH - LOG_SCALE_LOW) * (1.0 - torch.tanh(raw[second]).square())
-        self._actor_backward(actor_kept, torch.cat((mean_gradient, sigma_gradient * slope), -1), second)
+        mine = [(x[second], product[second], mean, inverse) for x, product, mean, inverse in actor_kept]
+        actor_gradient = self._cast(torch.cat((mean_gradient, sigma_gradient * slope), -1))
+        self.networks.actor.backward(mine, actor_gradient, slice(None))
 
         mean_log_prob = log_prob[second].mean()
         self.log_alpha.grad.copy_(-(mean_log_prob + self.settings.target_entropy))  # type: ignore[union-attr]
@@ -180,9 +173,8 @@ class FastSac:
     ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Critic loss, the lower of the two values of the proposed actions, and minus its gradient by the action.
 
-        Last, 1 where the replayed action is worth more than the proposed one.
-
-        The critics' parameter gradients come from the replayed half, the action's gradient from the proposed half.
+        Last, 1 where the replayed action is worth more than the proposed one. The critics' parameter gradients come
+        from the replayed half, the action's gradient from the proposed half.
         """
         size = target.shape[0]
         first, second = slice(0, size), slice(size, 2 * size)
@@ -204,10 +196,6 @@ class FastSac:
             action_gradient += critic.input_gradient(at_first[second], columns).float()
         lower = torch.minimum(q1, q2)
         return loss, lower[second], action_gradient, (lower[first] > lower[second]).float()
-
-    def _actor_backward(self, kept: list[Activation], gradient: Tensor, rows: slice) -> None:
-        mine = [(x[rows], product[rows], mean, inverse) for x, product, mean, inverse in kept]
-        self.networks.actor.backward(mine, self._cast(gradient), slice(None))
 
     def policy(self) -> Actor:
         """A copy of the actor on the CPU, detached from the learner."""

@@ -1,9 +1,10 @@
 """Every number of the learning algorithm, checked once."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
+from torch import Tensor
 
 from tactile_cube.agent.policy_file import DEEPEST, Width
 from tactile_cube.errors import InputError
@@ -15,27 +16,10 @@ def multiplies_bfloat16() -> bool:
 
 
 class AgentSettings(BaseModel):
-    """Hyperparameters of SAC; the defaults are the paper's first training where it publishes them.
+    """Hyperparameters of SAC, as the paper publishes them where it does; conf/agent/sac_fast.yaml explains each.
 
-    Attributes:
-        hidden: widths of the hidden layers of the actor and of each critic.
-        layer_norm: normalise the critics' hidden layers (without scale and shift).
-        gamma: discount a policy step.
-        learning_rate: of actor and critics (not published; 3e-4 is the usual choice).
-        alpha_learning_rate: of the temperature's logarithm; None takes learning_rate.
-        weight_decay: decoupled decay (AdamW) of actor and critics, not of the temperature.
-        tau: share of the online critics that flows into the targets at each update (not published).
-        alpha_init: temperature at the start.
-        target_entropy: entropy [nat] the temperature is tuned towards.
-        n_step: rewards summed before bootstrapping.
-        demonstration_weight: of imitating a demonstrated action where the critics hold it for better than the actor's
-            own (behaviour cloning with a Q filter, Nair et al. 2018); 0 learns by reward alone.
-        batch_size: replayed transitions an update.
-        precision: arithmetic of the matrix products: fp32, bf16, or auto: bf16 where the processor multiplies it
-            (AVX-512 and newer), else fp32.
-        device: "cpu", "cuda" or "cuda:0"; collection stays on the CPU.
-
-    Source: website table of the paper.
+    Imitation (`demonstration_weight`) is behaviour cloning with a Q filter, Nair et al. 2018. Collection stays on the
+    CPU whatever the `device` ("cpu", "cuda" or "cuda:0"). Source: website table of the paper.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -72,7 +56,11 @@ class AgentSettings(BaseModel):
             return torch.bfloat16 if self.device != "cpu" or multiplies_bfloat16() else torch.float32
         return torch.bfloat16 if self.precision == "bf16" else torch.float32
 
-    @property
-    def temperature_learning_rate(self) -> float:
-        """Learning rate of log alpha."""
-        return self.alpha_learning_rate or self.learning_rate
+    def optimizer(self, networks: list[Tensor], log_alpha: Tensor) -> torch.optim.AdamW:
+        """One fused AdamW for networks and temperature, whose weight decay spares the temperature."""
+        rate = self.alpha_learning_rate or self.learning_rate
+        groups: list[dict[str, Any]] = [
+            {"params": networks},
+            {"params": [log_alpha], "lr": rate, "weight_decay": 0.0},
+        ]
+        return torch.optim.AdamW(groups, lr=self.learning_rate, weight_decay=self.weight_decay, fused=True)

@@ -27,10 +27,10 @@ class SinglePass:
     Args:
         optimizer: AdamW whose first group holds the parameters.
         parameters: flat float32 vector; its tail are the critics.
-        working: bfloat16 copy of the parameters.
-        gradient: bfloat16 gradient.
+        working: their bfloat16 copy.
+        gradient: of the parameters, in bfloat16.
         targets: flat float32 target critics.
-        target_working: bfloat16 copy of the targets.
+        target_working: their bfloat16 copy.
         tau: share of the critics that flows into the targets.
     """
 
@@ -88,20 +88,10 @@ def adamw_step(
     inverse_root: np.float32,
     eps: np.float32,
 ) -> None:
-    """AdamW on every parameter, and the new parameters rounded to bfloat16.
+    """AdamW on `parameters` (n,) with moments `mean` and `square`, and the new ones rounded to bfloat16 in `working`.
 
-    Args:
-        parameters: (n,), written.
-        gradient: (n,).
-        working: (n,), written.
-        mean: first moments (n,), written.
-        square: second moments (n,), written.
-        beta1: decay of the first moments.
-        beta2: decay of the second moments.
-        keep: 1 - learning rate * weight decay.
-        rate: learning rate over the bias correction of the first moment.
-        inverse_root: 1 / sqrt(bias correction of the second moment).
-        eps: of AdamW.
+    `keep` is 1 - learning rate * weight decay, `rate` the learning rate over the bias correction of the first moment,
+    `inverse_root` 1 / sqrt(bias correction of the second moment).
     """
     one = np.float32(1.0)
     for i in range(parameters.shape[0]):
@@ -117,14 +107,7 @@ def adamw_step(
 
 @compiled_once
 def follow(online: Floats, targets: Floats, working: Halves, tau: np.float32) -> None:
-    """Soft target update, and the new targets rounded to bfloat16.
-
-    Args:
-        online: critics (n,).
-        targets: (n,), written.
-        working: (n,), written.
-        tau: share of the critics that flows into the targets.
-    """
+    """Soft target update of `targets` (n,), and the new ones rounded to bfloat16 in `working`."""
     for i in range(online.shape[0]):
         value = targets[i] + tau * (online[i] - targets[i])
         targets[i] = value

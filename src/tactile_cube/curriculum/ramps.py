@@ -31,8 +31,13 @@ class Ramps:
             if value is not None and not value >= 0.0:
                 raise InputError(f"curriculum {key} is {value}; give a scale >= 0")
 
-    def at(self, progress: float, final: Conditions) -> Conditions:
-        """Conditions at `progress`, 0 at the start to 1 at `final`."""
+    def progress(self, environment_steps: int, performance: float) -> float:
+        """Part of the way to the task's own conditions; below 0 it has not begun, above 1 it is over."""
+        raise NotImplementedError
+
+    def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
+        """Conditions of the episodes that start now, see `Curriculum`."""
+        progress = min(1.0, max(0.0, self.progress(environment_steps, performance)))
         return Conditions(
             filter_time=_between(self.filter_time, final.filter_time, progress),
             gravity_scale=_between(self.gravity_scale, final.gravity_scale, progress),
@@ -74,20 +79,16 @@ class LinearCurriculum(Ramps):
             raise InputError(f"curriculum begin {self.begin}, length {self.length}; give begin >= 0 and length > 0")
 
     def progress(self, environment_steps: int, performance: float) -> float:
-        """Part of the way done, 0 to 1."""
-        return min(1.0, max(0.0, (environment_steps - self.begin) / self.length))
-
-    def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
-        """Conditions of the episodes that start after `environment_steps`."""
-        return self.at(self.progress(environment_steps, performance), final)
+        """Goes by the steps."""
+        return (environment_steps - self.begin) / self.length
 
 
 @dataclass(frozen=True)
 class PerformanceCurriculum(Ramps):
-    """Conditions as hard as the policy can bear: they follow its mean final angle, up and down again.
+    """Conditions that follow the policy's mean final angle, up and down again.
 
-    The way done is a function of the present performance alone, without memory. So it gives way by itself when the
-    policy gets worse, and a resumed training needs nothing but its performance to go on with the same conditions.
+    They are a function of the present performance alone, without memory: they become easier by themselves when the
+    policy gets worse, and a resumed training needs nothing but its performance to continue with them.
 
     Attributes:
         low: mean final angle up to which the conditions stay at the start [rad].
@@ -104,9 +105,5 @@ class PerformanceCurriculum(Ramps):
             raise InputError(f"curriculum low {self.low} is not below high {self.high}; give angles low < high [rad]")
 
     def progress(self, environment_steps: int, performance: float) -> float:
-        """Part of the way done, 0 to 1."""
-        return min(1.0, max(0.0, (performance - self.low) / (self.high - self.low)))
-
-    def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
-        """Conditions of the episodes that start while the mean final angle is `performance` [rad]."""
-        return self.at(self.progress(environment_steps, performance), final)
+        """Goes by the performance."""
+        return (performance - self.low) / (self.high - self.low)

@@ -17,7 +17,7 @@ from tactile_cube.env.cube_pose import CubePose
 from tactile_cube.errors import InputError
 
 REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "off_centre", "leaving", "advance")
-"""Names and order of the terms in the key "reward_terms"."""
+"""Names and order of the terms in the key "reward_terms"; leaving is 1 in the step that loses the cube."""
 BORNE_TERMS = ("climb", "link_spin", "tips", "links", "link_force")
 """Further terms, of how the object is held: measured, and part of that key, only where one of them has a weight."""
 
@@ -53,11 +53,6 @@ def off_centre(first: CubePose, after: CubePose) -> float:
     A cube that is dragged aside is lost some twenty steps later, beyond what the discount lets the agent foresee.
     """
     return (after.x - first.x) ** 2 + (after.y - first.y) ** 2
-
-
-def leaving(lost: bool) -> float:
-    """1 in the step that ends the episode because the cube was lost, else 0."""
-    return float(lost)
 
 
 def advance(turned: float, direction: int, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
@@ -125,10 +120,9 @@ class Reward:
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
         for key in (*REWARD_TERMS, *BORNE_TERMS, "fastest"):
-            if not (math.isfinite(getattr(self, key)) and getattr(self, key) >= 0.0):
-                raise InputError(
-                    f"reward.{key} is {getattr(self, key)}; give a finite weight >= 0 (signs are built in)"
-                )
+            value = getattr(self, key)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError(f"reward.{key} is {value}; give a finite weight >= 0 (signs are built in)")
 
     @property
     def borne_terms(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tactile_cube.env import reward as terms
 from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
 from tactile_cube.env.reward import Reward
-from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Conditions, Task
+from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places
 from tactile_cube.simulation import EpisodeConstants, World
@@ -67,9 +67,8 @@ class RotationEnv:
     that what happens in it depends on nothing else.
 
     Attributes:
-        world: what simulates.
-        constants: constants of the running episode.
-        conditions: conditions of the next episode.
+        constants: of the running episode.
+        conditions: of the next episode.
         steered: names of the constants that are drawn by `odds`.
         odds: probability of each part of their ranges, in the next episode.
         places: where in their ranges they lie in the running episode, each in [0, 1).
@@ -92,17 +91,7 @@ class RotationEnv:
         constants: EpisodeConstants | None = None,
         hand: Hand = DLR_HAND2,
     ) -> None:
-        """Puts the task into `world`.
-
-        Args:
-            world: what simulates.
-            task: what to do.
-            reward: weights.
-            randomization: what differs between episodes.
-            start: table of start poses.
-            constants: nominal constants that the randomization varies; None: the published ones.
-            hand: the hand in `world`.
-        """
+        """Puts the task into `world`, whose hand is `hand`; `constants` are nominal, None: the published ones."""
         self.world, self.task, self.reward, self.randomization, self.hand = world, task, reward, randomization, hand
         self.nominal = EpisodeConstants() if constants is None else constants
         self.start_poses = start
@@ -120,10 +109,6 @@ class RotationEnv:
     def seed(self, seed: int, index: int = 0) -> None:
         """Starts the count of episodes anew; `index` tells worlds with the same seed apart."""
         self._seed, self._index, self._episode = seed, index, 0
-
-    def set_conditions(self, conditions: Conditions) -> None:
-        """Conditions of the episodes from the next reset on."""
-        self.conditions = conditions
 
     def reset(self) -> TimeStep:
         """Starts the next episode."""
@@ -157,7 +142,9 @@ class RotationEnv:
             if math.isfinite(moment.reward + float(moment.object_state.sum() + moment.joint_position.sum())):
                 self._moment = moment
                 return moment
-        self._moment = self._fault(step)
+        last, nothing = self._moment, np.zeros(len(self.reward.terms))
+        state = (last.joint_position, last.control_error, last.object_state, last.theta)
+        self._moment = TimeStep(*state, nothing, 0.0, FAULTY, step)
         return self._moment
 
     def _pose_now(self, previous_theta: float | None) -> CubePose:
@@ -174,7 +161,11 @@ class RotationEnv:
 
     def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
         turned = terms.spin(before, after, self.task.direction, self._limit)
-        tips, self._tips = self._tips, self._azimuths()
+        azimuths, self._tips = self._tips, self._azimuths()
+        held: tuple[float, ...] = ()
+        if self.reward.borne_terms:
+            tips, links, share = borne(normal_forces(self.world))
+            held = (terms.climb(self._first, after), max(turned, 0.0) * links, tips, links, share)
         return np.array(
             (
                 turned,
@@ -183,18 +174,11 @@ class RotationEnv:
                 terms.tilt(before, after),
                 terms.proximal(self.world.q.tolist(), self.hand.joints_per_finger),
                 terms.off_centre(self._first, after),
-                terms.leaving(outcome in LOST),
-                terms.advance(turned, self.task.direction, tips, self._tips),
-                *self._held(turned, after),
+                float(outcome in LOST),
+                terms.advance(turned, self.task.direction, azimuths, self._tips),
+                *held,
             )
         )
-
-    def _held(self, turned: float, after: CubePose) -> tuple[float, ...]:
-        """The terms of how the object is held; none where they earn nothing."""
-        if not self.reward.borne_terms:
-            return ()
-        tips, links, share = borne(normal_forces(self.world))
-        return terms.climb(self._first, after), max(turned, 0.0) * links, tips, links, share
 
     def _observe(self, measured: Array, outcome: int, step: int) -> TimeStep:
         world, pose = self.world, self._pose
@@ -208,12 +192,6 @@ class RotationEnv:
         theta = self.task.direction * (pose.theta - self._first.theta)
         reward = float(measured @ self._weights)
         return TimeStep(np.array(q_m), q_f - q_m, state, theta, measured, reward, outcome, step)
-
-    def _fault(self, step: int) -> TimeStep:
-        last = self._moment
-        nothing = np.zeros(len(self.reward.terms))
-        state = (last.joint_position, last.control_error, last.object_state, last.theta)
-        return TimeStep(*state, nothing, 0.0, FAULTY, step)
 
 
 TOUCH_FORCE = 0.02

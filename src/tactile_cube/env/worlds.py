@@ -15,17 +15,6 @@ from tactile_cube.env.rotation import OBJECT, Array, RotationEnv, TimeStep
 from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions, Curriculum
 
 
-def float_sizes(joints: int, terms: int) -> dict[str, int]:
-    """Keys and sizes of the real-valued observations of a hand with so many joints, as TimeStep describes them."""
-    return {
-        "joint_position": joints,
-        "control_error": joints,
-        "object_state": OBJECT + joints,
-        "theta": 1,
-        "reward_terms": terms,
-    }
-
-
 class WorldsEnv(EnvBase):  # type: ignore[misc]
     """Rotation tasks side by side, batch size `[worlds]`.
 
@@ -51,10 +40,13 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         self._seed_tasks(0)
 
     def _make_specs(self) -> None:
-        n, joints, terms = len(self.tasks), self.tasks[0].hand.joints, len(self.tasks[0].reward.terms)
-        spec = Composite({key: Unbounded((n, size)) for key, size in float_sizes(joints, terms).items()}, shape=(n,))
-        if self.tasks[0].steered:
-            spec["places"] = Unbounded((n, len(self.tasks[0].steered)))
+        n, first = len(self.tasks), self.tasks[0]
+        joints = first.hand.joints
+        sizes = {"joint_position": joints, "control_error": joints, "object_state": OBJECT + joints, "theta": 1}
+        sizes["reward_terms"] = len(first.reward.terms)
+        if first.steered:
+            sizes["places"] = len(first.steered)
+        spec = Composite({key: Unbounded((n, size)) for key, size in sizes.items()}, shape=(n,))
         spec["episode_step"] = Unbounded((n, 1), dtype=torch.int64)
         spec["outcome"] = Categorical(len(OUTCOMES), shape=(n, 1), dtype=torch.int64)
         spec["faulty"] = Categorical(2, shape=(n, 1), dtype=torch.bool)
@@ -79,16 +71,15 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         if self.curriculum is not None:
             conditions = self.curriculum.conditions(environment_steps, performance, conditions)
         for task in self.tasks:
-            task.set_conditions(conditions)
+            task.conditions = conditions
             task.odds = task.odds if odds is None else odds
         return conditions
 
     def _set_seed(self, seed: int | None) -> None:
         """Seeds every world, and torch's global generator, which the transforms draw from."""
-        if seed is None:
-            return
-        torch.manual_seed(seed)
-        self._seed_tasks(seed)
+        if seed is not None:
+            torch.manual_seed(seed)
+            self._seed_tasks(seed)
 
     def _seed_tasks(self, seed: int) -> None:
         for index, task in enumerate(self.tasks):

@@ -12,7 +12,6 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.errors import InputError
@@ -111,23 +110,6 @@ class LogUniform:
     def quantile(self, u: Array) -> Array:
         """Geometric between the bounds."""
         return np.asarray(self.low * (self.high / self.low) ** np.asarray(u), dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class Normal:
-    """Gaussian with `mean` and standard deviation `std`."""
-
-    mean: float
-    std: float
-
-    def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
-        if not self.std >= 0.0:
-            raise InputError(f"Normal: std {self.std} is negative; give a standard deviation >= 0")
-
-    def quantile(self, u: Array) -> Array:
-        """Gaussian quantile; the lowest of 2**53 uniform numbers, 0, becomes the next one so that it stays finite."""
-        return np.asarray(self.mean + self.std * ndtri(np.maximum(u, 2.0**-53)), dtype=np.float64)
 
 
 @dataclass(frozen=True)

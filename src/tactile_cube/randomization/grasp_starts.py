@@ -22,6 +22,7 @@ from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants, Start
 from tactile_cube.untrusted_file import read_npz
 
+Array = NDArray[np.float64]
 MOST = 10_000
 """Start poses; inverse kinematics is solved for each."""
 
@@ -49,7 +50,7 @@ class StartStates:
 
     def of(self, hand: Hand, constants: EpisodeConstants | None = None) -> StartPoses:
         """The start poses of `hand` with the object of `constants`; None: the nominal cube."""
-        known = EpisodeConstants() if constants is None else constants
+        known = constants or EpisodeConstants()
         nominal = known.object_shape == "box" and np.array_equal(known.cube_size, EpisodeConstants().cube_size)
         if self.poses == 1 and nominal:
             return StartPoses(hand, np.zeros(1), np.asarray(hand.start_angles, dtype=np.float64)[None])
@@ -62,10 +63,9 @@ class StartStates:
 
 @dataclass(frozen=True)
 class StartPoses:
-    """A table of start poses.
+    """A table of start poses of `hand`.
 
     Attributes:
-        hand: the hand.
         yaws: angles of the cube about the vertical `(poses,)` [rad].
         angles: joint angles that go with them `(poses, joints)` [rad].
     """
@@ -92,8 +92,6 @@ class StartPoses:
             cube_quaternion=Rotation.from_euler("ZYX", [self.yaws[pose] + turn[2], turn[1], turn[0]]).as_quat(),
         )
 
-
-Array = NDArray[np.float64]
 
 SHIPPED = Path(str(resources.files("tactile_cube"))) / "randomization" / "grasps.npz"
 """Those of the DLR-Hand II around the nominal cube; `tactile_cube.search_grasps` made them."""
@@ -146,11 +144,10 @@ class Grasps:
             made = cls(angles, targets, positions, quaternions, rest["hand"], rest["shape"], size, origin)
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"start.file={path}: no file of grasps ({error})") from error
-        made.require_sound(path)
+        made._require_sound(path)
         return made
 
-    def require_sound(self, path: Path) -> None:
-        """Raises InputError unless the columns fit one another and all numbers are finite."""
+    def _require_sound(self, path: Path) -> None:
         count = len(self.angles)
         shapes = {"targets": self.angles.shape, "positions": (count, 3), "quaternions": (count, 4)}
         for name, shape in shapes.items():
@@ -169,13 +166,11 @@ class GraspStarts:
 
     Attributes:
         file: of the grasps, as `tactile_cube.search_grasps(...).save` writes it; None: the one of the package.
-        share: part of the episodes that start in one; the others start as `otherwise` says.
-        otherwise: starts of the other episodes; None: the published one.
+        share: part of the episodes that start in one; the others start as published.
     """
 
     file: str | None = None
     share: float = 1.0
-    otherwise: StartStates | None = None
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
@@ -188,30 +183,21 @@ class GraspStarts:
         Raises:
             InputError: the grasps are of another hand or another object.
         """
-        known = EpisodeConstants() if constants is None else constants
+        known = constants or EpisodeConstants()
         path = SHIPPED if self.file is None else Path(self.file)
         grasps = Grasps.load(path)
-        wanted = (hand.name, str(known.object_shape), tuple(np.asarray(known.cube_size).tolist()))
-        if (grasps.hand, grasps.shape) != wanted[:2] or not np.allclose(grasps.size, wanted[2]):
+        shape, size = str(known.object_shape), np.asarray(known.cube_size).tolist()
+        if (grasps.hand, grasps.shape) != (hand.name, shape) or not np.allclose(grasps.size, size):
             raise InputError(
                 f"start.file={path}: grasps of hand {grasps.hand} and a {grasps.shape} of {list(grasps.size)} m, "
-                f"not of {wanted[0]} and a {wanted[1]} of {list(wanted[2])} m; "
-                "search with tactile_cube.search_grasps"
+                f"not of {hand.name} and a {shape} of {size} m; search with tactile_cube.search_grasps"
             )
-        others = (self.otherwise or StartStates()).of(hand, known)
-        return GraspTable(hand, grasps, self.share, others)
+        return GraspTable(hand, grasps, self.share, StartStates().of(hand, known))
 
 
 @dataclass(frozen=True)
 class GraspTable:
-    """A table of grasps to start in.
-
-    Attributes:
-        hand: the hand.
-        grasps: the grasps.
-        share: part of the episodes that start in one of them.
-        others: where the other episodes start.
-    """
+    """A table of grasps of `hand`, in which a `share` of the episodes start; the `others` have poses of their own."""
 
     hand: Hand
     grasps: Grasps

@@ -14,6 +14,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.randomization.distributions import Constant, Distribution, EffectRange, sample
 from tactile_cube.simulation import EpisodeConstants
 
+Array = NDArray[np.float64]
 PARTS = 8
 """Equally likely parts of the range of each constant."""
 RATE = 0.05
@@ -51,25 +52,12 @@ class Learnability:
         score = self.lost * (1.0 - self.lost) + 1e-6
         return np.asarray(self.share * score / score.sum(axis=1, keepdims=True) + (1.0 - self.share) / PARTS)
 
-    @property
-    def hardest(self) -> str:
-        """Where most cubes are lost, in words; "" without constants."""
-        if not self.ranges:
-            return ""
-        row, part = divmod(int(self.lost.argmax()), PARTS)
-        key, drawn = list(self.ranges.items())[row]
-        low, high = drawn.quantile(np.array([part, part + 1 - 1e-9]) / PARTS)
-        most = f"{key} {low:.2g} to {high:.2g}: {100 * self.lost[row, part]:.0f} %"
-        return f"{100 * self.lost.mean():.0f} % lost over all parts, most at {most}"
-
 
 def drawn_places(odds: Array, rng: np.random.Generator) -> Array:
     """Where in its range each constant lies `(constants,)` in [0, 1), for the probabilities `odds` of its parts."""
     parts = [int(rng.choice(PARTS, p=row)) for row in odds]
     return np.asarray((np.array(parts) + rng.random(len(odds))) / PARTS)
 
-
-Array = NDArray[np.float64]
 
 DRAWN_ONCE = ("cube_size",)
 """Constants with several numbers that share one draw: a cube stays a cube. All others are drawn per joint."""
@@ -112,27 +100,20 @@ class Randomization:
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
         for group in ("values", "factors", "shifts"):
-            for key in getattr(self, group):
+            for key, drawn in getattr(self, group).items():
                 if key not in FIELDS:
                     raise InputError(f"randomization.{group}.{key}: no such constant; choose from {', '.join(FIELDS)}")
-        for key in ("cube_position", "cube_rotation"):
-            if len(getattr(self, key)) != 3:
-                raise InputError(f"randomization.{key} has {len(getattr(self, key))} entries; give 3, for x, y, z")
-        self._require_distributions()
-        if not self.sensor_noise >= 0.0:
-            raise InputError(f"randomization.sensor_noise is {self.sensor_noise}; give a standard deviation >= 0 [rad]")
-        if not 0.0 <= self.sticky_probability < 1.0:
-            raise InputError(f"randomization.sticky_probability is {self.sticky_probability}; give a number in [0, 1)")
-        if not 0.0 <= self.steered < 1.0:
-            raise InputError(f"randomization.steered is {self.steered}; give a number in [0, 1)")
-
-    def _require_distributions(self) -> None:
-        for group in ("values", "factors", "shifts", "cube_position", "cube_rotation"):
-            drawn = getattr(self, group)
-            for key in drawn if isinstance(drawn, Mapping) else range(len(drawn)):
-                _require_distribution(f"{group}.{key}", drawn[key], one=group.startswith("cube"))
+                _require_distribution(f"{group}.{key}", drawn)
+        for group in ("cube_position", "cube_rotation"):
+            if len(getattr(self, group)) != 3:
+                raise InputError(f"randomization.{group} has {len(getattr(self, group))} entries; give 3, for x, y, z")
+            for index, drawn in enumerate(getattr(self, group)):
+                _require_distribution(f"{group}.{index}", drawn, one=True)
         for group in ("start_angles", "joint_offset"):
             _require_distribution(group, getattr(self, group))
+        for key, end in (("sensor_noise", np.inf), ("sticky_probability", 1.0), ("steered", 1.0)):
+            if not 0.0 <= getattr(self, key) < end:
+                raise InputError(f"randomization.{key} is {getattr(self, key)}; give a number in [0, {end:g})")
 
     def learnability(self, nominal: EpisodeConstants) -> Learnability:
         """What is known of the `values` of one number each before the first episode; of none unless `steered`."""
@@ -153,7 +134,8 @@ class Randomization:
                 shape = () if key in DRAWN_ONCE else np.shape(value)
                 given = group is self.values and key in known
                 drawn = distribution.quantile(np.array(known[key])) if given else sample(distribution, rng, shape)
-                changed[key] = _plain(combine(value, drawn))
+                combined = combine(value, drawn)
+                changed[key] = float(combined) if np.ndim(combined) == 0 else np.array(combined, dtype=np.float64)
         changed["force_seed"] = int(rng.integers(2**31))
         changed["effects"] = tuple(effect.draw(rng) for effect in self.effects)
         return dataclasses.replace(nominal, **changed)
@@ -168,7 +150,3 @@ def _require_distribution(place: str, drawn: Any, one: bool = False) -> None:
 
 def _replace(value: Array, drawn: Array) -> Array:
     return np.broadcast_to(drawn, np.shape(value))
-
-
-def _plain(value: Array) -> Array | float:
-    return float(value) if np.ndim(value) == 0 else np.array(value, dtype=np.float64)

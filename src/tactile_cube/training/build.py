@@ -1,37 +1,36 @@
 """Put a run together: fresh, or where it was."""
 
 import contextlib
+import ctypes
+import os
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
+from filelock import BaseFileLock, FileLock, Timeout
 
 from tactile_cube.agent.interface import Agent
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
-from tactile_cube.training.collection import Collection, SingleCollection
+from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
-from tactile_cube.training.expected_time import expected_seconds
-from tactile_cube.training.folder_lock import lock_folder
-from tactile_cube.training.heap import keep_freed_memory
 from tactile_cube.training.ledger import LEDGER, Ledger
-from tactile_cube.training.loggers import Loggers, MetricLogger
+from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
-from tactile_cube.training.multi_sync_collection import MultiSyncCollection
-from tactile_cube.training.ray_collection import RayCollection
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 
-MakeLogger = Callable[..., MetricLogger]
 POLICY_SUFFIX = ".safetensors"
 FROZEN = 3000
 """Updates that leave the actor of a policy file as it is, unless training.actor_frozen says otherwise."""
+TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD = -1, -2, -3
+"""Numbers of glibc's mallopt."""
 
 
 def build_run(
@@ -41,7 +40,7 @@ def build_run(
     make_agent: Callable[[Sizes], Agent],
     collector: CollectorSettings,
     training: TrainingSettings,
-    loggers: Mapping[str, MakeLogger],
+    loggers: Mapping[str, Callable[..., MetricLogger]],
     config: dict[str, Any],
 ) -> Run:
     """A run in `folder`: gone on with where its checkpoint says, or new.
@@ -68,23 +67,63 @@ def build_run(
         torch.set_num_threads(training.threads)
         torch.manual_seed(seed)
         checkpoints = Checkpoints(folder)
-        saved = _saved_state(checkpoints, training, config)
-        learner = build_learner(seed, environment, make_agent, collector, training, saved)
+        if training.resume == "never":
+            checkpoints.clear()
+            (folder / LEDGER).unlink(missing_ok=True)
+            shutil.rmtree(folder / "tensorboard", ignore_errors=True)
+        saved = checkpoints.load()
+        if saved is not None:
+            require_same_settings(folder / FILE, saved["config"], config)
+        learner = _build_learner(seed, environment, make_agent, collector, _protected(training), saved)
         held.callback(learner.collection.close)  # worker processes would keep the program from ending
-        in_process = isinstance(learner.collection, SingleCollection)
-        processes = 1 if in_process else collector.workers + 1
-        ledger = Ledger(folder / LEDGER, processes, learner.collection.cpu_seconds, in_process)
-        made = [make(folder=folder, resumed_at=learner.steps) for make in loggers.values()]
-        seconds = expected_seconds(training.steps - learner.steps, learner.agent.settings, collector, training)
-        notices = [*environment.approximations, *learner.agent.approximations()]
-        barrier = collector.worlds * training.steps_per_iteration * training.barrier_iterations
-        run = Run(learner, folder, config, Loggers(made), ledger, lock, checkpoints, seconds, barrier, notices)
+        run = Run(
+            learner=learner,
+            folder=folder,
+            config=config,
+            loggers=[make(folder=folder, resumed_at=learner.steps) for make in loggers.values()],
+            ledger=Ledger(
+                folder / LEDGER,
+                processes=1 if collector.kind == "single" else collector.workers + 1,
+                simulating=learner.collection.cpu_seconds,
+                in_process=collector.kind == "single",
+            ),
+            lock=lock,
+            checkpoints=checkpoints,
+            barrier_steps=collector.worlds * training.steps_per_iteration * training.barrier_iterations,
+            approximations=[*environment.approximations, *learner.agent.approximations()],
+            best_angle=saved["best_angle"] if saved is not None else 0.0,
+        )
         held.pop_all()  # it is the run's from here
-    run.best_angle = saved["best_angle"] if saved is not None else 0.0
     return run
 
 
-def build_learner(
+def lock_folder(folder: Path) -> BaseFileLock:
+    """Take the folder's lock; the system gives it back when the process ends, however it ends.
+
+    Raises:
+        InputError: another process has it: two of them would overwrite each other's checkpoints.
+    """
+    lock = FileLock(folder / ".lock")
+    try:
+        lock.acquire(blocking=False)
+    except Timeout:
+        raise InputError(
+            f"{folder}: another process trains in this folder; wait for its end (seconds after Ctrl-C), or "
+            "give this run another name=... or seed=..."
+        ) from None
+    return lock
+
+
+def keep_freed_memory() -> None:
+    """Tell glibc not to give memory back after each update (2 to 20 % of its time); does nothing elsewhere."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
+    if mallopt is not None:
+        mallopt(TRIM_THRESHOLD, 1_000_000_000)
+        mallopt(MMAP_THRESHOLD, 1_000_000_000)
+        mallopt(TOP_PAD, 200_000_000)
+
+
+def _build_learner(
     seed: int,
     environment: Environment,
     make_agent: Callable[[Sizes], Agent],
@@ -94,54 +133,44 @@ def build_learner(
 ) -> Learner:
     """Agent, experience and workers: as a checkpoint's contents `saved` say, from `init_from`, or new."""
     agent = make_agent(environment.sizes)
-    settings = protected(training)
     if saved is None and training.init_from:
-        warm_start(agent, Path(training.init_from))
+        _warm_start(agent, Path(training.init_from))
+    collection = _build_collection(environment, agent.policy(), collector, training)
     with contextlib.ExitStack() as held:
-        collection = build_collection(environment, agent.policy(), collector, settings)
         held.callback(collection.close)
         learner = Learner(
             agent=agent,
-            replay=Replay(settings.replay_size, environment.sizes, environment.reward_terms, seed),
+            replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
             collection=collection,
             episodes=EpisodeStatistics(
                 environment.outcomes,
                 environment.logged_terms,
                 environment.learnability() if environment.learnability is not None else None,
             ),
-            settings=settings,
+            settings=training,
             reward_weights=environment.reward_weights,
             seed=seed,
         )
         if saved is not None:
             _fit("the run's checkpoint", lambda: learner.load_state_dict(saved["learner"]))
         elif training.init_replay:
-            learner.replay.load_state_dict(replay_of(training.init_from))
+            learner.replay.load_state_dict(_replay_of(training.init_from))
         held.pop_all()
     return learner
 
 
-def build_collection(
+def _build_collection(
     environment: Environment, actor: Actor, collector: CollectorSettings, training: TrainingSettings
 ) -> Collection:
-    """Worker processes, workers of a Ray cluster, or this process."""
+    work = environment.make, actor, collector.worlds, training.steps_per_iteration
     if collector.kind == "single":
-        return SingleCollection(environment.make, actor, collector.worlds, training.steps_per_iteration)
-    workers = (
-        environment.make,
-        actor,
-        collector.worlds,
-        training.steps_per_iteration,
-        collector.workers,
-        collector.timeout,
-        collector.start_timeout,
+        return SingleCollection(*work)
+    return MultiSyncCollection(
+        *work, collector.workers, collector.timeout, collector.start_timeout, collector.start_method
     )
-    if collector.kind == "ray":
-        return RayCollection(*workers, collector.address)
-    return MultiSyncCollection(*workers, collector.start_method)
 
 
-def protected(training: TrainingSettings) -> TrainingSettings:
+def _protected(training: TrainingSettings) -> TrainingSettings:
     """The schedule, in which an actor without its critics waits until fresh ones know what it is worth.
 
     A policy file holds the actor alone; gradients of ignorant critics would lead it astray (docs/match.md).
@@ -152,7 +181,7 @@ def protected(training: TrainingSettings) -> TrainingSettings:
     return training.model_copy(update={"actor_frozen": FROZEN})
 
 
-def warm_start(agent: Agent, path: Path) -> None:
+def _warm_start(agent: Agent, path: Path) -> None:
     """Begin from the networks of a checkpoint, or from a policy file's actor."""
     if path.suffix == POLICY_SUFFIX:
         actor, info = load_policy(path)
@@ -168,12 +197,8 @@ def warm_start(agent: Agent, path: Path) -> None:
         _fit(f"training.init_from={path}", lambda: agent.load_networks(state["learner"]["agent"]))
 
 
-def replay_of(init_from: str | None) -> dict[str, Any]:
-    """The experience in a run's newest checkpoint.
-
-    Raises:
-        InputError: there is no run, or it is damaged.
-    """
+def _replay_of(init_from: str | None) -> dict[str, Any]:
+    """The experience in a run's newest checkpoint."""
     folder = Path(init_from).parent if init_from and Path(init_from).suffix != POLICY_SUFFIX else None
     saved = Checkpoints(folder).load() if folder else None
     if saved is None:
@@ -193,15 +218,3 @@ def _fit(where: str, load: Callable[[], None]) -> None:
     except (AttributeError, KeyError, RuntimeError, TypeError, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"{where}: networks of other shape than agent.* asks for ({reason})") from error
-
-
-def _saved_state(checkpoints: Checkpoints, training: TrainingSettings, config: dict[str, Any]) -> dict[str, Any] | None:
-    folder = checkpoints.folder
-    if training.resume == "never":
-        checkpoints.clear()
-        (folder / LEDGER).unlink(missing_ok=True)
-        shutil.rmtree(folder / "tensorboard", ignore_errors=True)
-    saved = checkpoints.load()
-    if saved is not None:
-        require_same_settings(folder / FILE, saved["config"], config)
-    return saved

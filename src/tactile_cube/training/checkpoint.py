@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt, ValidationError
+from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
 from torch import Tensor
 
 from tactile_cube.drivetrain.plain_yaml import describe
@@ -21,7 +21,6 @@ HEAD = b"tactile_cube checkpoint 2, sha256 "
 """First words of a file; its checksum follows, then a line break, then what torch.save wrote."""
 FREE_KEYS = {
     "training.steps",
-    "training.checkpoint_barriers",
     "training.policy_every",
     "training.log_iterations",
     "training.resume",
@@ -34,17 +33,12 @@ FREE_KEYS = {
     "collector.timeout",
     "collector.start_timeout",
     "collector.start_method",
-    "collector.address",
 }
 """Settings that may change between the sessions of a run: they do not touch what is learned from an iteration."""
 
 
 class Checkpoints:
-    """The checkpoints of a run folder: the newest, the one before in case that is damaged, and the replay's rows.
-
-    Args:
-        folder: run folder.
-    """
+    """The checkpoints of a run folder: the newest, the one before in case that is damaged, and the replay's rows."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -128,8 +122,6 @@ class Checkpoints:
 
 
 class _Ring(BaseModel):
-    """What a checkpoint says of its replay, whose rows lie in files of their own."""
-
     written: NonNegativeInt
     capacity: PositiveInt
     width: PositiveInt
@@ -138,22 +130,18 @@ class _Ring(BaseModel):
 
 
 class _Learner(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
     agent: dict[str, Any]
     replay: _Ring
 
 
 class _State(BaseModel):
-    """What a run saves."""
-
     learner: _Learner
     best_angle: float
     config: dict[str, Any]
 
 
 def load_checkpoint(path: Path) -> dict[str, Any]:
-    """Read one file, weights only: nothing in it is run. Its replay's rows lie in files of their own.
+    """Read one file, weights only: nothing in it is run.
 
     Raises:
         InputError: the file is missing or damaged, claims more than it holds, or has numbers that are not finite.

@@ -1,24 +1,34 @@
 """Collect experience: in this process, or in workers while the learner works.
 
-All give the same numbers for the same seed and division of worlds: everything random in a worker comes from torch's
+Both give the same numbers for the same seed and division of worlds: everything random in a worker comes from torch's
 generator and the worlds' own, and `restart` sets both.
 """
 
+import contextlib
 import copy
+import ctypes
+import multiprocessing
+import os
+import queue
+import signal
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, TimeoutError
 from functools import partial
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any, TypeVar
 
 import torch
-from tensordict import TensorDictBase
-from torchrl.collectors import Collector
+from tensordict import TensorDict, TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.envs import EnvBase
 
-from tactile_cube.agent.behaviour import Behaviour
 from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
 
+T = TypeVar("T")
 MakeEnv = Callable[..., EnvBase]
 """make_env(worlds=n, seed=s) -> batched environment of n worlds with a method set_progress(steps, performance)."""
 
@@ -31,33 +41,34 @@ class CollectionError(RuntimeError):
     """A simulation worker died, got stuck or failed; the run can go on from its last checkpoint."""
 
 
-class Collection(Protocol):
-    """A source of blocks of experience (worlds, steps)."""
+class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
+    """The stochastic actor, its own copy, or uniform actions in the first steps of a run.
 
-    def restart(self, seed: int, progress: Progress) -> None:
-        """Reset all worlds and seed everything random in them."""
+    Whether actions are random travels with the weights as a buffer, so that it reaches every worker in the same
+    iteration. Noise comes from torch's global generator of the worker.
+    """
 
-    def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
-        """Begin collecting one block with these weights; gives the conditions in force."""
+    in_keys = ["observation"]  # noqa: RUF012 - the name and type TorchRL asks for
+    out_keys = ["action"]  # noqa: RUF012
 
-    def take(self) -> TensorDictBase:
-        """Wait for the block begun last; it is the caller's to keep."""
+    def __init__(self, actor: Actor):
+        super().__init__()
+        self.actor = actor.requires_grad_(False)
+        self.register_buffer("random", torch.zeros(()))
 
-    def cpu_seconds(self) -> float:
-        """CPU time spent simulating so far [s]."""
-
-    def close(self) -> None:
-        """End the workers."""
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Sample an action for each world."""
+        mean, scale = self.actor(tensordict["observation"])
+        action = torch.tanh(mean + scale * torch.randn_like(mean))
+        if self.random:
+            action = torch.rand_like(action) * 2.0 - 1.0
+        return tensordict.set("action", action)
 
 
 class SingleCollection:
     """All worlds in this process, stepped before the learner's updates: nothing overlaps, everything is in reach.
 
-    Args:
-        make_env: see `MakeEnv`.
-        actor: any actor of the right sizes.
-        worlds: number of worlds.
-        steps: environment steps a world and block.
+    Arguments as of `MultiSyncCollection`.
     """
 
     def __init__(self, make_env: MakeEnv, actor: Actor, worlds: int, steps: int):
@@ -80,7 +91,13 @@ class SingleCollection:
     def restart(self, seed: int, progress: Progress) -> None:
         """Reset all worlds and seed everything random in them."""
         self._env.set_progress(*progress)
-        self._aside(partial(self._seed_and_reset, seed))
+
+        def seed_and_reset() -> None:
+            self._collector.set_seed(seed)
+            torch.manual_seed(seed)
+            self._collector.reset()
+
+        self._aside(seed_and_reset)
 
     def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Collect one block."""
@@ -103,11 +120,6 @@ class SingleCollection:
         """Close the worlds."""
         self._collector.shutdown()
 
-    def _seed_and_reset(self, seed: int) -> None:
-        self._collector.set_seed(seed)
-        torch.manual_seed(seed)
-        self._collector.reset()
-
     def _aside(self, call: Callable[[], Any]) -> Any:
         """Run a call on the collection's own random state, as if it were another process."""
         learner_state, started = torch.get_rng_state(), time.thread_time()
@@ -118,3 +130,195 @@ class SingleCollection:
             self._random_state = torch.get_rng_state()
             torch.set_rng_state(learner_state)
             self._cpu += time.thread_time() - started
+
+
+class Background:
+    """A daemon thread that runs submitted calls one after another, so that none is waited for without a time limit.
+
+    Daemonic, because a call may be stuck in a pipe to a dead process, and that must not keep the program from ending.
+    One for all calls, because a worker ends with the thread that started it (`_prepare_worker`).
+    """
+
+    def __init__(self) -> None:
+        self._calls: queue.SimpleQueue[tuple[Future[object], Callable[[], object]] | None] = queue.SimpleQueue()
+        threading.Thread(target=self._run, daemon=True, name="collection").start()
+
+    def submit(self, call: Callable[[], T]) -> "Future[T]":
+        """Queue a call; its result or exception arrives in the future."""
+        future: Future[T] = Future()
+        self._calls.put((future, call))  # type: ignore[arg-type]
+        return future
+
+    def close(self) -> None:
+        """End the thread after the calls already queued."""
+        self._calls.put(None)
+
+    def _run(self) -> None:
+        while (entry := self._calls.get()) is not None:
+            future, call = entry
+            try:
+                future.set_result(call())
+            except BaseException as error:  # noqa: BLE001, RUF100 - handed to whoever asks for the result
+                future.set_exception(error)
+
+
+class MultiSyncCollection:
+    """Worker processes that host several worlds each and step them while the learner updates.
+
+    Args:
+        make_env: see `MakeEnv`.
+        actor: any actor of the right sizes.
+        worlds: number of worlds in all.
+        steps: environment steps a world and block.
+        processes: worker processes; divides `worlds`.
+        timeout: longest wait for a block [s]; then the workers count as stuck.
+        start_timeout: the same up to the end of the first block: workers that start may have to compile first.
+        start_method: "fork" (Linux, fast) or "spawn".
+
+    Raises:
+        CollectionError: a worker failed, died or got stuck, here or in any method.
+    """
+
+    def __init__(
+        self,
+        make_env: MakeEnv,
+        actor: Actor,
+        worlds: int,
+        steps: int,
+        processes: int,
+        timeout: float,
+        start_timeout: float,
+        start_method: str,
+    ):
+        self._workers, self._timeout, self._start_timeout = processes, timeout, start_timeout
+        self._started = False
+        self._behaviour = Behaviour(copy.deepcopy(actor))
+        self._thread = Background()
+        self._block: Future[TensorDictBase] | None = None
+        self._final_cpu: float | None = None
+        self._processes: list[Any] = []
+        self._others = set(multiprocessing.active_children())
+        build = partial(self._build, make_env, worlds // processes, worlds * steps, start_method)
+        self._collector, self._blocks = self._call(build, "start")
+        self._processes = self._collector.procs
+
+    def _build(self, make_env: MakeEnv, worlds: int, frames: int, start_method: str) -> tuple[MultiSyncCollector, Any]:
+        torch.multiprocessing.set_start_method(start_method, force=True)
+        threads = torch.get_num_threads()
+        collector = MultiSyncCollector(
+            [make_env] * self._workers,
+            self._behaviour,
+            create_env_kwargs=[{"worlds": worlds, "seed": index} for index in range(self._workers)],
+            frames_per_batch=frames,
+            total_frames=-1,
+            cat_results="stack",
+            num_threads=threads,
+            num_sub_threads=1,
+            trust_policy=True,
+            auto_register_policy_transforms=False,
+            init_fn=partial(_prepare_worker, None if start_method == "forkserver" else os.getpid()),
+        )
+        torch.set_num_threads(threads)
+        return collector, iter(collector)
+
+    def restart(self, seed: int, progress: Progress) -> None:
+        """Reset all worlds and seed everything random in them."""
+        self._set_progress(progress)
+        self._call(partial(self._collector.set_seed, seed), "restart")
+
+    def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
+        """Hand the weights to the workers and let them collect one block."""
+        conditions = self._set_progress(progress)
+        self._behaviour.actor.load_state_dict(actor.state_dict())
+        self._behaviour.random.fill_(float(random))
+        weights = TensorDict.from_module(self._behaviour).data.clone()
+        self._block = self._thread.submit(partial(self._collect, weights))
+        return conditions
+
+    def take(self) -> TensorDictBase:
+        """Wait for the block begun last."""
+        assert self._block is not None, "launch first"
+        block: TensorDictBase = self._wait(self._block, "collect")
+        self._started = True
+        return block
+
+    def cpu_seconds(self) -> float:
+        """CPU time of all workers since they started [s]; 0 where the system does not tell."""
+        if self._final_cpu is not None:
+            return self._final_cpu
+        return sum(map(_process_cpu_seconds, self._processes))
+
+    def close(self) -> None:
+        """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
+        self._final_cpu = self.cpu_seconds()
+        self._kill()
+        closing = self._thread.submit(partial(self._collector.shutdown, timeout=1.0, raise_on_error=False))
+        with contextlib.suppress(Exception):  # the thread is daemonic: it may stay where it is
+            closing.result(timeout=3.0)
+        self._thread.close()
+
+    def _set_progress(self, progress: Progress) -> Conditions:
+        call = partial(self._collector.map_fn, "env.set_progress", [progress] * self._workers)
+        conditions: Conditions = self._call(call, "set the curriculum")[0]
+        return conditions
+
+    def _collect(self, weights: TensorDictBase) -> TensorDictBase:
+        for index, process in enumerate(self._processes):  # torchrl would hang sending weights to a dead worker
+            if not process.is_alive():
+                raise RuntimeError(f"worker {index} ended with exit code {process.exitcode}")
+        self._collector.update_policy_weights_(weights)
+        block: TensorDictBase = next(self._blocks).flatten(0, 1).clone()
+        return block
+
+    def _call(self, call: Callable[[], Any], doing: str) -> Any:
+        return self._wait(self._thread.submit(call), doing)
+
+    def _wait(self, future: "Future[Any]", doing: str) -> Any:
+        name, seconds = ("timeout", self._timeout) if self._started else ("start_timeout", self._start_timeout)
+        try:
+            return future.result(timeout=seconds)
+        except TimeoutError:
+            self._kill()
+            raise CollectionError(
+                f"no simulation worker answered within collector.{name}={seconds:g} s (to {doing})"
+            ) from None
+        except Exception as error:
+            self._kill()
+            raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
+
+    def _kill(self) -> None:
+        self._kill_children()
+        with contextlib.suppress(Exception):  # the thread may have been about to start one more
+            self._thread.submit(lambda: None).result(timeout=1.0)
+        self._kill_children()
+
+    def _kill_children(self) -> None:
+        # also those of a start that did not come to its end: they would be waited for when the program ends
+        for process in set(multiprocessing.active_children()) - self._others:
+            process.kill()
+            process.join(1.0)
+
+
+def _prepare_worker(parent: int | None) -> None:
+    """Leave Ctrl-C to the main process `parent`, and end with it even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    torch.set_num_threads(1)
+    if os.uname().sysname == "Linux":
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)  # SIGTERM would not reach a stopped process
+        if parent is not None and os.getppid() != parent:  # it ended before
+            os._exit(1)
+
+
+def _process_cpu_seconds(process: Any) -> float:
+    """User and system time of a running process [s], from /proc; 0 for one that is closed already."""
+    try:
+        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    except (OSError, ValueError):
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+Collection = SingleCollection | MultiSyncCollection
+"""A source of blocks of experience (worlds, steps)."""

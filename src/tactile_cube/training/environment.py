@@ -1,24 +1,19 @@
 """What training needs to know about an environment besides how to make one."""
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import torch
 from torch import Tensor
-from torchrl.envs import TransformedEnv
 
 from tactile_cube.agent.networks import Sizes
-from tactile_cube.agent.policy_file import load_policy, require_sizes
 from tactile_cube.env import OUTCOMES, Conditions
 from tactile_cube.env.rotation import OBJECT
 from tactile_cube.randomization import Learnability
 from tactile_cube.training.collection import MakeEnv
-from tactile_cube.training.loop import RewardWeights
 from tactile_cube.transforms import EnvConfig, make_env
-from tactile_cube.transforms.finger_exploration import Teacher
 
 
 @dataclass(frozen=True)
@@ -31,15 +26,15 @@ class Environment:
         reward_terms: number of reward terms.
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
-        learnability: makes what keeps account of the worlds; None: nothing does.
         logged_terms: names of the last reward terms, whose means the training curves show.
+        learnability: makes what keeps account of the worlds; None: nothing does.
         approximations: what its worlds compute less well than they could, in words.
     """
 
     make: MakeEnv
     sizes: Sizes
     reward_terms: int
-    reward_weights: RewardWeights
+    reward_weights: Callable[[Conditions], Tensor]
     outcomes: tuple[str, ...] = ()
     logged_terms: tuple[str, ...] = ()
     learnability: Callable[[], Learnability] | None = None
@@ -50,29 +45,15 @@ def rotation_environment(config: EnvConfig) -> Environment:
     """The rotation task as configured."""
     joints = config.hand.joints
     return Environment(
-        make=functools.partial(_make, config),
+        make=partial(make_env, config),
         sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
         reward_terms=len(config.reward.terms),
-        reward_weights=functools.partial(_weights, config),
-        outcomes=tuple(OUTCOMES),
+        reward_weights=partial(_weights, config),
+        outcomes=OUTCOMES,
         logged_terms=config.reward.borne_terms,
-        learnability=functools.partial(config.randomization.learnability, config.constants),
+        learnability=partial(config.randomization.learnability, config.constants),
         approximations=tuple(config.approximations()),
     )
-
-
-def _make(config: EnvConfig, worlds: int, seed: int) -> TransformedEnv:
-    return make_env(config, worlds, seed, teacher=_teacher(config))
-
-
-def _teacher(config: EnvConfig) -> Teacher | None:
-    """The policy that demonstrates, of the observation that this environment has."""
-    if config.exploration.teacher is None:
-        return None
-    path = Path(config.exploration.teacher)
-    actor, info = load_policy(path)
-    require_sizes(path, info, 2 * config.hand.joints * config.stack, config.hand.joints)
-    return actor.deterministic
 
 
 def _weights(config: EnvConfig, conditions: Conditions) -> Tensor:

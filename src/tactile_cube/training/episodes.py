@@ -11,6 +11,7 @@ from tactile_cube.randomization import Learnability
 
 WINDOW = 50
 """Episodes, and blocks of steps, that the statistics go back."""
+WINDOWS = ("angles", "lengths", "endings", "measured")
 
 
 class EpisodeStatistics:
@@ -31,8 +32,7 @@ class EpisodeStatistics:
         self.angles: deque[float] = deque(maxlen=WINDOW)
         self.lengths: deque[float] = deque(maxlen=WINDOW)
         self.endings: deque[int] = deque(maxlen=WINDOW)
-        self.episodes = 0
-        self.faulty = 0
+        self.episodes = self.faulty = 0
 
     def add(self, block: TensorDictBase) -> None:
         """Count the episodes that end in a block (worlds, steps)."""
@@ -85,12 +85,12 @@ class EpisodeStatistics:
 
     def state_dict(self) -> dict[str, Any]:
         """The window and the counts."""
-        windows = {name: list(getattr(self, name)) for name in ("angles", "lengths", "endings", "measured")}
+        windows = {name: list(getattr(self, name)) for name in WINDOWS}
         return {**windows, "episodes": self.episodes, "faulty": self.faulty, "lost": self.worlds.lost.tolist()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Inverse of `state_dict`."""
-        for name in ("angles", "lengths", "endings", "measured"):
+        for name in WINDOWS:
             setattr(self, name, deque(state.get(name, ()), maxlen=WINDOW))
         self.episodes, self.faulty = state["episodes"], state["faulty"]
         self.worlds.lost = np.array(state.get("lost", [])).reshape(self.worlds.lost.shape)

@@ -12,14 +12,7 @@ FILE = "finished.json"
 
 @dataclass(frozen=True)
 class Finished:
-    """The end of a run.
-
-    Attributes:
-        reason: why it ended, in words.
-        steps: environment steps.
-        final_angle: mean over the last training episodes [rad].
-        config: resolved configuration.
-    """
+    """The end of a run: reason in words, environment steps, mean final angle [rad], resolved configuration."""
 
     reason: str
     steps: int

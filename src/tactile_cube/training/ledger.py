@@ -39,11 +39,8 @@ class Ledger:
     """
 
     def __init__(self, path: Path, processes: int, simulating: Callable[[], float], in_process: bool):
-        self.path = path
-        self.before = read_costs(path)
-        self._processes = processes
-        self._simulating = simulating
-        self._in_process = in_process
+        self.path, self.before = path, read_costs(path)
+        self._processes, self._simulating, self._in_process = processes, simulating, in_process
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
     def costs(self) -> Costs:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,12 +25,11 @@ class CsvLogger:
 
     def __init__(self, folder: Path, resumed_at: int):
         self.path = folder / "metrics.csv"
-        rows = _whole_rows(self.path) if resumed_at else []
-        kept = rows[:1] + [row for row in rows[1:] if float(row[0]) <= resumed_at]
+        kept = _rows_until(resumed_at, self.path) if resumed_at and self.path.is_file() else []
         text = io.StringIO(newline="")
-        csv.writer(text).writerows(kept if len(kept) > 1 else [])
+        csv.writer(text).writerows(kept)
         write_whole(self.path, text.getvalue().encode())
-        self._columns: list[str] = kept[0] if len(kept) > 1 else []
+        self._columns: list[str] = kept[0] if kept else []
         self._file = self.path.open("a", newline="")
 
     def log(self, steps: int, metrics: Mapping[str, float]) -> None:
@@ -85,27 +84,9 @@ class WandbLogger:
         self._run.finish()
 
 
-class Loggers:
-    """Several loggers as one."""
-
-    def __init__(self, loggers: Sequence[MetricLogger]):
-        self._loggers = list(loggers)
-
-    def log(self, steps: int, metrics: Mapping[str, float]) -> None:
-        """Write one row everywhere."""
-        for logger in self._loggers:
-            logger.log(steps, metrics)
-
-    def close(self) -> None:
-        """Close all."""
-        for logger in self._loggers:
-            logger.close()
-
-
-def _whole_rows(path: Path) -> list[list[str]]:
-    """Header and rows; without a last row that a crash cut off."""
-    if not path.is_file():
-        return []
+def _rows_until(steps: int, path: Path) -> list[list[str]]:
+    """Header and rows up to `steps`, without a last row that a crash cut off; nothing where there are no rows."""
     lines = path.read_text().splitlines(keepends=True)
-    rows = list(csv.reader(line for line in lines if line.endswith("\n")))
-    return [row for row in rows if len(row) == len(rows[0])]
+    head, *rows = list(csv.reader(line for line in lines if line.endswith("\n"))) or [[]]
+    kept = [row for row in rows if len(row) == len(head) and float(row[0]) <= steps]
+    return [head, *kept] if kept else []

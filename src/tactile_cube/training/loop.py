@@ -24,23 +24,14 @@ from tactile_cube.training.replay import Replay
 from tactile_cube.training.settings import TrainingSettings
 from tactile_cube.training.transitions import TransitionAssembler
 
-RewardWeights = Callable[[Conditions], Tensor]
-"""Weights of the reward terms (terms,) under the conditions in force."""
-
 
 @dataclass
 class Learner:
     """Agent, experience and counters: all that a run learns and remembers.
 
     Attributes:
-        agent: networks and their update.
-        replay: experience.
-        collection: source of experience.
-        episodes: statistics of the last episodes.
-        settings: schedule of the run.
-        reward_weights: how reward terms are weighed under the conditions in force.
+        reward_weights: weights of the reward terms (terms,) under the conditions in force.
         conditions: those of the block begun last; None before the first.
-        seed: of the run.
     """
 
     agent: Agent
@@ -48,7 +39,7 @@ class Learner:
     collection: Collection
     episodes: EpisodeStatistics
     settings: TrainingSettings
-    reward_weights: RewardWeights
+    reward_weights: Callable[[Conditions], Tensor]
     seed: int
     iteration: int = 0
     steps: int = 0
@@ -58,8 +49,7 @@ class Learner:
 
     def __post_init__(self) -> None:
         """Nothing waits for its future yet."""
-        agent = self.agent.settings
-        self.assembler = TransitionAssembler(agent.n_step, agent.gamma)
+        self.assembler = TransitionAssembler(self.agent.settings.n_step, self.agent.settings.gamma)
 
     def run_to_barrier(self, after_iteration: Callable[[], None]) -> None:
         """Reset all worlds, then collect and learn up to the next barrier."""

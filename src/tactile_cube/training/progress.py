@@ -24,20 +24,11 @@ class ProgressLine:
     """
 
     def __init__(self, total: int, steps: int, updates: int, stream: TextIO | None = None):
-        self._total = total
+        self._total, self._stream = total, stream or sys.stdout
         self.stage, self.later = "", 0
-        self._stream = stream or sys.stdout
-        self._printed = time.perf_counter()
-        self._at_print = (steps, updates)
+        self._printed, self._at_print = time.perf_counter(), (steps, updates)
 
-    def show(
-        self,
-        steps: int,
-        updates: int,
-        summary: Mapping[str, float],
-        conditions: Mapping[str, float],
-        worlds: str = "",
-    ) -> None:
+    def show(self, steps: int, updates: int, summary: Mapping[str, float], conditions: Mapping[str, float]) -> None:
         """Print if the last line is old enough.
 
         Args:
@@ -45,29 +36,24 @@ class ProgressLine:
             updates: gradient steps so far.
             summary: statistics of episodes, see EpisodeStatistics.summary.
             conditions: the curriculum's values in force.
-            worlds: in which of them most is lost, in words.
         """
         now = time.perf_counter()
-        if now - self._printed < INTERVAL:
-            return
         elapsed = now - self._printed
-        step_rate = (steps - self._at_print[0]) / elapsed
-        update_rate = (updates - self._at_print[1]) / elapsed
+        if elapsed < INTERVAL:
+            return
+        step_rate, update_rate = (steps - self._at_print[0]) / elapsed, (updates - self._at_print[1]) / elapsed
         self._printed, self._at_print = now, (steps, updates)
         left = (max(self._total - steps, 0) + self.later) / max(step_rate, 1e-9)  # the last barrier may lie beyond
-        values = " ".join(f"{key} {value:.3g}" for key, value in conditions.items())
-        kept = [f"{100 * summary['ended_time_limit']:.0f} % kept"] if "ended_time_limit" in summary else []
         parts = [
-            *filter(None, [self.stage]),
+            self.stage,
             f"{steps / 1e3:8.1f} k of {self._total / 1e3:.0f} k steps",
             f"{step_rate:4.0f} steps/s {update_rate:4.0f} updates/s",
             f"final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps",
-            *kept,
-            *filter(None, [worlds]),
-            values,
-            f"{'at most ' if self.stage else ''}{clock(left)} left",
+            f"{100 * summary['ended_time_limit']:.0f} % kept" if "ended_time_limit" in summary else "",
+            " ".join(f"{key} {value:.3g}" for key, value in conditions.items()),
+            f"{'at most ' if self.stage else ''}{_clock(left)} left",
         ]
-        self.say(" | ".join(parts), in_place=self._stream.isatty())
+        self.say(" | ".join(filter(None, parts)), in_place=self._stream.isatty())
 
     def say(self, text: str, in_place: bool = False) -> None:
         """Print a line of its own, or over the last one."""
@@ -75,7 +61,6 @@ class ProgressLine:
         print(f"{clear}{text}", end="" if in_place else "\n", file=self._stream, flush=True)
 
 
-def clock(seconds: float) -> str:
-    """A length of time in words."""
+def _clock(seconds: float) -> str:
     hours, minutes = int(seconds // 3600), int(seconds % 3600 // 60)
     return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {int(seconds % 60):02d} s"

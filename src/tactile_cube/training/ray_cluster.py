@@ -15,11 +15,10 @@ from concurrent.futures import TimeoutError
 from typing import Any, TypeVar
 
 from tactile_cube.errors import InputError
-from tactile_cube.training.background import Background
-from tactile_cube.training.collection import CollectionError
+from tactile_cube.training.collection import Background, CollectionError
 
 STORE = 256 * 2**20
-"""Bytes of shared memory for what is sent: blocks and weights are a few megabytes."""
+"""Bytes of shared memory for what is sent: a recording is a few megabytes."""
 CONNECT = 5.0
 """Longest wait [s] for a cluster's address to accept a connection."""
 ANSWER = 60.0
@@ -36,7 +35,7 @@ class RayCluster:
         address: host:port of a cluster that this machine is a node of; None: one of its own, on the loopback interface,
             with a password of its own, no dashboard and no usage statistics. It ends with this process, however that
             ends.
-        workers: how many there will be, each with a core.
+        workers: how many cores it has.
         seconds: how long to try to start one of its own.
         asked: the setting that asks for it, for what is said about it.
 
@@ -80,14 +79,6 @@ class RayCluster:
                 raise CollectionError(f"Ray did not start on this machine: {_line(error)}") from error
         else:
             self._reaper = _end_with_this_process(_descendants() - before, self._folder)
-
-    def cores(self) -> int:
-        """All cores that the cluster has now."""
-        return int(_ray().cluster_resources().get("CPU", 0))
-
-    def put(self, value: object) -> Any:
-        """Store a value, for calls that take it; it goes to each machine once."""
-        return _ray().put(value)
 
     def each(self, work: Callable[[T], R], over: Sequence[T]) -> Iterator[tuple[T, R]]:
         """What `work` makes of each, a core each, in the order in which it is done; lost with a node, it runs again.

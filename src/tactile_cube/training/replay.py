@@ -44,7 +44,8 @@ class Replay:
             "demonstrated": 1,
         }
         self.capacity = capacity
-        _require_memory(4 * capacity * sum(self.widths.values()), capacity)
+        self.width = sum(self.widths.values())
+        _require_memory(4 * capacity * self.width, capacity)
         self.generator = torch.Generator().manual_seed(seed)
         self.buffer = ReplayBuffer(storage=LazyTensorStorage(capacity), generator=self.generator)
 
@@ -55,7 +56,7 @@ class Replay:
     @property
     def rows(self) -> Tensor:
         """The filled part of the ring, (len, width)."""
-        return self.buffer[:] if len(self) else torch.zeros(0, sum(self.widths.values()))
+        return self.buffer[:] if len(self) else torch.zeros(0, self.width)
 
     def extend(self, transitions: TensorDictBase) -> None:
         """Append transitions (rows,) with the keys of `widths`."""
@@ -84,7 +85,7 @@ class Replay:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Inverse of `state_dict`, for a ring of the same capacity and widths."""
-        rows, width, written = state["rows"], sum(self.widths.values()), state["written"]
+        rows, width, written = state["rows"], self.width, state["written"]
         if rows.shape[1] != width or len(rows) != min(written, self.capacity):
             raise InputError(
                 f"replay in the checkpoint holds {len(rows)} rows of width {rows.shape[1]}, this run's up to "

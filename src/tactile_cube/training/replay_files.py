@@ -3,7 +3,6 @@
 import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -19,11 +18,7 @@ Segment = tuple[int, int, str]
 
 
 class ReplayFiles:
-    """Rows by their number in order of arrival; row n lies at n % capacity of the ring.
-
-    Args:
-        folder: run folder.
-    """
+    """Rows by their number in order of arrival; row n lies at n % capacity of the ring."""
 
     def __init__(self, folder: Path):
         self.folder = folder / FOLDER
@@ -60,7 +55,7 @@ class ReplayFiles:
         self._require_whole(segments, written, capacity, width)
         ring = torch.empty(min(written, capacity), width)
         for segment in segments:
-            block = torch.from_numpy(self._read(segment).reshape(-1, width))
+            block = self._read(segment).reshape(-1, width)
             number = torch.arange(segment[0], _end(segment))
             inside = number >= written - capacity
             ring[number[inside] % capacity] = block[inside]
@@ -92,7 +87,7 @@ class ReplayFiles:
     def _path(self, first: int) -> Path:
         return self.folder / f"{first:012d}.f32"
 
-    def _read(self, segment: Segment) -> Any:
+    def _read(self, segment: Segment) -> Tensor:
         path = self._path(segment[0])
         try:
             content = path.read_bytes()
@@ -100,7 +95,7 @@ class ReplayFiles:
             raise InputError(f"{path}: cannot be read ({error.strerror})") from error
         if hashlib.sha256(content).hexdigest() != segment[2]:
             raise InputError(f"{path}: its checksum is wrong")
-        return np.frombuffer(bytearray(content), "<f4")
+        return torch.from_numpy(np.frombuffer(bytearray(content), "<f4"))
 
 
 def _end(segment: Segment) -> int:

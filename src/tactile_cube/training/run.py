@@ -1,7 +1,8 @@
 """A run: its folder, its sessions, when it saves and when it stops."""
 
 import contextlib
-import time
+import signal
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,11 @@ from filelock import BaseFileLock
 
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
 from tactile_cube.training.checkpoint import Checkpoints
-from tactile_cube.training.collection import CollectionError
 from tactile_cube.training.finished import Finished
-from tactile_cube.training.interruption import Interruption
 from tactile_cube.training.ledger import Ledger
-from tactile_cube.training.loggers import Loggers
+from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
-from tactile_cube.training.progress import ProgressLine, clock
+from tactile_cube.training.progress import ProgressLine
 
 INTERRUPTED = "interrupted"
 MASTERED = "mastered:"
@@ -29,68 +28,55 @@ class Run:
     """Drives a learner from barrier to barrier.
 
     Attributes:
-        learner: what learns.
-        folder: run folder.
         config: resolved configuration, kept in checkpoints and policy files.
-        loggers: where metrics go.
-        ledger: what it costs.
         lock: keeps other processes out of the folder.
-        checkpoints: where its state goes.
-        saved_at: environment steps at the last checkpoint.
-        expected_seconds: on the clock until all steps are done, on two idle cores.
         barrier_steps: environment steps from one barrier, and so one checkpoint, to the next.
         approximations: which shortcuts are on, in words.
+        best_angle: largest mean final angle at a barrier so far [rad].
+        saved_at: environment steps at the last checkpoint.
     """
 
     learner: Learner
     folder: Path
     config: dict[str, Any]
-    loggers: Loggers
+    loggers: Sequence[MetricLogger]
     ledger: Ledger
     lock: BaseFileLock
     checkpoints: Checkpoints
-    expected_seconds: float
     barrier_steps: int
     approximations: list[str]
+    best_angle: float
 
     def __post_init__(self) -> None:
         """A session begins."""
         self.line = ProgressLine(self.learner.settings.steps, self.learner.steps, self.learner.updates)
-        self.best_angle = 0.0
         self.commit = current_commit()
         self.saved_at = self.learner.steps
-        self._interruption = Interruption(self._seconds_to_barrier, self.line.say)
-        self._iteration_ended = time.perf_counter()
-        self._iteration_seconds: float | None = None
 
     def train(self) -> str:
-        """Learn until done, stopped or interrupted; gives the reason in words."""
+        """Learn until done, stopped or interrupted by Ctrl-C or SIGTERM; gives the reason in words."""
         reason = self._reason_to_stop()
+        signals = (signal.SIGINT, signal.SIGTERM)
+        before = [signal.signal(number, signal.default_int_handler) for number in signals]
         try:
-            with self._interruption:
-                if not reason and not self.learner.iteration:
-                    self._save()  # from here it goes on when something happens before the first barrier
-                while not reason:
-                    self._iteration_ended = time.perf_counter()
-                    self.learner.run_to_barrier(self._after_iteration)
-                    reason = self._reason_to_stop()
-                    with self._interruption.not_by_the_clock():
-                        self._save()
-                    reason = reason or (INTERRUPTED if self._interruption.asked else "")
+            if not reason and not self.learner.iteration:
+                self._save()  # from here it goes on when something happens before the first barrier
+            while not reason:
+                self.learner.run_to_barrier(self._after_iteration)
+                reason = self._reason_to_stop()
+                self._save()
         except KeyboardInterrupt:
-            return INTERRUPTED
-        except CollectionError:
-            if self._interruption.asked:  # whoever ends a job often ends the workers too
-                return INTERRUPTED
-            raise
+            reason = INTERRUPTED
+        finally:
+            for number, handler in zip(signals, before, strict=True):
+                signal.signal(number, handler)
         return reason
 
     def announce(self) -> None:
-        """Say what runs where and for how long, where it begins, and which shortcuts are on."""
+        """Say what runs where, where it begins, and which shortcuts are on."""
         learner, settings = self.learner, self.learner.settings
         start = f"goes on at {learner.steps} steps" if learner.steps else "starts"
-        expected = clock(self.expected_seconds)
-        self.line.say(f"{self.folder}: {start}, {settings.steps} steps in all, about {expected} on two idle cores")
+        self.line.say(f"{self.folder}: {start}, {settings.steps} steps in all")
         self.line.say(
             f"saved every {self.barrier_steps} steps; after Ctrl-C the same command goes on from the last time, "
             "and does the steps since then again"
@@ -120,25 +106,17 @@ class Run:
         """End the workers and write what is still in memory."""
         with contextlib.ExitStack() as stack:  # in reverse, each even if the one before fails
             stack.callback(self.lock.release)
-            stack.callback(self.loggers.close)
+            for logger in self.loggers:
+                stack.callback(logger.close)
             stack.callback(self.learner.collection.close)
             self.ledger.write(self.saved_at)  # first: the workers take their CPU time with them
-
-    def _seconds_to_barrier(self) -> float | None:
-        if self._iteration_seconds is None:
-            return None
-        settings = self.learner.settings
-        iterations = settings.barrier_iterations - self.learner.iteration % settings.barrier_iterations
-        return max(iterations * self._iteration_seconds - (time.perf_counter() - self._iteration_ended), 0.0)
 
     def _after_iteration(self) -> None:
         learner = self.learner
         assert learner.conditions is not None, "iterate first"
         conditions = learner.conditions.columns()
-        now = time.perf_counter()
-        self._iteration_ended, self._iteration_seconds = now, now - self._iteration_ended
         summary = learner.episodes.summary()
-        self.line.show(learner.steps, learner.updates, summary, conditions, learner.episodes.worlds.hardest)
+        self.line.show(learner.steps, learner.updates, summary, conditions)
         if learner.iteration % learner.settings.log_iterations == 0:
             losses = {key: float(value) for key, value in learner.metrics.items()}
             costs = self.ledger.costs()
@@ -146,14 +124,14 @@ class Run:
             # losses last: the columns of metrics.csv are those of the first row, so they must be there from the start
             blank = dict.fromkeys(("critic_loss", "actor_loss", "alpha", "entropy", "value"), float("nan"))
             counts = {"updates": learner.updates, "wall_hours": costs.wall / 3600}
-            self.loggers.log(learner.steps, summary | conditions | counts | hours | blank | losses)
+            for logger in self.loggers:
+                logger.log(learner.steps, summary | conditions | counts | hours | blank | losses)
 
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
-        angle, kept = self.learner.episodes.mean_angle, self.learner.episodes.kept
         if steps >= settings.steps:
             return f"all {settings.steps} steps done"
-        if settings.mastered(angle, kept):
+        if settings.mastered(self.learner.episodes.mean_angle, self.learner.episodes.kept):
             return f"{MASTERED} above {settings.goal}"
         deadline = settings.stop_if_no_regrasp_by
         if deadline is not None and steps >= deadline and self.best_angle < settings.regrasp_angle:

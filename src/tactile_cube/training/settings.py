@@ -7,12 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveFloat
 
 
 class RunSettings(BaseModel):
-    """What tells runs apart.
-
-    Attributes:
-        name: of the run, part of its folder's name.
-        seed: of everything random.
-    """
+    """What tells runs apart: the name is part of the folder's, the seed is that of everything random."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -21,28 +16,20 @@ class RunSettings(BaseModel):
 
 
 class CollectorSettings(BaseModel):
-    """How many worlds are stepped where.
+    """How many worlds are stepped where; conf/collector/multi_sync.yaml says what each setting means.
 
-    Attributes:
-        kind: "multi_sync" (worker processes beside the learner), "ray" (workers of a Ray cluster) or "single" (this
-            process, in turns with the learner).
-        worlds: worlds in all. Source: the paper's 12 workers.
-        processes: worker processes; None takes one for each core beside the learner's, as far as it divides `worlds`.
-        timeout: longest wait for the workers [s].
-        start_timeout: the same until their first block, before which they may compile.
-        start_method: how worker processes start; fork takes under a second, spawn about 3 s a worker.
-        address: host:port of a Ray cluster that this machine is a node of; None: one of its own on this machine.
+    `kind` is "multi_sync" (worker processes beside the learner) or "single" (this process, in turns with the learner);
+    without `processes` there is a worker for each core beside the learner's, as far as they divide `worlds`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    kind: Literal["multi_sync", "ray", "single"] = "multi_sync"
+    kind: Literal["multi_sync", "single"] = "multi_sync"
     worlds: PositiveInt = 12
     processes: PositiveInt | None = None
     timeout: PositiveFloat = 120.0
     start_timeout: PositiveFloat = 600.0
     start_method: Literal["fork", "spawn", "forkserver"] = "fork"
-    address: str | None = None
 
     @model_validator(mode="after")
     def _divides(self) -> Self:
@@ -52,7 +39,7 @@ class CollectorSettings(BaseModel):
 
     @property
     def workers(self) -> int:
-        """Worker processes used: as asked, or from the machine."""
+        """Worker processes used."""
         if self.processes is not None:
             return self.processes
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -61,34 +48,10 @@ class CollectorSettings(BaseModel):
 
 
 class TrainingSettings(BaseModel):
-    """The schedule of a run, in environment steps unless said otherwise.
+    """The schedule of a run, in environment steps; conf/training/paper.yaml says what each setting means.
 
-    Attributes:
-        steps: length of the run.
-        steps_per_iteration: steps a world and iteration.
-        updates_per_iteration: gradient steps an iteration.
-        learning_starts: no update before.
-        random_steps: uniform random actions before.
-        replay_size: transitions kept.
-        barrier_iterations: iterations between two resets of all worlds. A run can be saved and resumed bit for bit
-            there and nowhere else, since the state of a simulator cannot be saved; and it is saved at each of them.
-        policy_every: keep a separate policy file each so many steps; 0 keeps only latest and best.
-        log_iterations: iterations from one row of metrics to the next.
-        resume: "auto" goes on from the newest checkpoint of this run folder; "never" starts over.
-        init_from: checkpoint (.pt) or policy (.safetensors) whose networks the run starts from.
-        init_replay: take over the experience of `init_from`, a run's checkpoint then, as well: fine-tuning begins
-            with a full replay instead of the few steps it has made itself.
-        actor_frozen: updates at the beginning that leave the actor as it is: after `init_from` a policy file, whose
-            critics are fresh, they would lead it astray before they know what it is worth. None: as many as they need
-            there, and none after a checkpoint, which brings its critics.
-        stop_if_no_regrasp_by: give up when the mean final angle is still below `regrasp_angle` after so many steps.
-        regrasp_angle: angle [rad] no single twist reaches, so that beyond it the fingers must have regrasped.
-        stop_when_angle_above: finish early at this mean final angle [rad].
-        stop_when_kept_above: finish early at this share of cubes kept in the last training episodes; where both are
-            given, both must hold.
-        threads: torch threads of the learner; results differ in the last bits between thread counts.
-
-    Source: website table of the paper for the schedule.
+    A run can be saved and resumed bit for bit at barriers and nowhere else, since the state of a simulator cannot be
+    saved; and it is saved at each of them. Source: website table of the paper.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -110,7 +73,7 @@ class TrainingSettings(BaseModel):
     regrasp_angle: PositiveFloat = 2.0
     stop_when_angle_above: PositiveFloat | None = None
     stop_when_kept_above: PositiveFloat | None = None
-    threads: PositiveInt = Field(default=1)
+    threads: PositiveInt = 1
 
     @property
     def goal(self) -> str:

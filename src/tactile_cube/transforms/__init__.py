@@ -1,10 +1,8 @@
 """TorchRL transforms between worlds and policy, and the one place that knows their order."""
 
+from tactile_cube.transforms.disturbances import JointOffset, SensorNoise, StickyAction
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
-from tactile_cube.transforms.joint_offset import JointOffset
 from tactile_cube.transforms.make_env import EnvConfig, make_env, rotation_env
-from tactile_cube.transforms.sensor_noise import SensorNoise
-from tactile_cube.transforms.sticky_action import StickyAction
 
 __all__ = [
     "EnvConfig",

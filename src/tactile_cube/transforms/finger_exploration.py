@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -13,7 +12,7 @@ from torchrl.envs.transforms import Transform
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.gait import GaitRanges
-from tactile_cube.transforms.partial_reset import reset_mask
+from tactile_cube.transforms.disturbances import reset_mask
 
 
 def finger_groups(fingers: int, single: bool = False) -> Tensor:
@@ -28,10 +27,6 @@ def finger_groups(fingers: int, single: bool = False) -> Tensor:
     return torch.tensor([*alone, *pairs, *[[True] * fingers] * 2])
 
 
-Teacher = Callable[[Tensor], Tensor]
-"""From the stacked observation (..., readings) to the action (..., joints)."""
-
-
 @dataclass(frozen=True)
 class Exploration:
     """Extra exploration in a part of the episodes.
@@ -42,11 +37,10 @@ class Exploration:
         shortest: fewest steps that a target is held.
         longest: most steps that it is held.
         single: only one finger at a time does; else also pairs and all of them, which in the air costs the object.
-        demonstrations: part of the episodes in which a scripted gait or a teacher acts. There the policy takes over
-            where an exploring one would hold a target, and for as long.
-        noise: standard deviation of the noise on their actions.
-        gaits: the gaits that act there; None: a teacher does.
-        teacher: the policy that acts there instead: a shipped policy's name, a policy file or a run's folder.
+        demonstrations: part of the episodes in which a scripted gait acts. There the policy takes over where an
+            exploring one would hold a target, and for as long.
+        noise: standard deviation of the noise on the gait's actions.
+        gaits: the gaits that act there.
     """
 
     episodes: float = 0.3
@@ -57,7 +51,6 @@ class Exploration:
     demonstrations: float = 0.0
     noise: float = 0.1
     gaits: GaitRanges | None = None
-    teacher: str | None = None
 
     def __post_init__(self) -> None:
         """Refuses values without a meaning."""
@@ -72,8 +65,6 @@ class Exploration:
             raise InputError(
                 f"exploration holds {self.shortest} to {self.longest} steps; give 1 <= shortest <= longest"
             )
-        if self.gaits is not None and self.teacher is not None:
-            raise InputError(f"exploration.teacher={self.teacher} beside exploration.gaits; choose one of them")
         if not self.noise >= 0.0:
             raise InputError(f"exploration.noise is {self.noise}; give a standard deviation >= 0")
 
@@ -86,8 +77,8 @@ class Exploration:
 class FingerExploration(Transform):  # type: ignore[misc]
     """In some episodes a group of fingers holds a random target for a few steps instead of what the policy says.
 
-    In others a scripted gait or a teacher acts. Adds "exploring" (1), constant in an episode, so that statistics can
-    leave such episodes out, "demonstrated" (1), true after a step in which gait or teacher acted, and "action_taken"
+    In others a scripted gait acts. Adds "exploring" (1), constant in an episode, so that statistics can
+    leave such episodes out, "demonstrated" (1), true after a step in which the gait acted, and "action_taken"
     (joints), the action after this transform: the one that a replay must store. Draws from torch's global generator,
     the same number of draws at every step.
 
@@ -99,25 +90,15 @@ class FingerExploration(Transform):  # type: ignore[misc]
         self,
         exploration: Exploration,
         gaits: Tensor | None = None,
-        teacher: Teacher | None = None,
         fingers: int = 4,
         joints_per_finger: int = 3,
     ) -> None:
-        """Explores as `exploration` says.
-
-        Args:
-            exploration: how much of it.
-            gaits: actions (gaits, steps, joints) that demonstrations play.
-            teacher: what acts in demonstrations instead.
-            fingers: of the hand.
-            joints_per_finger: of it.
-        """
+        """Explores as `exploration` says; demonstrations play `gaits`, actions (gaits, steps, joints)."""
         super().__init__(out_keys=["exploring", "demonstrated", "action_taken"])
         self.settings = exploration
         self._groups, self._per_finger = finger_groups(fingers, exploration.single), joints_per_finger
         self._joints = fingers * joints_per_finger
         self._gaits = torch.zeros(1, 1, self._joints) if gaits is None else gaits
-        self._teacher = teacher
         self._exploring = self._demonstrating = self._demonstrated = self._held = torch.zeros(0)
         self._gait = self._clock = self._target = self._fingers = self._taken = torch.zeros(0)
 
@@ -125,15 +106,10 @@ class FingerExploration(Transform):  # type: ignore[misc]
         mask = reset_mask(tensordict, tensordict_reset)
         worlds = mask.shape[:-1]
         if self._exploring.shape != mask.shape:
-            self._exploring = torch.zeros_like(mask)
-            self._demonstrating = torch.zeros_like(mask)
-            self._demonstrated = torch.zeros_like(mask)
-            self._held = torch.zeros_like(mask, dtype=torch.int64)
-            self._gait = torch.zeros_like(mask, dtype=torch.int64)
-            self._clock = torch.zeros_like(mask, dtype=torch.int64)
-            self._target = torch.zeros(*worlds, self._joints)
+            self._exploring = self._demonstrating = self._demonstrated = torch.zeros_like(mask)
+            self._held = self._gait = self._clock = torch.zeros_like(mask, dtype=torch.int64)
+            self._target = self._taken = torch.zeros(*worlds, self._joints)
             self._fingers = torch.zeros(*worlds, self._joints, dtype=torch.bool)
-            self._taken = torch.zeros(*worlds, self._joints)
         draw = torch.rand(mask.shape)
         demonstrating = (draw >= self.settings.episodes) & (draw < self.settings.extra)
         self._exploring = torch.where(mask, draw < self.settings.extra, self._exploring)
@@ -148,7 +124,8 @@ class FingerExploration(Transform):  # type: ignore[misc]
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
         policy = tensordict.get("action")
         self._begin(policy.shape[:-1])
-        shown = self._shown(tensordict) + self.settings.noise * torch.randn(policy.shape)
+        gait = self._gaits[self._gait, self._clock].squeeze(-2)
+        shown = gait + self.settings.noise * torch.randn(policy.shape)
         usual = torch.where(self._demonstrating, shown.clamp(-1.0, 1.0), policy)
         instead = torch.where(self._demonstrating, policy, torch.where(self._fingers, self._target, policy))
         self._taken = torch.where(self._held > 0, instead, usual)
@@ -156,13 +133,6 @@ class FingerExploration(Transform):  # type: ignore[misc]
         self._held = (self._held - 1).clamp_min(0)
         self._clock = (self._clock + 1).clamp_max(self._gaits.shape[1] - 1)
         return tensordict.set("action", self._taken)
-
-    def _shown(self, tensordict: TensorDictBase) -> Tensor:
-        """What demonstrations do at this step, (..., joints)."""
-        if self._teacher is not None:
-            with torch.no_grad():
-                return self._teacher(tensordict.get("observation"))
-        return self._gaits[self._gait, self._clock].squeeze(-2)
 
     def _begin(self, worlds: torch.Size) -> None:
         """Lets exploring worlds that hold nothing begin to hold, with the probability of a step."""

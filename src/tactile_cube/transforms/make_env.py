@@ -21,10 +21,8 @@ from tactile_cube.hand.gait import similar_gaits
 from tactile_cube.randomization import GraspStarts, GraspTable, Randomization, StartPoses, StartStates, identified
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.health import unresolved
-from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration, Teacher
-from tactile_cube.transforms.joint_offset import JointOffset
-from tactile_cube.transforms.sensor_noise import SensorNoise
-from tactile_cube.transforms.sticky_action import StickyAction
+from tactile_cube.transforms.disturbances import JointOffset, SensorNoise, StickyAction
+from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
 
 ALMOST_ALL = 1.0 - 1e-9
 """The fraction of draws below what counts as a distribution's largest value."""
@@ -49,15 +47,10 @@ class EnvConfig:
     """Everything that defines the environment; plain data that can be sent to another process.
 
     Attributes:
-        task: what to do.
         hand: who does it; its number of joints gives the sizes of observations and actions.
-        reward: weights.
-        randomization: what differs between episodes.
-        start: start poses.
         exploration: extra exploration in training.
         curriculum: how conditions change in training; None: they do not.
         constants: nominal constants, which the task and the randomization change.
-        simulation: numerical options of the world.
         effects: effects of the drivetrain beyond the basic model: instances, or text such as `backlash@q2: play=0.02`.
         model: an identified model, as the path of its file, its contents or a ModelFile: its values, intervals and
             effects replace those of the drive in `constants` and `randomization`. None once that is done.
@@ -86,7 +79,7 @@ class EnvConfig:
             if not isinstance(getattr(self, key), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)
                 raise InputError(f"env.{key} is {str(getattr(self, key))[:60]}; give a {names}")
-        effects = [one for effect in self.effects for one in placed_effects(effect, self.hand)]
+        effects = [one for effect in self.effects for one in _placed_effects(effect, self.hand)]
         if self.constants.joints != self.hand.joints:
             raise InputError(
                 f"env.constants are of {self.constants.joints} joints, hand '{self.hand.name}' has {self.hand.joints}; "
@@ -106,20 +99,13 @@ class EnvConfig:
 
     def approximations(self) -> list[str]:
         """What is computed less well than it could be, in words; [] if nothing."""
-        key = "tip_spinning_friction"
-        drawn = self.randomization.values.get(key)
+        drawn = self.randomization.values.get("tip_spinning_friction")
         largest = self.constants.tip_spinning_friction if drawn is None else float(drawn.quantile(np.array(ALMOST_ALL)))
         said = unresolved(largest, self.simulation)
         return [said] if said else []
 
 
-def make_env(
-    config: EnvConfig,
-    worlds: int,
-    seed: int,
-    evaluation: bool = False,
-    teacher: Teacher | None = None,
-) -> TransformedEnv:
+def make_env(config: EnvConfig, worlds: int, seed: int, evaluation: bool = False) -> TransformedEnv:
     """Environment with batch size [worlds] and the keys "observation", "privileged" and "action".
 
     For a hand with 12 joints and a stack of 5 they have 120, 25 and 12 numbers.
@@ -129,7 +115,6 @@ def make_env(
         worlds: number of worlds that this process hosts; with `simulation.engine` mixed, engines alternate among them.
         seed: seed of the worlds and, through torch's global generator, of the transforms.
         evaluation: leaves out the extra exploration and the curriculum; everything else stays as configured.
-        teacher: what acts in demonstrations instead of gaits.
 
     Raises:
         InputError: fewer than one world.
@@ -137,16 +122,13 @@ def make_env(
     if worlds < 1:
         raise InputError(f"number of worlds is {worlds}; give at least 1")
     poses = config.start.of(config.hand, config.constants)
-    tasks = [rotation_env(_of_world(config, seed + index), poses) for index in range(worlds)]
+    # processes, told apart by their seed, take turns in the engines too
+    of_worlds = [replace(config, simulation=config.simulation.of_world(seed + index)) for index in range(worlds)]
+    tasks = [rotation_env(one, poses) for one in of_worlds]
     base = WorldsEnv(tasks, None if evaluation else config.curriculum)
-    env = TransformedEnv(base, Compose(*transforms(config, explore=not evaluation, teacher=teacher)))
+    env = TransformedEnv(base, Compose(*transforms(config, explore=not evaluation)))
     env.set_seed(seed)
     return env
-
-
-def _of_world(config: EnvConfig, index: int) -> EnvConfig:
-    """One of several worlds side by side, in the engine that is its turn; processes are told apart by their seed."""
-    return replace(config, simulation=config.simulation.of_world(index))
 
 
 def rotation_env(config: EnvConfig, poses: StartPoses | GraspTable | None = None) -> RotationEnv:
@@ -156,7 +138,7 @@ def rotation_env(config: EnvConfig, poses: StartPoses | GraspTable | None = None
     return RotationEnv(world, config.task, config.reward, config.randomization, start, config.constants, config.hand)
 
 
-def transforms(config: EnvConfig, explore: bool, teacher: Teacher | None = None) -> list[Transform]:
+def transforms(config: EnvConfig, explore: bool) -> list[Transform]:
     """The transforms, from the world to the policy: readings pass them downwards, actions upwards."""
     disturbances, hand = config.randomization, config.hand
     half_range = torch.tensor(0.5 * (hand.action_upper - hand.action_lower), dtype=torch.float32)
@@ -173,13 +155,12 @@ def transforms(config: EnvConfig, explore: bool, teacher: Teacher | None = None)
         StickyAction(disturbances.sticky_probability),
     ]
     if explore and config.exploration.extra > 0.0:
-        gaits = None if teacher is not None else demonstrated_gaits(config)
         size = (len(hand.fingers), hand.joints_per_finger)
-        chain.append(FingerExploration(config.exploration, gaits, teacher, *size))
+        chain.append(FingerExploration(config.exploration, _demonstrated_gaits(config), *size))
     return chain
 
 
-def placed_effects(effect: Effect | str, hand: Hand = DLR_HAND2) -> list[Effect]:
+def _placed_effects(effect: Effect | str, hand: Hand) -> list[Effect]:
     """The effects that a text such as `backlash@q2: play=0.02` names, one for each joint that matches."""
     if isinstance(effect, Effect):
         return [effect]
@@ -187,14 +168,12 @@ def placed_effects(effect: Effect | str, hand: Hand = DLR_HAND2) -> list[Effect]
     return [kind(joint, **values) for kind, joint in resolve([name], hand.joint_names)]
 
 
-def demonstrated_gaits(config: EnvConfig) -> torch.Tensor | None:
+def _demonstrated_gaits(config: EnvConfig) -> torch.Tensor | None:
     """Actions (gaits, steps, joints) of whole episodes; None without demonstrations."""
     if config.exploration.demonstrations == 0.0:
         return None
     if config.exploration.gaits is None:
-        raise InputError(
-            "exploration.demonstrations has neither gaits nor a teacher; choose exploration=demonstrations or teacher"
-        )
+        raise InputError("exploration.demonstrations has no gaits; choose exploration=demonstrations")
     if config.task.axis_vector()[2] < 1.0:
         raise InputError(f"task.axis is {config.task.axis}: gaits turn about z; choose exploration=fingers or none")
     gaits = similar_gaits(
