@@ -1,12 +1,8 @@
 """Which viewer is opened, and that it is bound to the loopback interface."""
 
-import contextlib
-import os
-import time
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 
 from tactile_cube.errors import InputError
@@ -59,26 +55,3 @@ def test_nothing_is_opened_unless_asked_for(started: list[list[str]]) -> None:
 def test_what_is_no_viewer_is_refused() -> None:
     with pytest.raises(InputError, match="viewer=tv: choose one of auto, window, web, none"):
         viewer.show_files([], "tv")
-
-
-def test_when_a_viewer_is_ended_nothing_of_it_goes_on() -> None:
-    page = viewer.start_viewer(True)
-    deadline = time.monotonic() + 60.0
-    while len(group(page.process.pid)) < 2 and time.monotonic() < deadline:  # module and program
-        time.sleep(0.05)
-    assert len(group(page.process.pid)) == 2
-    page.end()
-    while group(page.process.pid) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert group(page.process.pid) == []
-    page.end()
-
-
-def group(leader: int) -> list[int]:
-    """Processes of a group that run."""
-    running = []
-    for process in psutil.process_iter():
-        with contextlib.suppress(psutil.NoSuchProcess, ProcessLookupError):
-            if os.getpgid(process.pid) == leader and process.status() != psutil.STATUS_ZOMBIE:
-                running.append(process.pid)
-    return running

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
+from tactile_cube.visualization.blueprint import whole
 from tactile_cube.visualization.comparison_figures import marked
-from tactile_cube.visualization.rerun_recording import TIMELINE, Branch, log_robot, recording_file
+from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file
 
 Array = NDArray[np.float64]
 POSE_RATE = 50.0  # [Hz] of the robot's poses
@@ -76,12 +77,7 @@ def blueprint(comparison: Comparison) -> rrb.Blueprint:
         row_shares=[3, 2],
     )
     active = list(comparison.recording.joints).index(worst)
-    return rrb.Blueprint(
-        rrb.Horizontal(left, rrb.Tabs(*tabs, active_tab=active), column_shares=[2, 3]),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-    )
+    return whole(rrb.Horizontal(left, rrb.Tabs(*tabs, active_tab=active), column_shares=[2, 3]))
 
 
 def _log_robot(branch: Branch, comparison: Comparison, starts: list[float]) -> None:

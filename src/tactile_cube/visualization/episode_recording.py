@@ -84,8 +84,8 @@ def _log_joints(branch: Branch, record: EpisodeRecord) -> None:
         for signal, brightness in SIGNALS.items():
             if signal in record.trace:
                 colours = [tuple(round(brightness * part) for part in colour) for colour in JOINT_COLOURS]
-                time, values = record.trace["time"][:: branch.stride], record.trace[signal][:: branch.stride, mine]
-                _joint_lines(branch, f"{entity}/{signal}", time, values, signal, colours)
+                values = record.trace[signal][:, mine]
+                _joint_lines(branch, f"{entity}/{signal}", record.trace["time"], values, signal, colours)
         _joint_lines(branch, f"{entity}/q_n", record.time[:-1], record.target[:, mine], "q_n")
 
 
