@@ -114,6 +114,7 @@ def test_a_mesh_is_shown_as_its_faces(tmp_path: Path) -> None:
     mesh, size = read_mesh(write_obj(tmp_path, 0.08 * CUBE))
     record = replace(episode(steps=3), object_shape=mesh, cube_size=size, trace={})
     write_episode(record, tmp_path / "mesh.rrd", summary="")
-    corners = np.vstack(listed(tmp_path / "mesh.rrd", "/cube/body", "Mesh3D:vertex_positions")[0])
+    sides = [listed(tmp_path / "mesh.rrd", f"/cube/part{side}", "Mesh3D:vertex_positions")[0] for side in range(6)]
+    corners = np.vstack(sides)
     assert len(corners) == 3 * 12
     np.testing.assert_allclose(np.abs(corners), 0.04, atol=1e-6)
