@@ -87,7 +87,6 @@ class DiagnosisResult:
         from tactile_cube.measurement.bench import without_touches
         from tactile_cube.measurement.comparing.comparison import compare_recording
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.comparison_summary import markdown
         from tactile_cube.visualization.diagnosis_report import diagnosis_report
         from tactile_cube.visualization.report import write_report
 
@@ -98,7 +97,7 @@ class DiagnosisResult:
         path = str(folder / "model.yaml")
         page = diagnosis_report(data, before, after, self.job.command, path, shapes, found.experiment)
         write_report(page, folder / "report.html")
-        write_comparison(after, folder / "diagnosis.rrd", markdown(after))
+        write_comparison(after, folder / "diagnosis.rrd")
 
 
 @as_input_errors

@@ -74,7 +74,6 @@ class IdentificationResult:
         from tactile_cube.measurement.bench import without_touches
         from tactile_cube.measurement.comparing.comparison import compare_recording
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.comparison_summary import markdown
         from tactile_cube.visualization.contact_report import contact_sections
         from tactile_cube.visualization.diagnosis_report import identification_report
 
@@ -82,7 +81,7 @@ class IdentificationResult:
         after = compare_recording(
             without_touches(self.recording), self.model, config.engine, config.step, floor=found.floor
         )
-        write_comparison(after, folder / "identification.rrd", markdown(after))
+        write_comparison(after, folder / "identification.rrd")
         held = contact_sections(self.contact, alone=False) if self.contact else []
         path = str(folder / "model.yaml")
         return identification_report(after, self.data["error"], self.data["joints"], command, path, held)

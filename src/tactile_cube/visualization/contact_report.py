@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from tactile_cube.identification.contact.identification import ContactIdentification
-from tactile_cube.identification.in_words import GAIN_OF
+from tactile_cube.identification.in_words import GAIN_OF, answer
 from tactile_cube.measurement.units import milli
-from tactile_cube.visualization.diagnosis_report import VERDICTS
+from tactile_cube.visualization.diagnosis_report import tone_of
 from tactile_cube.visualization.diagnosis_sections import (
     HELD,
     effect_section,
@@ -38,53 +37,45 @@ def contact_sections(found: ContactIdentification, alone: bool = True) -> list[S
     table = Table(("effect", "parameter", "initialisation", "value", ""), rows)
     stages = {key: one.overall for key, one in found.stages.items()} | {"noise_floor": found.noise_floor}
     joints = {key: one.joints for key, one in found.stages.items()}
-    by_initialisation = Section("What each initialisation says", (EXPLANATION,), [table])
+    by_initialisation = Section("What each initialisation says", [EXPLANATION], [table])
     return [stage_section(stages, joints, HELD), *(effect_section(effects) if alone else []), by_initialisation]
 
 
 def contact_diagnosis_report(
-    result: Mapping[str, Any], name: str, command: str, recording: str, model_path: str
+    result: dict[str, Any], name: str, command: str, recording: str, model_path: str
 ) -> Report:
     """The page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
-    tone, said = VERDICTS[result["verdict"]]
-    names = (" or " if result["verdict"] == "ambiguous" else " and ").join(one["name"] for one in result["effects"])
-    return Report(
-        title=f"What is missing? {name}",
-        answer=f"{said}: {names}." if names else said,
-        tone=tone,
-        sections=[
-            held_section(result),
-            *effect_section(result["effects"]),
-            *ranking_section([_ranked(row) for row in result["ranking"]]),
-            _next_section(result, recording, model_path),
-        ],
-        footer=f"Made by tactile_cube in {result['seconds']:.0f} s: {command}",
-    )
-
-
-def _ranked(row: Mapping[str, Any]) -> dict[str, Any]:
-    """One effect that was tried, for people."""
-    return {
-        "effect": row["effects"],
-        "held-out error [mrad]": 1e3 * row["held_out_error"],
-        "share that it takes off": row["gain"],
-        "of": GAIN_OF[row["gain_of"]],
-        "p (no better than without)": row["p_value"],
-    }
-
-
-def _next_section(result: Mapping[str, Any], recording: str, model_path: str) -> Section:
-    """What to type or to record after a diagnosis."""
-    names = ",".join(one["name"] for one in result["effects"])
+    ranking = [
+        {
+            "effect": row["effects"],
+            "held-out error [mrad]": 1e3 * row["held_out_error"],
+            "share that it takes off": row["gain"],
+            "of": GAIN_OF[row["gain_of"]],
+            "p (no better than without)": row["p_value"],
+        }
+        for row in result["ranking"]
+    ]
+    effects = ",".join(one["name"] for one in result["effects"])
     train = f"python -m tactile_cube.train +experiment=adapt model={model_path}"
-    fit = f"python -m tactile_cube.identify recording={recording} effects=[{names}]"
+    fit = f"python -m tactile_cube.identify recording={recording} effects=[{effects}]"
     said, lines = {
         "adequate": ("Train in the world as it is stated:", [train]),
         "missing_effect": ("Fit exactly this on all trials, and train with the result:", [fit, train]),
         "ambiguous": ("Record more loads and initialisations and diagnose again, or see what each would be:", [fit]),
         "unknown_effect": ("Record free motion too: the drivetrain may lack something that the grasps show.", []),
     }[result["verdict"]]
-    return Section("What to do next", [said], [Listing(lines, code=True)] if lines else [])
+    return Report(
+        title=f"What is missing? {name}",
+        answer=answer(result, None),
+        tone=tone_of(result),
+        sections=[
+            held_section(result),
+            *effect_section(result["effects"]),
+            *ranking_section(ranking),
+            Section("What to do next", [said], [Listing(lines, code=True)] if lines else []),
+        ],
+        footer=f"Made by tactile_cube in {result['seconds']:.0f} s: {command}",
+    )
 
 
 def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:
