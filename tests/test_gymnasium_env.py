@@ -88,7 +88,7 @@ def test_success_is_the_verdict_of_evaluate_told_in_the_last_step(
 ) -> None:
     judged = []
 
-    def judge_episode(record: EpisodeRecord, episode: int, seed: int) -> SimpleNamespace:
+    def judge_episode(record: EpisodeRecord) -> SimpleNamespace:
         judged.append(record)
         return SimpleNamespace(verdict=verdict)
 
@@ -108,7 +108,7 @@ def test_the_scripted_gait_earns_the_success_that_evaluate_gives_it() -> None:
     env = GymnasiumRotation(config)
     observation, _ = env.reset(seed=0)
     policy, step, ended, info = ScriptedPolicy(), 0, False, {}
-    policy.start(env._task, 0)
+    policy.start(env._env.base_env.tasks[0], 0)
     while not ended:
         observation, _, terminated, truncated, info = env.step(policy.act(observation, step))
         step, ended = step + 1, terminated or truncated

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from torchrl.envs import TransformedEnv
 
 from tactile_cube.env import RotationEnv
 from tactile_cube.evaluation.episode_record import EpisodeRecord
@@ -17,7 +18,6 @@ from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, succeeded, summarise
 from tactile_cube.evaluation.variant import NumbPolicy, Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
-from tactile_cube.hand import Hand
 from tactile_cube.simulation import Start
 from tactile_cube.simulation.health import unresolved_among
 from tactile_cube.transforms import EnvConfig, make_env
@@ -40,12 +40,14 @@ class VariantResult:
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
         flags, varied = succeeded(self.results, self.success_share), drawn(self.results)
-        rows = [result.as_dict() for result in self.results]
-        worlds = [{name: result.world[name] for name in varied} for result in self.results]
+        episodes = [
+            result.as_dict() | {"world": {name: result.world[name] for name in varied}, "success": flag}
+            for result, flag in zip(self.results, flags, strict=True)
+        ]
         return {
             "variant": dataclasses.asdict(self.variant),
             "summary": dataclasses.asdict(self.summary),
-            "episodes": [{**row, "world": w, "success": f} for row, w, f in zip(rows, worlds, flags, strict=True)],
+            "episodes": episodes,
             "lost_where": [dataclasses.asdict(one) for one in lost_where(self.results)],
             "unresolved": self.unresolved,
         }
@@ -58,7 +60,8 @@ class VariantResult:
         lines = [sentence(self.variant.name, self.summary)]
         lines += [f"  not successful: {', '.join(failed)}"] if failed else []
         lines += [f"  {where.text}" for where in lost_where(self.results)]
-        return "\n".join([*lines, *([f"  {self.unresolved}"] if self.unresolved else [])])
+        lines += [f"  {self.unresolved}"] if self.unresolved else []
+        return "\n".join(lines)
 
 
 SPINNING_FRICTION = "spinning friction [mm]"
@@ -76,13 +79,11 @@ class Evaluation:
     """
 
     def __init__(self, config: EnvConfig, policy: Policy, protocol: Protocol, seed: int) -> None:
-        self._config = _with_time_limit(config, protocol.seconds)
-        self.protocol, self._policy, self._seed = protocol, policy, seed
-
-    @property
-    def hand(self) -> Hand:
-        """The hand that acts."""
-        return self._config.hand
+        if protocol.seconds is not None:
+            steps = round(protocol.seconds / config.simulation.policy_dt)
+            config = dataclasses.replace(config, task=dataclasses.replace(config.task, episode_steps=steps))
+        self.protocol, self.hand = protocol, config.hand
+        self._config, self._policy, self._seed = config, policy, seed
 
     @property
     def nominal_values(self) -> dict[str, float]:
@@ -113,13 +114,9 @@ class Evaluation:
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
         env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
-        policy, results = self._feeling(variant), list[EpisodeResult]()
-        for episode in range(self.protocol.episodes):
-            seed = episode_seed(self._seed, episode)
-            results.append(judge_episode(run_episode(env, policy, seed, variant.pull), episode, seed))
-            report(variant.name, results[-1])
-        env.close()
-        return self._variant_result(variant, results)
+        policy, seeds = self._feeling(variant), [episode_seed(self._seed, k) for k in range(self.protocol.episodes)]
+        episodes = ((seed, run_episode(env, policy, seed, variant.pull)) for seed in seeds)
+        return self._judged(variant, env, episodes, report)
 
     def _run_replay(self, results: list[EpisodeResult], report: Report) -> VariantResult:
         """Replay the best episode's targets open loop, from starts that differ a little."""
@@ -130,15 +127,19 @@ class Evaluation:
         config = self.protocol.variants[0].apply(dataclasses.replace(self._config, randomization=undisturbed))
         env = make_env(config, 1, self._seed, evaluation=True)
         variant = Variant(name="replay of the best episode, start displaced a little")
-        replays = []
-        for episode in range(self.protocol.episodes):
-            displaced = NearlyEqualStart(episode_seed(self._seed, episode))
-            replays.append(judge_episode(run_episode(env, replay, best.seed, displaced), episode, best.seed))
-            report(variant.name, replays[-1])
-        env.close()
-        return self._variant_result(variant, replays)
+        starts = [NearlyEqualStart(episode_seed(self._seed, k)) for k in range(self.protocol.episodes)]
+        episodes = ((best.seed, run_episode(env, replay, best.seed, start)) for start in starts)
+        return self._judged(variant, env, episodes, report)
 
-    def _variant_result(self, variant: Variant, results: list[EpisodeResult]) -> VariantResult:
+    def _judged(
+        self, variant: Variant, env: TransformedEnv, episodes: Iterable[tuple[int, EpisodeRecord]], report: Report
+    ) -> VariantResult:
+        """Run and judge episodes, each with its seed, and close their environment."""
+        results = []
+        for number, (seed, record) in enumerate(episodes):
+            results.append(judge_episode(record, number, seed))
+            report(variant.name, results[-1])
+        env.close()
         share, options = self.protocol.success_share, variant.apply(self._config).simulation
         frictions = [float(result.world["tip_spinning_friction"]) for result in results]
         return VariantResult(variant, results, summarise(results, share), share, unresolved_among(frictions, options))
@@ -147,13 +148,6 @@ class Evaluation:
 def episode_seed(seed: int, episode: int) -> int:
     """Return the seed of an episode; ranges of different seeds do not overlap below 10 000 episodes."""
     return 10_000 * seed + episode
-
-
-def _with_time_limit(config: EnvConfig, seconds: float | None) -> EnvConfig:
-    if seconds is None:
-        return config
-    steps = round(seconds / config.simulation.policy_dt)
-    return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_steps=steps))
 
 
 POSITION_SPREAD = 0.0005

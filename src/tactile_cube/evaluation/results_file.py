@@ -24,18 +24,7 @@ KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours",
 
 @dataclass(frozen=True)
 class EvaluationRun:
-    """What was run.
-
-    Attributes:
-        protocol: how.
-        source: which policy.
-        task: what it had to do.
-        engine: of the worlds, where a condition names none of its own.
-        seed: of the evaluation.
-        command: the words of the command line.
-        cpu_hours: processor time it took [h].
-        worlds: which options draw them: "randomization" and "start".
-    """
+    """What was run: `engine` where a condition names none of its own; `worlds`: which options draw them."""
 
     protocol: Protocol
     source: PolicySource

@@ -16,12 +16,7 @@ FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 @dataclass(frozen=True)
 class FingerHistory:
-    """What one finger did in an episode.
-
-    Attributes:
-        lifts: how often it let go of the cube and touched it again later.
-        faces: faces of the cube in the order in which it landed on them; a face stands again after each change.
-    """
+    """How often a finger let go and touched again later, and the side faces it landed on, in their order."""
 
     lifts: int
     faces: tuple[str, ...]
@@ -73,9 +68,9 @@ def support(record: EpisodeRecord) -> Support:
 def touched_faces(record: EpisodeRecord) -> NDArray[np.int64]:
     """Return the face of each contact row `(k,)`: an index into `FACES`, in the cube's own frame."""
     table = record.contacts
-    orientation = Rotation.from_quat(record.cube_quaternion[table.step]) if len(table.step) else None
-    if orientation is None:
+    if not len(table.step):
         return np.zeros(0, dtype=np.int64)
+    orientation = Rotation.from_quat(record.cube_quaternion[table.step])
     local = orientation.inv().apply(table.position - record.cube_position[table.step])
     scaled = local / (record.cube_size / 2)
     axis = np.argmax(np.abs(scaled), axis=1)
