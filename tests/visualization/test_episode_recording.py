@@ -64,7 +64,6 @@ def test_theta_and_reward_terms_come_back(recording: Path) -> None:
     theta = rows(recording, "/task/theta", "Scalars:scalars").ravel()
     np.testing.assert_allclose(theta, np.linspace(0.0, 4.0, 21))
     np.testing.assert_allclose(rows(recording, "/task/reward/plane", "Scalars:scalars").ravel(), -0.5)
-    np.testing.assert_allclose(rows(recording, "/curriculum/filter_time", "Scalars:scalars").ravel(), 0.5)
 
 
 def test_every_joint_moves_the_coupled_ones_too(recording: Path) -> None:

@@ -1,11 +1,10 @@
-"""Which viewer is opened, and that it is bound to the loopback interface."""
+"""Whether a viewer is opened, and that it is bound to the loopback interface."""
 
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tactile_cube.errors import InputError
 from tactile_cube.visualization import viewer
 
 
@@ -38,20 +37,10 @@ def test_a_window_opens_where_there_is_a_display_and_else_the_command_is_told(
     assert ("rerun a.rrd" in said) == (not expected)
 
 
-@pytest.mark.parametrize("wanted", ["web", "window"])
-def test_whatever_is_opened_listens_to_this_machine_alone(started: list[list[str]], wanted: str) -> None:
-    said = viewer.show_files([Path("a.rrd")], wanted)
+def test_what_is_opened_listens_to_this_machine_alone_and_nothing_is_unless_asked_for(started: list[list[str]]) -> None:
+    viewer.show_files([Path("a.rrd")], "window")
     (words,) = started
     assert words[words.index("--bind") + 1] == "127.0.0.1"
     assert words[-1] == "a.rrd"
-    assert ("http://127.0.0.1:" in said) == (wanted == "web")
-
-
-def test_nothing_is_opened_unless_asked_for(started: list[list[str]]) -> None:
     assert "rerun a.rrd b.rrd" in viewer.show_files([Path("a.rrd"), Path("b.rrd")], "none")
-    assert not started
-
-
-def test_what_is_no_viewer_is_refused() -> None:
-    with pytest.raises(InputError, match="viewer=tv: choose one of auto, window, web, none"):
-        viewer.show_files([], "tv")
+    assert len(started) == 1

@@ -46,11 +46,10 @@ class EpisodeViews:
         return rrb.TimeSeriesView(name="theta [rad]", origin=self._at("task/theta"))
 
     def task(self) -> list[rrb.View]:
-        """Rewards, forces, conditions, and the episode in words."""
+        """Rewards, forces, and the episode in words."""
         return [
             self._curves("reward terms", "task/reward"),
             self._curves("forces [N]", "task/force"),
-            self._curves("T_s [s], gravity", "curriculum"),
             rrb.TextDocumentView(name="Episode", origin=self._at("episode")),
         ]
 

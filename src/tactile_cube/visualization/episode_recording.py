@@ -25,7 +25,6 @@ FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215), 
 JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255), (240, 190, 80), (190, 120, 230), (130, 210, 220))
 SIGNALS = {"q": 1.0, "q_m": 0.75, "q_f": 0.6, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
-CONDITIONS = ("filter_time", "gravity_scale")
 ARROW_LENGTH = 0.03
 """Length of a contact arrow [m/N]."""
 POSE_RATE = 50.0
@@ -167,7 +166,7 @@ def _log_contacts(branch: Branch, record: EpisodeRecord) -> None:
 
 
 def _log_task(branch: Branch, record: EpisodeRecord) -> None:
-    """Write theta, the terms of the reward, the fingers' forces and the conditions of the episode."""
+    """Write theta, the terms of the reward and the fingers' forces."""
     branch.lines("task/theta", record.time, record.theta, ["theta"])
     forces = np.zeros((record.steps + 1, len(record.fingers)))
     np.add.at(forces, (record.contacts.step, record.contacts.finger), record.contacts.normal_force)
@@ -177,9 +176,6 @@ def _log_task(branch: Branch, record: EpisodeRecord) -> None:
         if np.any(values):  # terms that are switched off would only fill the legend
             branch.lines(f"task/reward/{name}", record.time[1:], values, [name])
     branch.lines("task/reward/sum", record.time[1:], record.reward, ["sum"])
-    for name in CONDITIONS:
-        if name in record.constants:
-            branch.lines(f"curriculum/{name}", record.time, np.full(record.steps + 1, record.constants[name]), [name])
 
 
 def _log_joints(branch: Branch, record: EpisodeRecord) -> None:
