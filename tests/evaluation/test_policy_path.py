@@ -73,8 +73,5 @@ def test_a_file_without_a_gait_is_refused(content: str, tmp_path: Path) -> None:
     (tmp_path / "gait.yaml").write_text(content)
     with pytest.raises(InputError, match=r"gait\.yaml"):
         find_policy(f"scripted:{tmp_path / 'gait.yaml'}")
-
-
-def test_a_gait_file_that_is_missing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nothing\.yaml"):
         find_policy(f"scripted:{tmp_path / 'nothing.yaml'}")

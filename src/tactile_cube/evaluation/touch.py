@@ -36,33 +36,24 @@ def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
     return result
 
 
-@dataclass(frozen=True)
-class Support:
-    """What bears the cube: samples at the ends of the policy steps, so at 10 Hz.
+def support(record: EpisodeRecord) -> dict[str, float]:
+    """What bears the cube at the ends of the policy steps; a touch is more than `TOUCH_FORCE` of a tip, or of links.
 
-    Attributes:
-        tips: share of the time in which `SUPPORTING_TIPS` fingertips or more touch it.
-        links: share of the time in which a link touches it that is no fingertip.
-        link_force: these links' share of all normal force of the fingers; 0 without any force.
+    Returns:
+        tip_support: share of the time in which `SUPPORTING_TIPS` fingertips or more touch it. link_contact: share of
+        the time in which a link touches it that is no fingertip. link_force_share: these links' share of all normal
+        force of the fingers; 0 without any force.
     """
-
-    tips: float
-    links: float
-    link_force: float
-
-
-def support(record: EpisodeRecord) -> Support:
-    """Sum up the contacts of an episode; a touch is more than `TOUCH_FORCE` from a finger's tip or its other links."""
     table, fingers = record.contacts, len(record.fingers)
     force = np.zeros((2, record.steps + 1, fingers))
     np.add.at(force, (table.tip.astype(np.int64), table.step, table.finger), table.normal_force)
     links, tips = force[:, 1:]  # without the start, where no force has acted yet
     total = float(links.sum() + tips.sum())
-    return Support(
-        tips=float(((tips > TOUCH_FORCE).sum(axis=1) >= SUPPORTING_TIPS).mean()),
-        links=float((links > TOUCH_FORCE).any(axis=1).mean()),
-        link_force=float(links.sum()) / total if total > 0.0 else 0.0,
-    )
+    return {
+        "tip_support": float(((tips > TOUCH_FORCE).sum(axis=1) >= SUPPORTING_TIPS).mean()),
+        "link_contact": float((links > TOUCH_FORCE).any(axis=1).mean()),
+        "link_force_share": float(links.sum()) / total if total > 0.0 else 0.0,
+    }
 
 
 def touched_faces(record: EpisodeRecord) -> NDArray[np.int64]:

@@ -9,7 +9,6 @@ from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import common_unit, milli
 from tactile_cube.visualization.comparison_report import (
-    band_section,
     overlay_section,
     recording_section,
     test_section,
@@ -110,7 +109,6 @@ def identification_report(
             recording_section(after.recording, after.model),
             where_section(after),
             overlay_section(after),
-            *band_section(after),
             test_section(after),
             train_section(model_path),
         ],
