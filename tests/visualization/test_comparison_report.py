@@ -29,8 +29,7 @@ from tactile_cube.visualization.comparison_episode import (
     MEASURED as MEASURED_LINE,
 )
 from tactile_cube.visualization.comparison_figures import band, overlay
-from tactile_cube.visualization.comparison_report import comparison_report
-from tactile_cube.visualization.comparison_summary import summary
+from tactile_cube.visualization.comparison_report import comparison_report, summary
 from tactile_cube.visualization.diagnosis_report import diagnosis_report, identification_report
 from tactile_cube.visualization.diagnosis_sections import stage_section
 from tactile_cube.visualization.report import Report, Section, Table, write_report

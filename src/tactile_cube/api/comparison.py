@@ -43,7 +43,7 @@ class ComparisonResult:
     @property
     def text(self) -> str:
         """The answer, a line a joint, and where it fails, in words."""
-        from tactile_cube.visualization.comparison_summary import summary
+        from tactile_cube.visualization.comparison_report import summary
 
         return summary(self.comparison)
 

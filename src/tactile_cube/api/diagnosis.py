@@ -76,7 +76,7 @@ class DiagnosisResult:
             self._report_free(folder, self.data, self.free)
 
     def _report_contact(self, folder: Path, data: dict[str, Any]) -> None:
-        from tactile_cube.visualization.contact_report import contact_diagnosis_report
+        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
         from tactile_cube.visualization.report import write_report
 
         path, made = str(folder / "model.yaml"), self.model.provenance

@@ -1,18 +1,25 @@
-"""Evaluate a policy by a protocol: every variant with the same seeds, one verdict an episode."""
+"""Evaluate a policy by a protocol: every variant with the same seeds, one verdict an episode, the results as JSON."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 from torchrl.envs import TransformedEnv
 
-from tactile_cube.env import RotationEnv
+from tactile_cube.agent.policy_file import current_commit
+from tactile_cube.env import RotationEnv, Task
+from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
-from tactile_cube.evaluation.policies import Policy, ReplayPolicy
+from tactile_cube.evaluation.policies import Policy, PolicySource, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, succeeded, summarise
@@ -45,10 +52,10 @@ class VariantResult:
             for result, flag in zip(self.results, flags, strict=True)
         ]
         return {
-            "variant": dataclasses.asdict(self.variant),
-            "summary": dataclasses.asdict(self.summary),
+            "variant": asdict(self.variant),
+            "summary": asdict(self.summary),
             "episodes": episodes,
-            "lost_where": [dataclasses.asdict(one) for one in lost_where(self.results)],
+            "lost_where": [asdict(one) for one in lost_where(self.results)],
             "unresolved": self.unresolved,
         }
 
@@ -176,3 +183,65 @@ class NearlyEqualStart:
             cube_quaternion=turned.as_quat(),
         )
         world.reset(env.constants, start)
+
+
+FORMAT = "tactile_cube results 1"
+KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours", "variants")
+"""What everybody who reads a results file relies on."""
+
+
+@dataclass(frozen=True)
+class EvaluationRun:
+    """What was run: `engine` where a condition names none of its own; `worlds`: which options draw them."""
+
+    protocol: Protocol
+    source: PolicySource
+    task: Task
+    engine: str
+    seed: int
+    command: str
+    cpu_hours: float
+    worlds: Mapping[str, str]
+
+
+def write_results(path: Path, run: EvaluationRun, variants: list[VariantResult]) -> None:
+    """Write the results file."""
+    data = {
+        "format": FORMAT,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "protocol": run.protocol.name,
+        "seconds": run.protocol.seconds,
+        "success_share": run.protocol.success_share,
+        "policy": {"label": run.source.label, **run.source.provenance},
+        "task": asdict(run.task),
+        "engine": run.engine,
+        "worlds": dict(run.worlds),
+        "seed": run.seed,
+        "command": run.command,
+        "cpu_hours": run.cpu_hours,
+        "version": metadata.version("tactile-cube"),
+        "commit": current_commit(),
+        "variants": [variant.as_dict() for variant in variants],
+    }
+    path.write_text(
+        json.dumps(data, indent=1, default=lambda one: one.tolist() if hasattr(one, "tolist") else str(one)),
+        encoding="utf-8",
+    )
+
+
+def read_results(path: Path) -> dict[str, Any]:
+    """Read a results file.
+
+    Raises:
+        InputError: it is missing, damaged or something else.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: not a results file of evaluate: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError(f"{path}: not a results file of evaluate (expected format {FORMAT!r})")
+    missing = [key for key in KEYS if key not in data]
+    if missing:
+        raise InputError(f"{path}: results without {', '.join(missing)}; run evaluate again")
+    return data

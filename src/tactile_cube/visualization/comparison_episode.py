@@ -13,7 +13,7 @@ from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
 from tactile_cube.visualization.blueprint import whole
 from tactile_cube.visualization.comparison_figures import marked
-from tactile_cube.visualization.comparison_summary import outcome
+from tactile_cube.visualization.comparison_report import outcome
 from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file
 
 Array = NDArray[np.float64]
