@@ -45,12 +45,6 @@ def test_faces_are_told_apart_on_a_cuboid() -> None:
     assert touched_faces(record).tolist() == [3, 3]
 
 
-def test_no_contacts_at_all() -> None:
-    record = episode(steps=4, touch=np.zeros((5, 4), dtype=bool))
-    assert touched_faces(record).size == 0
-    assert finger_history(record, 0).faces == ()
-
-
 def table(*rows: tuple[int, int, bool, float]) -> ContactTable:
     """Contacts of step, finger, whether its tip touches, and normal force [N]."""
     step, finger, tip, force = (np.array(column) for column in zip(*rows, strict=True))
