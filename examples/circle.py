@@ -174,7 +174,7 @@ def publish(out: Path, folder: Path) -> None:
             text = path.read_text(encoding="utf-8").replace(f"{Path.cwd()}/", "")
             (folder / path.name).write_text(text, encoding="utf-8")
     for stage in ("before", "after"):
-        for path in [*out.glob(f"{stage}/*.gif"), *out.glob(f"{stage}/*.png")]:
+        for path in out.glob(f"{stage}/*.gif"):
             shutil.copy(path, folder / f"{stage}{path.suffix}")
 
 

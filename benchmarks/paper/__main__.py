@@ -32,7 +32,7 @@ def main() -> None:
     given = parser.parse_args()
     for sweep in given.sweeps:
         curves = read_sweep(sweep)
-        print(f"{sweep}\n\n{sweep_table(curves, TABLE_I if TABLE_I.keys() & curves else None, intervals=True)}\n")
+        print(f"{sweep}\n\n{sweep_table(curves, TABLE_I if TABLE_I.keys() & curves else None)}\n")
         runs = [path for path in sorted(sweep.glob("*seed*")) if path.is_dir() and RUN.match(path.name)]
         if left := [run.name for run in runs if not (run / FINISHED).is_file()]:
             print(f"not finished: {', '.join(left)}")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.paper.rows import EVALUATE, HEAD, newest, paper_rows, typed
-from tactile_cube.evaluation.results_file import read_results
+from tactile_cube.evaluation.evaluation import read_results
 
 Results = dict[str, Any]
 TITLE, DIFFERENCES = "# The paper's results beside ours", "## What is not as in the paper"

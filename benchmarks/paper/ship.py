@@ -10,8 +10,8 @@ from pathlib import Path
 from benchmarks.paper.ancestry import read_ancestry
 from benchmarks.paper.model_card import model_card
 from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.evaluation.evaluation import read_results
 from tactile_cube.evaluation.policy_path import SHIPPED, policy_path
-from tactile_cube.evaluation.results_file import read_results
 
 
 def main() -> None:

@@ -17,16 +17,13 @@ from tactile_cube.env import BORNE_TERMS, OUTCOMES, REWARD_TERMS, RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.rollout import Recorder
 from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode
-from tactile_cube.transforms import EnvConfig, JointOffset, make_env
+from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
 Observation = NDArray[np.float32]
 Picture = NDArray[np.uint8]
-
 FULL_TURN = 2.0 * np.pi
 """Bound of the readings: no joint of a hand turns that far [rad]."""
-
-
 VIEW = 256
 """Edge of each of the two views in a picture [pixels]."""
 
@@ -63,7 +60,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         self.render_mode = render_mode
         self._judged = judged
         self._recorder: Recorder | None = None
-        self._scene: tuple[NDArray[np.float64], Scene] | None = None
+        self._scene: Scene | None = None
         with torch.random.fork_rng(devices=[]):
             self._env = make_env(config, worlds=1, seed=0, evaluation=True)
             self._generator = torch.get_rng_state()
@@ -80,11 +77,8 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
             if seed is not None:
                 self._env.set_seed(seed)
             data = self._env.reset()
-        if self._judged:
-            offset = next(part.offset for part in self._env.transform if isinstance(part, JointOffset))
-            self._recorder = Recorder(
-                self._task, np.broadcast_to(offset.double().numpy(), (1, self._task.hand.joints))[0]
-            )
+        self._recorder = Recorder(self._env) if self._judged else None
+        self._close_scene()  # the next object may be of another size
         return data["observation"][0].numpy().copy(), _info(data)
 
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -92,42 +86,29 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         command = torch.as_tensor(np.clip(action, -1.0, 1.0), dtype=torch.float32)[None]
         with self._own_generator():
             data = self._env.step(TensorDict({"action": command}, batch_size=[1]))["next"]
-        ends = bool(data["terminated"]), bool(data["truncated"])
-        return data["observation"][0].numpy().copy(), float(data["reward"]), *ends, _info(data) | self._success(data)
+        info, ends = _info(data), (bool(data["terminated"]), bool(data["truncated"]))
+        if self._recorder is not None:
+            self._recorder.add(data)
+            if any(ends):
+                judged = judge_episode(self._recorder.record(0))
+                info["is_success"] = judged.verdict is EpisodeVerdict.REGRASPING
+        return data["observation"][0].numpy().copy(), float(data["reward"]), *ends, info
 
     def render(self) -> Picture | None:
         """Hand and cube from the side and from below (256, 512, 3), with render_mode "rgb_array"; else None."""
         if self.render_mode is None:
             return None
-        world = self._task.world
-        scene = self._scene_of(np.asarray(self._task.constants.cube_size))
-        scene.pose(world.q, world.cube_position, world.cube_quaternion)
-        return np.concatenate([np.asarray(scene.picture(camera, VIEW, VIEW)) for camera in (SIDE, BELOW)], axis=1)
-
-    @property
-    def _task(self) -> RotationEnv:
         task: RotationEnv = self._env.base_env.tasks[0]
-        return task
-
-    def _scene_of(self, cube_size: NDArray[np.float64]) -> Scene:
-        """The scene of the last picture if the cube had this size, else a new one."""
-        if self._scene is None or not np.array_equal(self._scene[0], cube_size):
-            self._close_scene()
-            self._scene = cube_size, Scene(cube_size, self._task.hand, self._task.constants.object_shape)
-        return self._scene[1]
+        if self._scene is None:
+            self._scene = Scene(np.asarray(task.constants.cube_size), task.hand, task.constants.object_shape)
+        self._scene.pose(task.world.q, task.world.cube_position, task.world.cube_quaternion)
+        views = [np.asarray(self._scene.picture(camera, VIEW, VIEW)) for camera in (SIDE, BELOW)]
+        return np.concatenate(views, axis=1)
 
     def _close_scene(self) -> None:
         if self._scene is not None:
-            self._scene[1].close()
+            self._scene.close()
             self._scene = None
-
-    def _success(self, data: TensorDictBase) -> dict[str, bool]:
-        if self._recorder is None:
-            return {}
-        self._recorder.add(data)
-        if not bool(data["done"]):
-            return {}
-        return {"is_success": judge_episode(self._recorder.record(0), 0, 0).verdict is EpisodeVerdict.REGRASPING}
 
     @contextmanager
     def _own_generator(self) -> Iterator[None]:
@@ -184,15 +165,8 @@ def make_rotation(
 
     from tactile_cube.composition import composed
 
-    groups = {
-        "hand": hand,
-        "object": object,
-        "task": task,
-        "reward": reward,
-        "randomization": randomization,
-        "start": start,
-    }
-    groups |= {"exploration": "none", "curriculum": "none", "env": "rotation"}
-    chosen = [f"+{group}={option}" for group, option in groups.items()]
-    config = composed(None, [*chosen, "+model=null", f"+engine={engine}", *overrides])
+    groups = {"hand": hand, "object": object, "task": task, "reward": reward, "randomization": randomization}
+    groups |= {"start": start, "exploration": "none", "curriculum": "none", "env": "rotation"}
+    groups |= {"model": "null", "engine": engine}
+    config = composed(None, [*(f"+{group}={option}" for group, option in groups.items()), *overrides])
     return GymnasiumRotation(instantiate(config.env), render_mode)

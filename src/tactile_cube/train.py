@@ -23,7 +23,7 @@ def sweep_summary(folders: list[Path]) -> None:
     for sweep in dict.fromkeys(folder.parent for folder in folders):
         runs, picture = read_sweep(sweep), sweep / "learning_curves.png"
         write_sweep_curves(runs, picture, sweep.name)
-        print(f"\n{sweep}\n\n{sweep_table(runs, intervals=True)}\n\nlearning curves: {picture}")
+        print(f"\n{sweep}\n\n{sweep_table(runs)}\n\nlearning curves: {picture}")
 
 
 @command("train", after_sweep=sweep_summary)

@@ -98,7 +98,7 @@ def test_a_grasp_is_compared_too(tmp_path: Path) -> None:
     compared = run("compare", "recording=grip", "hydra.run.dir=run", folder=tmp_path)
     assert compared.returncode == 0, compared.stderr
     assert "twist_0_0 simulated, 1 of 1" in compared.stderr
-    assert "what a world with the true effects leaves of a grasp" in (tmp_path / "run" / "report.html").read_text()
+    assert "the error of a grasp with all true contact effects" in (tmp_path / "run" / "report.html").read_text()
 
 
 def test_a_bad_recording_is_one_line_and_status_2(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import torch
 from torchrl.envs.utils import check_env_specs, step_mdp
 
 from tactile_cube.curriculum import LinearCurriculum
-from tactile_cube.env import OUTCOMES, Conditions, RotationEnv
+from tactile_cube.env import OUTCOMES, RotationEnv
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.randomization import Randomization, Uniform
 
@@ -61,7 +61,6 @@ def test_progress_acts_at_the_next_reset(rotation_task: MakeTask) -> None:
     assert env.tasks[0].constants.filter_time == pytest.approx(0.12)
     shown = env.set_progress(150, 0.0)
     assert shown.columns() == pytest.approx({"T_s": 0.31, "gravity": 0.525, "penalty": 1.0})
-    assert Conditions.from_columns(shown.columns() | {"final_angle": 0.2}) == shown
     assert env.tasks[0].constants.filter_time == pytest.approx(0.12)
     env.reset()
     assert env.tasks[0].constants.filter_time == pytest.approx(0.31)

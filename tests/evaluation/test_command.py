@@ -21,7 +21,7 @@ def test_a_baseline_is_judged_filmed_and_recorded(tmp_path: Path) -> None:
     assert "2 holding" in run.stdout
     data = json.loads((tmp_path / "run" / "results.json").read_text())
     assert [row["verdict"] for row in data["variants"][0]["episodes"]] == ["holding", "holding"]
-    for ending in (".gif", ".png", ".rrd", ".npz"):
+    for ending in (".gif", ".rrd", ".npz"):
         assert list((tmp_path / "run").glob(f"episode*{ending}")), ending
 
 

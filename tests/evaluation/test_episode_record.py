@@ -41,8 +41,5 @@ def test_a_damaged_record_is_refused_by_name(tmp_path: Path, content: bytes) -> 
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"episode\.npz"):
         EpisodeRecord.load(path)
-
-
-def test_a_missing_record_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nowhere\.npz"):
         EpisodeRecord.load(tmp_path / "nowhere.npz")

@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,19 @@ from tactile_cube.evaluation.policy_path import SHIPPED, networks_path, policy_p
 
 
 def test_a_run_folder_means_its_latest_policy(tmp_path: Path) -> None:
+    (tmp_path / "policy.safetensors").touch()
+    assert policy_path(str(tmp_path)) == tmp_path / "policy.safetensors"
+
+
+def test_a_training_in_stages_means_the_latest_of_its_stages_until_it_has_a_policy_of_its_own(tmp_path: Path) -> None:
+    for age, stage in enumerate(("worlds", "holding", "gaiting")):
+        (tmp_path / stage).mkdir()
+        (tmp_path / stage / "policy.safetensors").touch()
+        os.utime(tmp_path / stage / "policy.safetensors", (1000 - age, 1000 - age))
+    with pytest.raises(InputError, match="first checkpoint"):  # a folder of runs is no run
+        policy_path(str(tmp_path))
+    (tmp_path / ".hydra").mkdir()
+    assert policy_path(str(tmp_path)) == tmp_path / "worlds" / "policy.safetensors"
     (tmp_path / "policy.safetensors").touch()
     assert policy_path(str(tmp_path)) == tmp_path / "policy.safetensors"
 
@@ -59,8 +73,5 @@ def test_a_file_without_a_gait_is_refused(content: str, tmp_path: Path) -> None:
     (tmp_path / "gait.yaml").write_text(content)
     with pytest.raises(InputError, match=r"gait\.yaml"):
         find_policy(f"scripted:{tmp_path / 'gait.yaml'}")
-
-
-def test_a_gait_file_that_is_missing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nothing\.yaml"):
         find_policy(f"scripted:{tmp_path / 'nothing.yaml'}")

@@ -14,11 +14,8 @@ def test_success_is_a_share_of_the_best_run_for_those_that_keep_the_cube() -> No
     assert succeeded([*results(15.0, 12.1, 11.9, 3.0), lost], 0.8) == [True, True, False, False, False]
 
 
-def test_success_without_a_share_is_regrasping() -> None:
+def test_success_without_a_share_is_regrasping_and_nothing_succeeds_when_nobody_turned() -> None:
     assert succeeded(results(5.0, 0.2), None) == [True, False]
-
-
-def test_nothing_succeeds_when_nobody_turned() -> None:
     assert succeeded(results(-0.1, -0.2), 0.8) == [False, False]
 
 

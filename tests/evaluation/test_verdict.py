@@ -56,20 +56,17 @@ def test_angle_and_time_count_from_the_start_and_the_largest_tilt_is_told() -> N
     assert (result.verdict, result.exploits) == (EpisodeVerdict.HOLDING, ())
 
 
-def test_judging_fingers_that_twist_with_the_cube() -> None:
-    assert judge_episode(episode(angle=1.6, carried=True)).verdict == EpisodeVerdict.STUCK_TWISTED
+@pytest.mark.parametrize("ending", ["time_limit", "dropped", "left_range", "tilted", "lifted", "faulty"])
+def test_every_early_ending_loses_a_cube_that_twists_with_the_fingers(ending: str) -> None:
+    result, kept = judge_episode(episode(angle=1.6, carried=True, ending=ending)), ending == "time_limit"
+    assert result.verdict == (EpisodeVerdict.STUCK_TWISTED if kept else EpisodeVerdict.SPUN_AND_DROPPED)
+    assert result.kept == kept
 
 
-@pytest.mark.parametrize("ending", ["dropped", "left_range", "tilted", "lifted", "faulty"])
-def test_every_early_ending_loses_the_cube(ending: str) -> None:
-    result = judge_episode(episode(angle=1.6, carried=True, ending=ending))
-    assert result.verdict == EpisodeVerdict.SPUN_AND_DROPPED
-    assert not result.kept
-
-
-def test_a_result_is_plain_data() -> None:
+def test_an_episode_without_any_touch_is_plain_data_too() -> None:
     result = judge_episode(episode(steps=10, touch=np.zeros((11, 4), dtype=bool)))
     assert json.loads(json.dumps(result.as_dict()))["kept"] is True
+    assert result.faces_visited == (0, 0, 0, 0)
 
 
 def test_the_cubes_height_is_that_of_the_last_part() -> None:

@@ -22,7 +22,7 @@ def write_metrics(folder: Path, text: str = METRICS) -> Path:
 
 def test_learning_curves_become_a_picture(tmp_path: Path) -> None:
     curve = read_curve(write_metrics(tmp_path), "seed 0")
-    write_learning_curves([curve, curve], tmp_path / "curves.png", "table")
+    write_learning_curves(curve, tmp_path / "curves.png")
     with Image.open(tmp_path / "curves.png") as picture:
         assert picture.width > 500
 

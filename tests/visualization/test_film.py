@@ -6,7 +6,7 @@ from PIL import Image
 
 from tactile_cube.hand.object_mesh import read_mesh
 from tactile_cube.hand.object_shape import ObjectShape
-from tactile_cube.visualization.film import MAX_BYTES, write_film, write_stills
+from tactile_cube.visualization.film import MAX_BYTES, write_film
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 from tests.evaluation.synthetic import episode
 from tests.meshes import CUBE, write_obj
@@ -26,12 +26,6 @@ def test_a_long_episode_is_thinned_out_and_runs_faster(tmp_path: Path) -> None:
     with Image.open(tmp_path / "film.gif") as film:
         assert film.n_frames == 201
         assert film.info["duration"] == 200
-
-
-def test_stills_show_every_kth_step(tmp_path: Path) -> None:
-    write_stills(episode(steps=40), tmp_path / "stills.png", every=10, columns=3, view=64)
-    with Image.open(tmp_path / "stills.png") as sheet:
-        assert sheet.size == (3 * 128, 2 * (64 + 22))
 
 
 @pytest.mark.parametrize("camera", [SIDE, BELOW])

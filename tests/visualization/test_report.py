@@ -10,9 +10,7 @@ LEGIBLE = 11.0  # [px] of a phone's screen, whose page is as wide as it says; sm
 def test_on_a_phone_figures_stay_legible_and_what_is_wider_scrolls_alone(tmp_path: Path) -> None:
     drawing = svg(time_chart("angle [rad]"))
     table = Table(("joint", "error"), [("q1", "1.0")])
-    write_report(
-        Report("r", "a", "good", sections=[Section("s", blocks=[Figure(drawing, "c"), table])]), tmp_path / "r"
-    )
+    write_report(Report("r", "a", "good", [Section("s", blocks=[Figure(drawing, "c"), table])], "f"), tmp_path / "r")
     text = (tmp_path / "r").read_text()
     assert '<meta name="viewport" content="width=device-width' in text
     narrow = text[text.index("@media (max-width") :]

@@ -43,7 +43,7 @@ class ComparisonResult:
     @property
     def text(self) -> str:
         """The answer, a line a joint, and where it fails, in words."""
-        from tactile_cube.visualization.comparison_summary import summary
+        from tactile_cube.visualization.comparison_report import summary
 
         return summary(self.comparison)
 
@@ -59,7 +59,6 @@ class ComparisonResult:
     def write(self, folder: PathLike, rerun: bool = True) -> None:
         """Write comparison.json, report.html and, with `rerun`, comparison.rrd."""
         from tactile_cube.visualization.comparison_report import comparison_report
-        from tactile_cube.visualization.comparison_summary import markdown
         from tactile_cube.visualization.report import write_report
 
         folder = Path(folder)
@@ -70,7 +69,7 @@ class ComparisonResult:
         if rerun:
             from tactile_cube.visualization.comparison_episode import write_comparison
 
-            write_comparison(self.comparison, folder / "comparison.rrd", markdown(self.comparison))
+            write_comparison(self.comparison, folder / "comparison.rrd")
 
 
 @as_input_errors

@@ -76,7 +76,7 @@ class DiagnosisResult:
             self._report_free(folder, self.data, self.free)
 
     def _report_contact(self, folder: Path, data: dict[str, Any]) -> None:
-        from tactile_cube.visualization.contact_report import contact_diagnosis_report
+        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
         from tactile_cube.visualization.report import write_report
 
         path, made = str(folder / "model.yaml"), self.model.provenance
@@ -87,7 +87,6 @@ class DiagnosisResult:
         from tactile_cube.measurement.bench import without_touches
         from tactile_cube.measurement.comparing.comparison import compare_recording
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.comparison_summary import markdown
         from tactile_cube.visualization.diagnosis_report import diagnosis_report
         from tactile_cube.visualization.report import write_report
 
@@ -98,7 +97,7 @@ class DiagnosisResult:
         path = str(folder / "model.yaml")
         page = diagnosis_report(data, before, after, self.job.command, path, shapes, found.experiment)
         write_report(page, folder / "report.html")
-        write_comparison(after, folder / "diagnosis.rrd", markdown(after))
+        write_comparison(after, folder / "diagnosis.rrd")
 
 
 @as_input_errors

@@ -68,11 +68,11 @@ def search_grasps(*settings: str, grasps: int = 2000, seed: int = 0) -> Grasps:
         >>> tactile_cube.search_grasps("object=cylinder").save(Path("grasps.npz"))  # then start=grasps start.file=...
     """
     from tactile_cube.agent.policy_file import current_commit
-    from tactile_cube.evaluation.grasp_search import GraspSearch, find_grasps
+    from tactile_cube.evaluation.grasp_search import find_grasps
     from tactile_cube.simulation import World
 
     config = env_config(*settings)
-    found = find_grasps(World(config.hand, config.simulation), config.constants, GraspSearch(), grasps, seed)
+    found = find_grasps(World(config.hand, config.simulation), config.constants, grasps, seed)
     words = ", ".join([*map(repr, settings), f"grasps={grasps}", f"seed={seed}"])
     command = f"tactile_cube.search_grasps({words})"
     return replace(found, origin={**found.origin, "command": command, "commit": current_commit()})

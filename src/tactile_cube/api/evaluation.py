@@ -11,8 +11,7 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
     from tactile_cube.evaluation.episode_record import EpisodeRecord
-    from tactile_cube.evaluation.evaluation import Evaluation, VariantResult
-    from tactile_cube.evaluation.results_file import EvaluationRun
+    from tactile_cube.evaluation.evaluation import Evaluation, EvaluationRun, VariantResult
     from tactile_cube.evaluation.summary import Summary
 
 
@@ -47,7 +46,7 @@ class EvaluationResult:
 
     def write(self, folder: PathLike, film: bool = True) -> None:
         """Write results.json, the robustness map where conditions lie on axes, and films of the best episodes."""
-        from tactile_cube.evaluation.results_file import write_results
+        from tactile_cube.evaluation.evaluation import write_results
 
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
@@ -95,9 +94,8 @@ def run_evaluation(job: Job, say: Say) -> EvaluationResult:
     from hydra.utils import instantiate
 
     from tactile_cube.evaluation.environment import environment, worlds
-    from tactile_cube.evaluation.evaluation import Evaluation
+    from tactile_cube.evaluation.evaluation import Evaluation, EvaluationRun
     from tactile_cube.evaluation.policies import find_policy
-    from tactile_cube.evaluation.results_file import EvaluationRun
     from tactile_cube.evaluation.summary import HEADER, row
 
     torch.set_num_threads(1)

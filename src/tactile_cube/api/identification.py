@@ -65,7 +65,7 @@ class IdentificationResult:
         if self.free is not None:
             write_report(self._free_report(folder, self.free), folder / "report.html")
         elif self.contact is not None:
-            from tactile_cube.visualization.contact_report import contact_report
+            from tactile_cube.visualization.diagnosis_report import contact_report
 
             path = str(folder / "model.yaml")
             write_report(contact_report(self.contact, self.model.rig, self.job.command, path), folder / "report.html")
@@ -74,15 +74,13 @@ class IdentificationResult:
         from tactile_cube.measurement.bench import without_touches
         from tactile_cube.measurement.comparing.comparison import compare_recording
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.comparison_summary import markdown
-        from tactile_cube.visualization.contact_report import contact_sections
-        from tactile_cube.visualization.diagnosis_report import identification_report
+        from tactile_cube.visualization.diagnosis_report import contact_sections, identification_report
 
         config, command = self.job.config, self.job.command
         after = compare_recording(
             without_touches(self.recording), self.model, config.engine, config.step, floor=found.floor
         )
-        write_comparison(after, folder / "identification.rrd", markdown(after))
+        write_comparison(after, folder / "identification.rrd")
         held = contact_sections(self.contact, alone=False) if self.contact else []
         path = str(folder / "model.yaml")
         return identification_report(after, self.data["error"], self.data["joints"], command, path, held)

@@ -133,7 +133,7 @@ def _own_grasps(job: Job, file: Path) -> str | None:
     from hydra.utils import instantiate
 
     from tactile_cube.agent.policy_file import current_commit
-    from tactile_cube.evaluation.grasp_search import GraspSearch, find_grasps
+    from tactile_cube.evaluation.grasp_search import find_grasps
     from tactile_cube.randomization import GraspStarts
     from tactile_cube.simulation import SimulationOptions, World
 
@@ -143,7 +143,7 @@ def _own_grasps(job: Job, file: Path) -> str | None:
     except InputError:
         if not file.is_file():
             print(f"searching {GRASPS} grasps of hand '{env.hand.name}': {file}", flush=True)
-            found = find_grasps(World(env.hand, SimulationOptions()), env.constants, GraspSearch(), GRASPS, 0)
+            found = find_grasps(World(env.hand, SimulationOptions()), env.constants, GRASPS, 0)
             file.parent.mkdir(parents=True, exist_ok=True)
             replace(found, origin=found.origin | {"command": job.command, "commit": current_commit()}).save(file)
         return str(file)

@@ -123,10 +123,7 @@ def training_run(job: Job, stage: str = "", later: int = 0) -> Run:
         make_agent=instantiate(config.agent, _partial_=True),
         collector=CollectorSettings(**plain["collector"]),
         training=TrainingSettings(**plain["training"] | {"init_from": networks_path(config.training.init_from)}),
-        loggers={
-            name: instantiate(entry, _partial_=True)
-            for name, entry in (*config.logger.items(), *config.visualization.items())
-        },
+        loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
         config=plain,
     )
     run.line.stage, run.line.later = stage, later
@@ -143,7 +140,6 @@ def plain_settings(job: Job) -> dict[str, Any]:
     from tactile_cube.hand.urdf_hand import urdf_file
 
     plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
-    plain.pop("visualization", None)  # a run is the same whether or not somebody looks on
     if not plain["stages"]:  # so runs from before there were stages stay the same
         del plain["stages"], plain["judgement"]
     if job.config.model is not None:

@@ -46,7 +46,7 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
     Args:
         run: folder of a training run, a policy file, or a policy that ships with the package; of a folder of `evaluate`
             or `compare`, the recordings in it are opened.
-        settings: values as on the command line, e.g. "episodes=4", "viewer=web".
+        settings: values as on the command line, e.g. "episodes=4", "viewer=none".
         folder: where the recording goes; None: outputs/view/...
         say: takes a line for each episode.
 
@@ -90,8 +90,8 @@ def write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
     from tactile_cube.visualization.episode_recording import description, write_pair
 
     config = job.config
-    if config.run not in BASELINES:
-        policy_path(config.run, "run")  # names the key that the user wrote
+    # Found here, so that an error names the key that the user wrote.
+    curve = None if config.run in BASELINES else learning_curve(policy_path(config.run, "run").parent)
     settings = [f"protocol.episodes={config.episodes}", f"seed={config.seed}", *config.evaluate]
     settings += [] if config.seconds is None else [f"protocol.seconds={config.seconds}"]
     tried = evaluate(config.run, *settings, say=say)
@@ -102,15 +102,14 @@ def write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
         for name, one in chosen.items()
     }
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_pair(file, recorded, tried.evaluation.hand, learning_curve(config.run), _words(config.run, tried))
+    write_pair(file, recorded, tried.evaluation.hand, curve, _words(config.run, tried))
     return chosen
 
 
-def learning_curve(run: str) -> Curve | None:
-    """The learning curve of a run's folder, or of a policy in one; None without metrics."""
+def learning_curve(folder: Path) -> Curve | None:
+    """The learning curve of a run's folder; None without metrics."""
     from tactile_cube.evaluation.training_curve import read_curve
 
-    folder = Path(run) if Path(run).is_dir() else Path(run).parent
     metrics = folder / "metrics.csv"
     if not metrics.is_file() or metrics.read_text(encoding="utf-8").count("\n") < 2:  # no row yet
         return None

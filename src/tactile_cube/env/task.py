@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +33,6 @@ class Conditions:
     def columns(self) -> dict[str, float]:
         """By the names that they have in logs: "T_s" [s], "gravity" and "penalty" (scales)."""
         return {"T_s": self.filter_time, "gravity": self.gravity_scale, "penalty": self.penalty_scale}
-
-    @classmethod
-    def from_columns(cls, columns: Mapping[str, float]) -> Self:
-        """What `columns` gave; further columns, as a row of metrics has, are passed over.
-
-        Raises:
-            KeyError: a column is missing.
-        """
-        return cls(columns["T_s"], columns["gravity"], columns["penalty"])
 
 
 class Curriculum(Protocol):

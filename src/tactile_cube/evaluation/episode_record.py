@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import ObjectShape
 from tactile_cube.untrusted_file import read_npz
@@ -85,7 +87,7 @@ class EpisodeRecord:
     constants: dict[str, float | str] = field(default_factory=dict)
     trace: dict[str, Array] = field(default_factory=dict)
     policy: dict[str, Array] = field(default_factory=dict)
-    fingers: tuple[str, ...] = ("ring", "middle", "fore", "thumb")
+    fingers: tuple[str, ...] = tuple(finger.name for finger in DLR_HAND2.fingers)
     object_shape: ObjectShape = "box"
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
 
@@ -106,20 +108,18 @@ class EpisodeRecord:
 
     def save(self, path: Path) -> None:
         """Write the record as one compressed npz file."""
-        arrays: dict[str, NDArray[np.generic]] = {}
-        for name in ARRAY_FIELDS:
-            arrays[name] = getattr(self, name)
-        arrays |= {f"contacts.{name}": getattr(self.contacts, name) for name in CONTACT_FIELDS}
-        arrays |= {f"reward.{name}": value for name, value in self.reward_terms.items()}
-        arrays |= {f"trace.{name}": value for name, value in self.trace.items()}
-        arrays |= {f"policy.{name}": value for name, value in self.policy.items()}
-        shape = self.object_shape
-        if isinstance(shape, ObjectMesh):
-            arrays |= {f"mesh.{name}": value for name, value in shape.arrays().items()}
-        arrays["meta"] = np.array(
-            json.dumps([self.ending, self.direction, self.constants, self.fingers, str(shape), self.axis])
-        )
-        np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
+        shape, arrays = self.object_shape, {name: getattr(self, name) for name in ARRAY_FIELDS}
+        groups: dict[str, Mapping[str, NDArray[Any]]] = {
+            "contacts": vars(self.contacts),
+            "reward": self.reward_terms,
+            "trace": self.trace,
+            "policy": self.policy,
+            "mesh": shape.arrays() if isinstance(shape, ObjectMesh) else {},
+        }
+        for group, columns in groups.items():
+            arrays |= {f"{group}.{name}": values for name, values in columns.items()}
+        meta = [self.ending, self.direction, self.constants, self.fingers, str(shape), self.axis]
+        np.savez_compressed(path, meta=np.array(json.dumps(meta)), **arrays)
 
     @classmethod
     def load(cls, path: Path) -> EpisodeRecord:
@@ -130,22 +130,20 @@ class EpisodeRecord:
         """
         data: dict[str, Any] = read_npz(path)
         try:
-            ending, direction, constants, *later = json.loads(str(data["meta"]))
-            hand = {"fingers": tuple(later[0]), "object_shape": later[1], "axis": tuple(later[2])} if later else {}
+            ending, direction, constants, fingers, shape, axis = json.loads(str(data["meta"]))
             mesh = _with_prefix(data, "mesh.")
-            if mesh:
-                hand["object_shape"] = ObjectMesh.from_arrays(mesh)
-            contacts = ContactTable(**{name: data[f"contacts.{name}"] for name in CONTACT_FIELDS})
             return cls(
                 **{name: data[name] for name in ARRAY_FIELDS},
                 reward_terms=_with_prefix(data, "reward."),
-                contacts=contacts,
+                contacts=ContactTable(**{name: data[f"contacts.{name}"] for name in CONTACT_FIELDS}),
                 ending=ending,
                 direction=direction,
                 constants=constants,
                 trace=_with_prefix(data, "trace."),
                 policy=_with_prefix(data, "policy."),
-                **hand,
+                fingers=tuple(fingers),
+                object_shape=ObjectMesh.from_arrays(mesh) if mesh else shape,
+                axis=tuple(axis),
             )
         except (LookupError, ValueError, TypeError, AttributeError) as error:
             raise InputError(f"{path}: not an episode recorded by evaluate (*.npz): {error}") from error
@@ -156,14 +154,4 @@ def _with_prefix(data: dict[str, Array], prefix: str) -> dict[str, Array]:
 
 
 CONTACT_FIELDS = tuple(f.name for f in dataclasses.fields(ContactTable))
-ARRAY_FIELDS = (
-    "time",
-    "theta",
-    "joint_position",
-    "filtered_target",
-    "target",
-    "cube_position",
-    "cube_quaternion",
-    "reward",
-    "cube_size",
-)
+ARRAY_FIELDS = tuple(field.name for field in dataclasses.fields(EpisodeRecord) if field.type == "Array")

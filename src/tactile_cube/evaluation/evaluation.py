@@ -1,23 +1,30 @@
-"""Evaluate a policy by a protocol: every variant with the same seeds, one verdict an episode."""
+"""Evaluate a policy by a protocol: every variant with the same seeds, one verdict an episode, the results as JSON."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from torchrl.envs import TransformedEnv
 
-from tactile_cube.env import RotationEnv
+from tactile_cube.agent.policy_file import current_commit
+from tactile_cube.env import RotationEnv, Task
+from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
-from tactile_cube.evaluation.policies import Policy, ReplayPolicy
+from tactile_cube.evaluation.policies import Policy, PolicySource, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.rollout import run_episode
 from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, succeeded, summarise
 from tactile_cube.evaluation.variant import NumbPolicy, Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
-from tactile_cube.hand import Hand
 from tactile_cube.simulation import Start
 from tactile_cube.simulation.health import unresolved_among
 from tactile_cube.transforms import EnvConfig, make_env
@@ -40,13 +47,15 @@ class VariantResult:
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
         flags, varied = succeeded(self.results, self.success_share), drawn(self.results)
-        rows = [result.as_dict() for result in self.results]
-        worlds = [{name: result.world[name] for name in varied} for result in self.results]
+        episodes = [
+            result.as_dict() | {"world": {name: result.world[name] for name in varied}, "success": flag}
+            for result, flag in zip(self.results, flags, strict=True)
+        ]
         return {
-            "variant": dataclasses.asdict(self.variant),
-            "summary": dataclasses.asdict(self.summary),
-            "episodes": [{**row, "world": w, "success": f} for row, w, f in zip(rows, worlds, flags, strict=True)],
-            "lost_where": [dataclasses.asdict(one) for one in lost_where(self.results)],
+            "variant": asdict(self.variant),
+            "summary": asdict(self.summary),
+            "episodes": episodes,
+            "lost_where": [asdict(one) for one in lost_where(self.results)],
             "unresolved": self.unresolved,
         }
 
@@ -58,7 +67,8 @@ class VariantResult:
         lines = [sentence(self.variant.name, self.summary)]
         lines += [f"  not successful: {', '.join(failed)}"] if failed else []
         lines += [f"  {where.text}" for where in lost_where(self.results)]
-        return "\n".join([*lines, *([f"  {self.unresolved}"] if self.unresolved else [])])
+        lines += [f"  {self.unresolved}"] if self.unresolved else []
+        return "\n".join(lines)
 
 
 SPINNING_FRICTION = "spinning friction [mm]"
@@ -76,13 +86,11 @@ class Evaluation:
     """
 
     def __init__(self, config: EnvConfig, policy: Policy, protocol: Protocol, seed: int) -> None:
-        self._config = _with_time_limit(config, protocol.seconds)
-        self.protocol, self._policy, self._seed = protocol, policy, seed
-
-    @property
-    def hand(self) -> Hand:
-        """The hand that acts."""
-        return self._config.hand
+        if protocol.seconds is not None:
+            steps = round(protocol.seconds / config.simulation.policy_dt)
+            config = dataclasses.replace(config, task=dataclasses.replace(config.task, episode_steps=steps))
+        self.protocol, self.hand = protocol, config.hand
+        self._config, self._policy, self._seed = config, policy, seed
 
     @property
     def nominal_values(self) -> dict[str, float]:
@@ -113,13 +121,9 @@ class Evaluation:
 
     def _run_variant(self, variant: Variant, report: Report) -> VariantResult:
         env = make_env(variant.apply(self._config), 1, self._seed, evaluation=True)
-        policy, results = self._feeling(variant), list[EpisodeResult]()
-        for episode in range(self.protocol.episodes):
-            seed = episode_seed(self._seed, episode)
-            results.append(judge_episode(run_episode(env, policy, seed, variant.pull), episode, seed))
-            report(variant.name, results[-1])
-        env.close()
-        return self._variant_result(variant, results)
+        policy, seeds = self._feeling(variant), [episode_seed(self._seed, k) for k in range(self.protocol.episodes)]
+        episodes = ((seed, run_episode(env, policy, seed, variant.pull)) for seed in seeds)
+        return self._judged(variant, env, episodes, report)
 
     def _run_replay(self, results: list[EpisodeResult], report: Report) -> VariantResult:
         """Replay the best episode's targets open loop, from starts that differ a little."""
@@ -130,15 +134,19 @@ class Evaluation:
         config = self.protocol.variants[0].apply(dataclasses.replace(self._config, randomization=undisturbed))
         env = make_env(config, 1, self._seed, evaluation=True)
         variant = Variant(name="replay of the best episode, start displaced a little")
-        replays = []
-        for episode in range(self.protocol.episodes):
-            displaced = NearlyEqualStart(episode_seed(self._seed, episode))
-            replays.append(judge_episode(run_episode(env, replay, best.seed, displaced), episode, best.seed))
-            report(variant.name, replays[-1])
-        env.close()
-        return self._variant_result(variant, replays)
+        starts = [NearlyEqualStart(episode_seed(self._seed, k)) for k in range(self.protocol.episodes)]
+        episodes = ((best.seed, run_episode(env, replay, best.seed, start)) for start in starts)
+        return self._judged(variant, env, episodes, report)
 
-    def _variant_result(self, variant: Variant, results: list[EpisodeResult]) -> VariantResult:
+    def _judged(
+        self, variant: Variant, env: TransformedEnv, episodes: Iterable[tuple[int, EpisodeRecord]], report: Report
+    ) -> VariantResult:
+        """Run and judge episodes, each with its seed, and close their environment."""
+        results = []
+        for number, (seed, record) in enumerate(episodes):
+            results.append(judge_episode(record, number, seed))
+            report(variant.name, results[-1])
+        env.close()
         share, options = self.protocol.success_share, variant.apply(self._config).simulation
         frictions = [float(result.world["tip_spinning_friction"]) for result in results]
         return VariantResult(variant, results, summarise(results, share), share, unresolved_among(frictions, options))
@@ -147,13 +155,6 @@ class Evaluation:
 def episode_seed(seed: int, episode: int) -> int:
     """Return the seed of an episode; ranges of different seeds do not overlap below 10 000 episodes."""
     return 10_000 * seed + episode
-
-
-def _with_time_limit(config: EnvConfig, seconds: float | None) -> EnvConfig:
-    if seconds is None:
-        return config
-    steps = round(seconds / config.simulation.policy_dt)
-    return dataclasses.replace(config, task=dataclasses.replace(config.task, episode_steps=steps))
 
 
 POSITION_SPREAD = 0.0005
@@ -182,3 +183,65 @@ class NearlyEqualStart:
             cube_quaternion=turned.as_quat(),
         )
         world.reset(env.constants, start)
+
+
+FORMAT = "tactile_cube results 1"
+KEYS = ("created", "protocol", "policy", "task", "seed", "command", "cpu_hours", "variants")
+"""What everybody who reads a results file relies on."""
+
+
+@dataclass(frozen=True)
+class EvaluationRun:
+    """What was run: `engine` where a condition names none of its own; `worlds`: which options draw them."""
+
+    protocol: Protocol
+    source: PolicySource
+    task: Task
+    engine: str
+    seed: int
+    command: str
+    cpu_hours: float
+    worlds: Mapping[str, str]
+
+
+def write_results(path: Path, run: EvaluationRun, variants: list[VariantResult]) -> None:
+    """Write the results file."""
+    data = {
+        "format": FORMAT,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "protocol": run.protocol.name,
+        "seconds": run.protocol.seconds,
+        "success_share": run.protocol.success_share,
+        "policy": {"label": run.source.label, **run.source.provenance},
+        "task": asdict(run.task),
+        "engine": run.engine,
+        "worlds": dict(run.worlds),
+        "seed": run.seed,
+        "command": run.command,
+        "cpu_hours": run.cpu_hours,
+        "version": metadata.version("tactile-cube"),
+        "commit": current_commit(),
+        "variants": [variant.as_dict() for variant in variants],
+    }
+    path.write_text(
+        json.dumps(data, indent=1, default=lambda one: one.tolist() if hasattr(one, "tolist") else str(one)),
+        encoding="utf-8",
+    )
+
+
+def read_results(path: Path) -> dict[str, Any]:
+    """Read a results file.
+
+    Raises:
+        InputError: it is missing, damaged or something else.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: not a results file of evaluate: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError(f"{path}: not a results file of evaluate (expected format {FORMAT!r})")
+    missing = [key for key in KEYS if key not in data]
+    if missing:
+        raise InputError(f"{path}: results without {', '.join(missing)}; run evaluate again")
+    return data

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,81 +27,54 @@ CLOSING_TIME = 0.1
 """T_s while the hand closes [s]: targets are constant, so what stands in the end hardly depends on it."""
 
 
-@dataclass(frozen=True)
-class GraspSearch:
-    """What is tried, and what counts as a grasp.
-
-    Attributes:
-        yaw: the object is turned by at most this about the vertical [rad]; a cube's faces repeat beyond pi/4.
-        swing: a finger stands at most this far about the vertical from its own place [rad].
-        press: smallest and largest depth of a holding finger's target under the face [m].
-        away: smallest and largest gap between the face and the target of a finger in the air [m].
-        in_air: part of the tries in which one finger is in the air; needs four fingers.
-        closing: policy steps without weight in which the hand closes.
-        holding: policy steps at full weight with constant targets.
-        watched: the last of them, in which the object must hardly move.
-        creep: largest distance that the object may move in them [m].
-        turn: largest angle that it may turn in them [rad].
-        shifted: largest distance of the object from the middle of the hand [m].
-        tilted: largest angle between its axis and the vertical [rad].
-        touching: least number of fingertips that hold it.
-    """
-
-    yaw: float = 0.25 * np.pi
-    swing: float = 0.9
-    press: tuple[float, float] = (0.004, 0.016)
-    away: tuple[float, float] = (0.008, 0.03)
-    in_air: float = 0.5
-    closing: int = 4
-    holding: int = 10
-    watched: int = 5
-    creep: float = 0.001
-    turn: float = 0.02
-    shifted: float = 0.012
-    tilted: float = 0.25
-    touching: int = 3
+YAW = 0.25 * np.pi
+"""The object is turned by at most this about the vertical [rad]; a cube's faces repeat beyond."""
+SWING = 0.9
+"""A finger stands at most this far about the vertical from its own place [rad]."""
+PRESS, AWAY = (0.004, 0.016), (0.008, 0.03)
+"""Depth of a holding finger's target under the face, gap between the face and that of a finger in the air [m]."""
+IN_AIR = 0.5
+"""Part of the tries in which one finger is in the air; needs four fingers."""
+CLOSING, HOLDING, WATCHED = 4, 10, 5
+"""Policy steps without weight in which the hand closes; at full weight; the last of them, in which nothing may move."""
+CREEP, TURN = 0.001, 0.02
+"""How far [m] and by which angle [rad] the object may move in them."""
+SHIFTED, TILTED = 0.012, 0.25
+"""Largest distance of the object from the middle of the hand [m] and angle between its axis and the vertical [rad]."""
+TOUCHING = 3
+"""Least number of fingertips that hold it."""
+TRIES = 100
+"""For each grasp wanted, after which the search gives up."""
 
 
-def find_grasps(
-    world: World,
-    constants: EpisodeConstants,
-    search: GraspSearch,
-    count: int,
-    seed: int,
-    most_tries: int | None = None,
-    say: Callable[[str], None] = print,
-) -> Grasps:
+def find_grasps(world: World, constants: EpisodeConstants, count: int, seed: int) -> Grasps:
     """Try random grasps until `count` of them held; yaws are drawn first, hard ones as often as easy ones.
 
     Args:
         world: simulates them, with the hand.
         constants: nominal constants; gravity acts fully.
-        search: what is tried and kept.
         count: grasps to find.
         seed: of everything random.
-        most_tries: after which to give up; None: a hundred for each grasp wanted.
-        say: takes a line for every hundredth grasp.
 
     Raises:
-        InputError: fewer than `count` were found in `most_tries`.
+        InputError: fewer than `count` were found in `TRIES` times as many tries.
     """
     if count < 1:
         raise InputError(f"grasps is {count}; give at least 1")
-    rng, tries = np.random.default_rng(seed), 0
-    limit = 100 * count if most_tries is None else most_tries
+    rng, tries, limit = np.random.default_rng(seed), 0, TRIES * count
     rows: list[tuple[Array, ...]] = []
-    yaw = rng.uniform(-search.yaw, search.yaw)
+    yaw = rng.uniform(-YAW, YAW)
     while len(rows) < count:
         if tries >= limit:
             raise InputError(f"{len(rows)} of {count} grasps held in {limit} tries; widen the search")
         tries += 1
-        attempt = _attempt(world.hand, constants, search, yaw, rng)
-        held = attempt and _held(world, constants, search, *attempt, yaw)
+        attempt = _attempt(world.hand, constants, yaw, rng)
+        held = attempt and _held(world, constants, *attempt, yaw)
         if held:
             rows.append(held)
-            yaw = rng.uniform(-search.yaw, search.yaw)
+            yaw = rng.uniform(-YAW, YAW)
             if len(rows) % 100 == 0:
-                say(f"{len(rows)} of {count} grasps, {tries} tries")
+                print(f"{len(rows)} of {count} grasps, {tries} tries")
     angles, targets, positions, quaternions = (np.stack(column) for column in zip(*rows, strict=True))
     size = tuple(np.asarray(constants.cube_size).tolist())
     origin: dict[str, str | int] = {"seed": seed, "tries": tries}
@@ -110,20 +82,20 @@ def find_grasps(
 
 
 def _attempt(
-    hand: Hand, constants: EpisodeConstants, search: GraspSearch, yaw: float, rng: np.random.Generator
+    hand: Hand, constants: EpisodeConstants, yaw: float, rng: np.random.Generator
 ) -> tuple[Array, Array] | None:
     """Start angles and targets; None where a finger does not reach its place or two are too near."""
-    four = len(hand.fingers) > search.touching
-    lifted = int(rng.integers(len(hand.fingers))) if four and rng.random() < search.in_air else -1
+    four = len(hand.fingers) > TOUCHING
+    lifted = int(rng.integers(len(hand.fingers))) if four and rng.random() < IN_AIR else -1
     half, turned = 0.5 * np.asarray(constants.cube_size), Rotation.from_euler("z", yaw)
     start, target, tips = np.zeros(hand.joints), np.zeros(hand.joints), []
     for finger, place in enumerate(places(hand)):
-        angle = place + rng.uniform(-search.swing, search.swing) - yaw
+        angle = place + rng.uniform(-SWING, SWING) - yaw
         side = np.array([np.cos(angle), np.sin(angle), 0.0])
         if finger == lifted:
-            gap = goal = rng.uniform(*search.away)
+            gap = goal = rng.uniform(*AWAY)
         else:
-            gap, goal = CLEARANCE, -rng.uniform(*search.press)
+            gap, goal = CLEARANCE, -rng.uniform(*PRESS)
         before, after = (
             turned.apply(tip_centres(constants.object_shape, side, half, hand.tip_radius, g)) for g in (gap, goal)
         )
@@ -143,31 +115,31 @@ def _attempt(
 
 
 def _held(
-    world: World, constants: EpisodeConstants, search: GraspSearch, start: Array, target: Array, yaw: float
+    world: World, constants: EpisodeConstants, start: Array, target: Array, yaw: float
 ) -> tuple[Array, ...] | None:
     """Angles, targets, position and orientation in the end; None where the object is not held at rest."""
     quaternion = Rotation.from_euler("z", yaw).as_quat()
-    settings = {"filter_time": CLOSING_TIME, "gravity_scale": 1.0, "gravity_onset": search.closing}
+    settings = {"filter_time": CLOSING_TIME, "gravity_scale": 1.0, "gravity_onset": CLOSING}
     world.reset(replace(constants, **settings), Start(start, cube_quaternion=quaternion))  # type: ignore[arg-type]
     poses = []
-    for _ in range(search.closing + search.holding):
+    for _ in range(CLOSING + HOLDING):
         world.step(target)
         poses.append(np.concatenate([world.cube_position, world.cube_quaternion]))
-        if not world.healthy or np.linalg.norm(world.cube_position) > 2.0 * search.shifted:
+        if not world.healthy or np.linalg.norm(world.cube_position) > 2.0 * SHIFTED:
             return None
-    before, after = poses[-1 - search.watched], poses[-1]
+    before, after = poses[-1 - WATCHED], poses[-1]
     turned = (Rotation.from_quat(before[3:]).inv() * Rotation.from_quat(after[3:])).magnitude()
     tilt = np.arccos(np.clip(Rotation.from_quat(after[3:]).as_matrix()[2, 2], -1.0, 1.0))
-    still = np.linalg.norm(after[:3] - before[:3]) < search.creep and turned < search.turn
-    central = np.linalg.norm(after[:3]) < search.shifted and tilt < search.tilted
-    if not (still and central and _tips_only(world, search.touching)):
+    still = np.linalg.norm(after[:3] - before[:3]) < CREEP and turned < TURN
+    central = np.linalg.norm(after[:3]) < SHIFTED and tilt < TILTED
+    if not (still and central and _tips_only(world)):
         return None
     return np.array(world.q), target, after[:3], after[3:]
 
 
-def _tips_only(world: World, touching: int) -> bool:
-    """Whether so many fingertips bear the object, and no other link or finger does."""
+def _tips_only(world: World) -> bool:
+    """Whether `TOUCHING` fingertips bear the object, and no other link or finger does."""
     pressing = [contact for contact in world.contacts() if contact.force > 0.0]
     tip_links = {finger.name: world.hand.link_names(k)[-1] for k, finger in enumerate(world.hand.fingers)}
     proper = all(one.other == "cube" and one.link == tip_links[one.finger] for one in pressing)
-    return proper and len({one.finger for one in pressing}) >= touching
+    return proper and len({one.finger for one in pressing}) >= TOUCHING

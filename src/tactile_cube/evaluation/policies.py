@@ -79,21 +79,14 @@ class RandomPolicy:
 
 
 class ReplayPolicy:
-    """Sends the targets of a recorded episode again, whatever the fingers feel.
+    """Sends the targets of a recorded episode again, whatever the fingers feel, and keeps the last one after its end.
 
-    After the recording's end the last target is kept.
+    Args:
+        targets: q_n `(n, joints)` [rad], in the encoders' coordinates.
     """
 
     def __init__(self, targets: Array) -> None:
         self._targets = targets
-
-    @classmethod
-    def from_file(cls, path: Path) -> ReplayPolicy:
-        """Read the targets from an episode that evaluate wrote (`*.npz`)."""
-        record = EpisodeRecord.load(path)
-        if record.steps == 0:
-            raise InputError(f"{path}: the recorded episode has no steps to replay")
-        return cls(record.target)
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Scale the targets to the hand's action range."""
@@ -109,19 +102,6 @@ class ScriptedPolicy:
 
     def __init__(self, gait: Gait | None = None) -> None:
         self._gait = gait or Gait()
-
-    @classmethod
-    def from_file(cls, path: Path) -> ScriptedPolicy:
-        """The best gait of a file that `benchmarks.teacher` wrote.
-
-        Raises:
-            InputError: it cannot be read, or holds no gait.
-        """
-        try:
-            best = read_yaml(path)["best"]
-            return cls(Gait(**best | {"phases": tuple(best["phases"])}))
-        except (KeyError, TypeError) as error:
-            raise InputError(f"policy=scripted:{path}: no gait of search_gait (key 'best')") from error
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Remember hand and direction."""
@@ -165,24 +145,23 @@ def find_policy(name: str | None) -> PolicySource:
 
     Args:
         name: a policy file, a folder of a training run, the name of a policy that ships with the package, "hold",
-            "random", "scripted", "scripted:FILE" (the best gait that search_gait found), "replay:FILE", or None for the
-            shipped default.
+            "random", "scripted", "scripted:FILE" (the best gait that `benchmarks.teacher` found), "replay:FILE" (an
+            episode that evaluate wrote, `*.npz`), or None for the shipped default.
 
     Raises:
         InputError: there is no such policy, or its file cannot be used.
     """
-    if name is not None and name in BASELINES:
+    if name in BASELINES:
         return PolicySource(BASELINES[name](), name)
-    if name is not None and name.startswith("scripted:"):
-        file = Path(name.removeprefix("scripted:"))
-        return PolicySource(ScriptedPolicy.from_file(file), f"scripted gait of {file.name}")
-    if name is not None and name.startswith("replay:"):
-        file = Path(name.removeprefix("replay:"))
-        return PolicySource(ReplayPolicy.from_file(file), f"replay of {file.name}")
-    return _from_file(policy_path(name))
-
-
-def _from_file(path: Path) -> PolicySource:
+    kind, separator, place = (name or "").partition(":")
+    if separator and kind == "scripted":
+        return PolicySource(ScriptedPolicy(_best_gait(Path(place))), f"scripted gait of {Path(place).name}")
+    if separator and kind == "replay":
+        record = EpisodeRecord.load(Path(place))
+        if record.steps == 0:
+            raise InputError(f"{place}: the recorded episode has no steps to replay")
+        return PolicySource(ReplayPolicy(record.target), f"replay of {Path(place).name}")
+    path = policy_path(name)
     actor, info = load_policy(path)
     joints = info.action_size
     reading = 2 * joints  # q_m and e_q
@@ -192,3 +171,11 @@ def _from_file(path: Path) -> PolicySource:
     file, label = (path.name, path.stem) if shipped else (str(path), f"{path.resolve().parent.name}/{path.stem}")
     provenance = {"file": file, **info.model_dump(exclude={"config"})}
     return PolicySource(ActorPolicy(actor), label, provenance, info.config, stack, joints)
+
+
+def _best_gait(file: Path) -> Gait:
+    try:
+        best = read_yaml(file)["best"]
+        return Gait(**best | {"phases": tuple(best["phases"])})
+    except (KeyError, TypeError) as error:
+        raise InputError(f"policy=scripted:{file}: no gait of benchmarks.teacher (key 'best')") from error

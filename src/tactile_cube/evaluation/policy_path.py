@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tactile_cube.did_you_mean import suggestion
 from tactile_cube.errors import InputError
+from tactile_cube.run_folder import CONFIGURATION
 
 BASELINES = ("hold", "random", "scripted", "scripted:GAIT.yaml", "replay:EPISODE.npz")
 """Names that are no files; evaluate knows them."""
@@ -18,7 +19,7 @@ def policy_path(name: str | None, key: str = "policy") -> Path:
     """Return the policy file that a name means.
 
     Args:
-        name: a policy file, a run's folder, or a policy that ships with the package; None takes `default`.
+        name: a policy file, a run's folder (its latest policy), or the name of a shipped policy; None takes `default`.
         key: that the user wrote the name behind.
 
     Raises:
@@ -28,7 +29,11 @@ def policy_path(name: str | None, key: str = "policy") -> Path:
         name = "default"
     path, packaged = Path(name), SHIPPED / f"{name}.safetensors"
     if path.is_dir():
-        path /= "policy.safetensors"
+        folder, path = path, path / "policy.safetensors"
+        # A training in stages has a policy of its own in the end; before that, the stage's that was written last.
+        stages = folder.glob("*/policy.safetensors") if (folder / CONFIGURATION).is_dir() else ()
+        if not path.is_file():
+            path = max(stages, key=lambda file: file.stat().st_mtime, default=path)
         if not path.is_file():
             raise InputError(f"{key}={name}: the folder holds no {path.name}; is the run's first checkpoint written?")
     if not path.is_file() and packaged.is_file():

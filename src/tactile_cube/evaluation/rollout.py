@@ -35,8 +35,7 @@ def run_episode(
     state = env.reset()
     task: RotationEnv = env.base_env.tasks[0]
     policy.start(task, seed)
-    offset = next(part.offset for part in env.transform if isinstance(part, JointOffset))
-    recorder = Recorder(task, np.broadcast_to(offset.double().numpy(), (1, task.hand.joints))[0])
+    recorder = Recorder(env)
     finished, step = False, 0
     while not finished:
         if interference is not None:
@@ -52,10 +51,12 @@ def run_episode(
 
 
 class Recorder:
-    """Gathers the samples of an episode as it runs; the first one is the start."""
+    """Gathers the samples of an episode as it runs in an environment with one world; made after its reset."""
 
-    def __init__(self, task: RotationEnv, joint_offset: Array) -> None:
-        self._task, self._joint_offset = task, joint_offset
+    def __init__(self, env: TransformedEnv) -> None:
+        task: RotationEnv = env.base_env.tasks[0]
+        offset = next(part.offset for part in env.transform if isinstance(part, JointOffset))
+        self._task, self._joint_offset = task, np.broadcast_to(offset.double().numpy(), (1, task.hand.joints))[0]
         self._fingers = tuple(finger.name for finger in task.hand.fingers)
         self._tips = [task.hand.link_names(finger)[-1] for finger in range(len(self._fingers))]
         self._rows: dict[str, list[Array]] = {name: [] for name in WORLD_SIGNALS}

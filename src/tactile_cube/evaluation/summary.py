@@ -15,25 +15,14 @@ from tactile_cube.evaluation.verdict import REGRASP_ANGLE, EpisodeResult, Episod
 
 @dataclass(frozen=True)
 class Summary:
-    """What a set of episodes comes to.
+    """What a set of episodes comes to; means over the episodes, of what `EpisodeResult` has by the same name.
 
     Attributes:
-        episodes: how many.
-        mean_angle: mean final angle [rad].
-        std_angle: its standard deviation over the episodes [rad].
-        best_angle: largest final angle [rad].
-        successes: episodes that succeeded.
+        mean_angle: of the final angles, as `std_angle` and `best_angle` are [rad].
         success_means: what success is, in words.
-        success_low: lower end of the 95 % interval of the success rate.
-        success_high: upper end.
+        success_low: lower end of the 95 % interval of the success rate; `success_high`: upper end.
         kept: episodes that ended with the cube in the hand.
         rate: mean of final angle over duration [rad/s].
-        finger_lifts: mean number of finger lifts an episode.
-        tip_support: mean share of the time in which three or more fingertips touch the cube.
-        link_contact: mean share of the time in which another link touches it.
-        link_force_share: mean share of these links in the fingers' normal force.
-        rise: mean height of the cube above its start, late in the episodes [m].
-        reward_terms: mean over the episodes of each weighed term's sum.
         verdicts: how often each verdict was given.
         exploits: how often each exploit was found.
     """
@@ -58,11 +47,15 @@ class Summary:
     exploits: dict[str, int]
 
 
+AVERAGED = ("tip_support", "link_contact", "link_force_share", "rise")
+
+
 def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> Summary:
     """Reduce episodes to a summary; `success_share` as in `Protocol`."""
     angles = np.array([result.final_angle for result in results])
     successes = sum(succeeded(results, success_share))
     low, high = wilson_interval(successes, len(results))
+    alike = {name: float(np.mean([getattr(one, name) for one in results])) for name in AVERAGED}
     return Summary(
         episodes=len(results),
         mean_angle=float(angles.mean()),
@@ -75,10 +68,7 @@ def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> 
         kept=sum(result.kept for result in results),
         rate=float(np.mean([result.final_angle / max(result.duration, 1e-9) for result in results])),
         finger_lifts=float(np.mean([sum(result.finger_lifts) for result in results])),
-        tip_support=float(np.mean([result.tip_support for result in results])),
-        link_contact=float(np.mean([result.link_contact for result in results])),
-        link_force_share=float(np.mean([result.link_force_share for result in results])),
-        rise=float(np.mean([result.rise for result in results])),
+        **alike,
         reward_terms={
             name: float(np.mean([result.reward_terms[name] for result in results])) for name in results[0].reward_terms
         },

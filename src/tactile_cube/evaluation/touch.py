@@ -16,12 +16,7 @@ FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 @dataclass(frozen=True)
 class FingerHistory:
-    """What one finger did in an episode.
-
-    Attributes:
-        lifts: how often it let go of the cube and touched it again later.
-        faces: faces of the cube in the order in which it landed on them; a face stands again after each change.
-    """
+    """How often a finger let go and touched again later, and the side faces it landed on, in their order."""
 
     lifts: int
     faces: tuple[str, ...]
@@ -41,41 +36,32 @@ def touching(record: EpisodeRecord) -> NDArray[np.bool_]:
     return result
 
 
-@dataclass(frozen=True)
-class Support:
-    """What bears the cube: samples at the ends of the policy steps, so at 10 Hz.
+def support(record: EpisodeRecord) -> dict[str, float]:
+    """What bears the cube at the ends of the policy steps; a touch is more than `TOUCH_FORCE` of a tip, or of links.
 
-    Attributes:
-        tips: share of the time in which `SUPPORTING_TIPS` fingertips or more touch it.
-        links: share of the time in which a link touches it that is no fingertip.
-        link_force: these links' share of all normal force of the fingers; 0 without any force.
+    Returns:
+        tip_support: share of the time in which `SUPPORTING_TIPS` fingertips or more touch it. link_contact: share of
+        the time in which a link touches it that is no fingertip. link_force_share: these links' share of all normal
+        force of the fingers; 0 without any force.
     """
-
-    tips: float
-    links: float
-    link_force: float
-
-
-def support(record: EpisodeRecord) -> Support:
-    """Sum up the contacts of an episode; a touch is more than `TOUCH_FORCE` from a finger's tip or its other links."""
     table, fingers = record.contacts, len(record.fingers)
     force = np.zeros((2, record.steps + 1, fingers))
     np.add.at(force, (table.tip.astype(np.int64), table.step, table.finger), table.normal_force)
     links, tips = force[:, 1:]  # without the start, where no force has acted yet
     total = float(links.sum() + tips.sum())
-    return Support(
-        tips=float(((tips > TOUCH_FORCE).sum(axis=1) >= SUPPORTING_TIPS).mean()),
-        links=float((links > TOUCH_FORCE).any(axis=1).mean()),
-        link_force=float(links.sum()) / total if total > 0.0 else 0.0,
-    )
+    return {
+        "tip_support": float(((tips > TOUCH_FORCE).sum(axis=1) >= SUPPORTING_TIPS).mean()),
+        "link_contact": float((links > TOUCH_FORCE).any(axis=1).mean()),
+        "link_force_share": float(links.sum()) / total if total > 0.0 else 0.0,
+    }
 
 
 def touched_faces(record: EpisodeRecord) -> NDArray[np.int64]:
     """Return the face of each contact row `(k,)`: an index into `FACES`, in the cube's own frame."""
     table = record.contacts
-    orientation = Rotation.from_quat(record.cube_quaternion[table.step]) if len(table.step) else None
-    if orientation is None:
+    if not len(table.step):
         return np.zeros(0, dtype=np.int64)
+    orientation = Rotation.from_quat(record.cube_quaternion[table.step])
     local = orientation.inv().apply(table.position - record.cube_position[table.step])
     scaled = local / (record.cube_size / 2)
     axis = np.argmax(np.abs(scaled), axis=1)

@@ -15,6 +15,7 @@ from tactile_cube.errors import InputError
 ANGLE, STEPS = "final_angle", "steps"
 CURRICULUM = ("T_s", "gravity")
 """What a curriculum moves, [s] and share of the weight."""
+MEDIANS = ("million steps: median (interval)", "angle at the end [rad]: median (interval)", "CPU hours of all runs")
 COSTS = ("simulating_hours", "learning_hours")
 REGRASPING = 3.0
 """Mean final angle [rad] that shows regrasping in training: with starts turned by up to 43 deg a single twist comes to
@@ -58,14 +59,6 @@ def read_curve(path: Path, label: str) -> Curve:
     return Curve(label, {name: [float(row[name] or "nan") for row in rows] for name in rows[0]})
 
 
-def curriculum_ends(curve: Curve) -> list[int]:
-    """Return the rows in which the curriculum begins and ends, or nothing where it never moved."""
-    columns = [curve.columns[name] for name in CURRICULUM if name in curve.columns]
-    values = list(zip(*columns, strict=True))
-    moving = [row for row in range(1, len(values)) if values[row] != values[row - 1]]
-    return [moving[0], moving[-1]] if moving else []
-
-
 def regrasping_begins(curve: Curve) -> int | None:
     """Return the row in which the mean final angle of the last 50 episodes first exceeds `REGRASPING`, or None."""
     episodes = curve.columns.get("episodes", [WINDOW_FILL] * len(curve.columns[STEPS]))
@@ -75,12 +68,6 @@ def regrasping_begins(curve: Curve) -> int | None:
     return None
 
 
-def cpu_hours(curve: Curve, index: int) -> float:
-    """Return the processor time spent on simulating and learning up to a row [h]."""
-    return sum(curve.columns[name][index] for name in COSTS if name in curve.columns)
-
-
-INTERVALS = ("million steps: median (interval)", "angle at the end [rad]: median (interval)", "CPU hours of all runs")
 RUN = re.compile(r"(?:(?P<setting>.+)-)?seed(?P<seed>\d+)$")
 _FILTER_TIME = re.compile(r"task\.filter_time=(?P<time>[\d.]+)-(?P<task>task=\w+)$")
 
@@ -106,30 +93,19 @@ def read_sweep(folder: Path) -> dict[str, dict[int, Curve]]:
     return runs
 
 
-def sweep_table(
-    runs: Mapping[str, Mapping[int, Curve]], paper: Mapping[str, str] | None = None, intervals: bool = False
-) -> str:
-    """Return the table of the runs, a line each setting.
+def sweep_table(runs: Mapping[str, Mapping[int, Curve]], paper: Mapping[str, str] | None = None) -> str:
+    """Return the table of the runs, a line each setting; medians over the seeds with their `median_interval`.
 
     Args:
         runs: from `read_sweep`.
         paper: published column by setting; its settings are the lines then, those without a run as such.
-        intervals: add columns of medians over the seeds, each with the interval of `median_interval`.
     """
-    head = [
-        "setting",
-        *(["paper, million steps"] if paper else []),
-        "million steps, seed by seed",
-        "CPU hours (median)",
-        *(INTERVALS if intervals else []),
-    ]
+    head = ["setting", *(["paper, million steps"] if paper else []), "million steps, seed by seed", *MEDIANS]
     lines = [head, ["---"] * len(head)]
     for setting in paper or sorted(runs):
-        known = [paper[setting]] if paper else []
-        curves = runs.get(setting, {})
-        steps = ", ".join(_until(curves[seed]) for seed in sorted(curves))
-        more = _over_seeds(list(curves.values())) if intervals else []
-        lines.append([setting, *known, steps or "not run", _median_cost(list(curves.values())), *more])
+        curves = [curve for _, curve in sorted(runs.get(setting, {}).items())]
+        steps = ", ".join(map(_until, curves)) or "not run"
+        lines.append([setting, *([paper[setting]] if paper else []), steps, *_over_seeds(curves)])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
@@ -151,12 +127,12 @@ def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
 
 def _over_seeds(curves: Sequence[Curve]) -> list[str]:
     if not curves:
-        return [""] * len(INTERVALS)
+        return [""] * len(MEDIANS)
     begun = [(curve, regrasping_begins(curve)) for curve in curves]
     steps = [float("inf") if row is None else curve.columns[STEPS][row] / 1e6 for curve, row in begun]
     angles = [curve.columns[ANGLE][-1] for curve in curves]
-    hours = [cpu_hours(curve, -1) for curve in curves]
-    return [_interval(steps, 3), _interval(angles, 2), f"{sum(hours):.3f}"]
+    hours = sum(curve.columns[name][-1] for curve in curves for name in COSTS if name in curve.columns)
+    return [_interval(steps, 3), _interval(angles, 2), f"{hours:.3f}"]
 
 
 def _interval(values: Sequence[float], digits: int) -> str:
@@ -169,11 +145,3 @@ def _until(curve: Curve) -> str:
     if row is not None:
         return f"{curve.columns[STEPS][row] / 1e6:.3f}"
     return f"> {curve.columns[STEPS][-1] / 1e6:.3f} (at {curve.columns[ANGLE][-1]:.1f} rad)"
-
-
-def _median_cost(curves: Sequence[Curve]) -> str:
-    """Median over the runs; a run that does not regrasp counts as dearer than all others."""
-    begun = [(curve, regrasping_begins(curve)) for curve in curves]
-    costs = [float("inf") if row is None else cpu_hours(curve, row) for curve, row in begun]
-    middle = median(costs) if costs else float("inf")
-    return f"{middle:.3f}" if middle < float("inf") else "-"

@@ -20,14 +20,6 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 from tactile_cube.transforms import EnvConfig
 
 
-def senses(hand: Hand) -> dict[str, NDArray[np.bool_]]:
-    """Which of the numbers of a reading belong to each sense: measured angles, control errors, all of one finger's."""
-    places = np.arange(2 * hand.joints)
-    finger = places % hand.joints // hand.joints_per_finger
-    own = {one.name: finger == index for index, one in enumerate(hand.fingers)}
-    return {"q_m": places < hand.joints, "e_q": places >= hand.joints, **own}
-
-
 class NumbPolicy:
     """Another policy whose senses are partly frozen at the first observation of the episode."""
 
@@ -47,16 +39,19 @@ class NumbPolicy:
 
 
 def numb_reading(numb: Sequence[str], hand: Hand = DLR_HAND2) -> NDArray[np.bool_]:
-    """Return which of the numbers of a reading are frozen.
+    """Return which of the numbers of a reading are frozen: measured angles, control errors, all of one finger's.
 
     Raises:
         InputError: there is no such sense.
     """
-    known = senses(hand)
+    places = np.arange(2 * hand.joints)
+    finger = places % hand.joints // hand.joints_per_finger
+    senses = {"q_m": places < hand.joints, "e_q": places >= hand.joints}
+    senses |= {one.name: finger == index for index, one in enumerate(hand.fingers)}
     for name in numb:
-        if name not in known:
-            raise InputError(f"variant.numb has {name!r}; choose from {', '.join(known)}")
-    return np.any([known[name] for name in numb], axis=0) if numb else np.zeros(2 * hand.joints, dtype=np.bool_)
+        if name not in senses:
+            raise InputError(f"variant.numb has {name!r}; choose from {', '.join(senses)}")
+    return np.isin(places, [place for name in numb for place in np.flatnonzero(senses[name])])
 
 
 CONSTANTS = tuple(field.name for field in dataclasses.fields(EpisodeConstants))
@@ -144,10 +139,7 @@ class Variant:
             constants=dataclasses.replace(config.constants, **constants),
             randomization=dataclasses.replace(config.randomization, values=values),
             simulation=dataclasses.replace(config.simulation, **self.simulation),
-            effects=[
-                *config.effects,
-                *(effect for name in self.effects for effect in typical_effects(name, config.hand)),
-            ],
+            effects=[*config.effects, *(one for name in self.effects for one in typical_effects(name, config.hand))],
         )
 
 

@@ -63,9 +63,7 @@ class EpisodeResult:
         faces_visited: different side faces each finger has stood on, ring to thumb.
         max_tilt: largest tilt of the cube [rad].
         rise: mean height of the cube above its start in the last `LATE_SHARE` of the episode [m].
-        tip_support: share of the time in which three or more fingertips touch the cube.
-        link_contact: share of the time in which another link touches it.
-        link_force_share: these links' share of the fingers' normal force.
+        tip_support: as `link_contact` and `link_force_share`: see `touch.support`.
         reward_terms: sum of each weighed term of the reward.
         exploits: names of physical exploits found; empty when the turning is honest.
         world: constants of its world, SI units, as `EpisodeRecord.constants` has them.
@@ -106,7 +104,7 @@ def judge_episode(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> Epi
     angle = float(record.theta[-1] - record.theta[0])
     begin = round((1.0 - LATE_SHARE) * record.steps)
     late = float(record.theta[-1] - record.theta[begin])
-    changes, borne = tuple(history.face_changes for history in histories), support(record)
+    changes = tuple(history.face_changes for history in histories)
     return EpisodeResult(
         episode=episode,
         seed=seed,
@@ -120,9 +118,7 @@ def judge_episode(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> Epi
         faces_visited=tuple(len(set(history.faces)) for history in histories),
         max_tilt=float(np.max(cube_tilt(record))),
         rise=float(np.mean(record.cube_position[begin:, 2]) - record.cube_position[0, 2]),
-        tip_support=borne.tips,
-        link_contact=borne.links,
-        link_force_share=borne.link_force,
+        **support(record),
         reward_terms={name: float(np.sum(term)) for name, term in record.reward_terms.items()},
         exploits=tuple(exploits(record)),
         world=dict(record.constants),

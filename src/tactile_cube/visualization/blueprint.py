@@ -19,16 +19,12 @@ class EpisodeViews:
     """The views of one episode.
 
     Attributes:
-        fingers: names of the hand's fingers.
         hand_name: of the robot in the hand's URDF.
         root: path below which the episode was written, "/" or e.g. "/best".
-        window: seconds before the cursor that the signals show; None: the whole episode.
     """
 
-    fingers: Sequence[str]
     hand_name: str
     root: str = "/"
-    window: float | None = None
 
     def scene(self, name: str = "Hand and cube") -> rrb.View:
         """Hand, object, contact forces and trail in 3D."""
@@ -46,15 +42,14 @@ class EpisodeViews:
         )
 
     def theta(self) -> rrb.View:
-        """How far the object was turned, all of it."""
+        """How far the object was turned."""
         return rrb.TimeSeriesView(name="theta [rad]", origin=self._at("task/theta"))
 
     def task(self) -> list[rrb.View]:
-        """Rewards, forces, conditions, and the episode in words."""
+        """Rewards, forces, and the episode in words."""
         return [
             self._curves("reward terms", "task/reward"),
             self._curves("forces [N]", "task/force"),
-            self._curves("T_s [s], gravity", "curriculum"),
             rrb.TextDocumentView(name="Episode", origin=self._at("episode")),
         ]
 
@@ -80,10 +75,7 @@ class EpisodeViews:
 
     def _curves(self, name: str, origin: str, *entities: str) -> rrb.View:
         contents = [self._at(entity) for entity in entities] or "$origin/**"
-        ranges = None if self.window is None else [last_seconds(self.window)]
-        return rrb.TimeSeriesView(
-            name=name, origin=self._at(origin), contents=contents, plot_legend=LEGEND, time_ranges=ranges
-        )
+        return rrb.TimeSeriesView(name=name, origin=self._at(origin), contents=contents, plot_legend=LEGEND)
 
     def _at(self, entity: str) -> str:
         return f"{self.root.rstrip('/')}/{entity}".rstrip("/") or "/"
@@ -96,8 +88,11 @@ def episode_blueprint(fingers: Sequence[str], hand_name: str) -> rrb.Blueprint:
         fingers: names of the hand's fingers.
         hand_name: of the robot in the hand's URDF.
     """
-    views = EpisodeViews(fingers, hand_name)
-    return _one_episode(views, views.task())
+    views = EpisodeViews(hand_name)
+    left = rrb.Vertical(views.scene(), views.theta(), row_shares=[4, 1])
+    joints = rrb.Tabs(*(views.finger(finger) for finger in fingers))
+    right = rrb.Vertical(rrb.Tabs(*views.task()), joints, row_shares=[2, 3])
+    return whole(rrb.Horizontal(left, right, column_shares=[5, 4]))
 
 
 def pair_blueprint(fingers: Sequence[str], hand_name: str, names: dict[str, str], curves: bool) -> rrb.Blueprint:
@@ -111,38 +106,15 @@ def pair_blueprint(fingers: Sequence[str], hand_name: str, names: dict[str, str]
     """
     sides = []
     for root, name in names.items():
-        views = EpisodeViews(fingers, hand_name, f"/{root}")
+        views = EpisodeViews(hand_name, f"/{root}")
         signals = rrb.Tabs(views.theta(), *views.task(), *(views.finger(finger) for finger in fingers))
         sides.append(rrb.Vertical(views.scene(name), signals, row_shares=[3, 2]))
     episodes = rrb.Horizontal(*sides)
     if not curves:
         return whole(episodes)
+    learning = rrb.Spatial2DView(name="Learning curves", origin="/curves", background=(255, 255, 255))
     words = rrb.TextDocumentView(name="Run", origin="/run")
-    return whole(rrb.Horizontal(episodes, rrb.Vertical(_learning_curves(), words), column_shares=[5, 2]))
-
-
-def live_blueprint(fingers: Sequence[str], hand_name: str, seconds: float) -> rrb.Blueprint:
-    """Return the layout for episodes that follow one another while a run learns.
-
-    Args:
-        fingers: names of the hand's fingers.
-        hand_name: of the robot in the hand's URDF.
-        seconds: an episode lasts at most [s]: so much of the signals is shown.
-    """
-    views = EpisodeViews(fingers, hand_name, window=seconds)
-    return _one_episode(views, [_learning_curves(), *views.task()])
-
-
-def _learning_curves() -> rrb.View:
-    return rrb.Spatial2DView(name="Learning curves", origin="/curves", background=(255, 255, 255))
-
-
-def _one_episode(views: EpisodeViews, task: Sequence[rrb.View]) -> rrb.Blueprint:
-    """Scene and theta on the left; on the right what concerns the task, below it the signals of a finger."""
-    left = rrb.Vertical(views.scene(), views.theta(), row_shares=[4, 1])
-    joints = rrb.Tabs(*(views.finger(finger) for finger in views.fingers))
-    right = rrb.Vertical(rrb.Tabs(*task), joints, row_shares=[2, 3])
-    return whole(rrb.Horizontal(left, right, column_shares=[5, 4]))
+    return whole(rrb.Horizontal(episodes, rrb.Vertical(learning, words), column_shares=[5, 2]))
 
 
 def whole(views: rrb.Container) -> rrb.Blueprint:
@@ -153,9 +125,3 @@ def whole(views: rrb.Container) -> rrb.Blueprint:
         rrb.SelectionPanel(state="hidden"),
         rrb.BlueprintPanel(state="hidden"),
     )
-
-
-def last_seconds(seconds: float) -> rrb.VisibleTimeRange:
-    """From so many seconds before the cursor to the cursor."""
-    start, end = rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds), rrb.TimeRangeBoundary.cursor_relative()
-    return rrb.VisibleTimeRange(TIMELINE, start=start, end=end)

@@ -28,14 +28,13 @@ STYLE: Any = {
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its interval; `neutral` is where it would change nothing."""
+    """A value with its interval."""
 
     name: str
     value: float
     low: float
     high: float
     unit: str
-    neutral: float | None = None
 
 
 @matplotlib.rc_context(STYLE)
@@ -111,15 +110,14 @@ def heat_map(rows: Sequence[str], columns: Sequence[str], values: Sequence[Seque
 
 @matplotlib.rc_context(STYLE)
 def interval_chart(intervals: Sequence[Interval]) -> str:
-    """One row a value, each on an axis of its own: the interval as a bar, the value as a dot, the neutral as a tick."""
+    """One row a value, each on an axis of its own: the interval as a bar, the value as a dot."""
     axes = empty_chart(ROW * len(intervals) + 12, left=330, right=250, top=6, bottom=6)
     for row, one in enumerate(intervals):
-        known = [one.low, one.high, one.value, *([] if one.neutral is None else [one.neutral])]
+        known = [one.low, one.high, one.value]
         width = (max(known) - min(known)) or 1.0
-        low, high, value, *neutral = [(place - min(known)) / width for place in known]
+        low, high, value = [(place - min(known)) / width for place in known]
         axes.hlines(row, low, high, color="#80b9d9", linewidth=7)
         axes.plot(value, row, "o", color=SIMULATED)
-        axes.plot(neutral, [row] * len(neutral), "|", color=FLOOR, markersize=16, markeredgewidth=2)
         label = f"{one.value:.4g} {one.unit} [{one.low:.4g}, {one.high:.4g}]"
         axes.annotate(label, (1, row), (14, 0), axes.get_yaxis_transform(), textcoords="offset points", va="center")
     axes.set(yticks=range(len(intervals)), yticklabels=[one.name for one in intervals], xticks=[], xlim=(-0.08, 1.08))

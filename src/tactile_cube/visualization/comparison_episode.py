@@ -11,24 +11,19 @@ from numpy.typing import NDArray
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
+from tactile_cube.visualization.blueprint import whole
 from tactile_cube.visualization.comparison_figures import marked
-from tactile_cube.visualization.rerun_recording import TIMELINE, Branch, log_robot, recording_file
+from tactile_cube.visualization.comparison_report import outcome
+from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file
 
 Array = NDArray[np.float64]
 POSE_RATE = 50.0  # [Hz] of the robot's poses
 SIGNAL_RATE = 250.0  # [Hz] of the signals at most
 PAUSE = 1.0  # [s] between two trials on the time line
-COLORS = {
-    "command": (140, 140, 140),
-    "measured": (230, 130, 20),
-    "simulated": (80, 150, 255),
-    "measured - simulated": (80, 150, 255),
-    "measured, failing": (230, 60, 60),
-    "measured - simulated, failing": (230, 60, 60),
-}
+COMMAND, MEASURED, SIMULATED, FAILING = (140, 140, 140), (230, 130, 20), (80, 150, 255), (230, 60, 60)
 
 
-def write_comparison(comparison: Comparison, path: Path, summary: str) -> None:
+def write_comparison(comparison: Comparison, path: Path) -> None:
     """Write the recording with its blueprint; open it with `rerun FILE.rrd`.
 
     The trials follow one another on the time line. The robot moves as measured; a joint that fails is plotted in red.
@@ -36,16 +31,15 @@ def write_comparison(comparison: Comparison, path: Path, summary: str) -> None:
     Args:
         comparison: what was compared.
         path: file to write, `.rrd`.
-        summary: Markdown shown beside the robot.
     """
     starts = trial_starts(comparison)
-    with recording_file(path, blueprint(comparison), "tactile_cube_compare") as stream:
+    with recording_file(path, _blueprint(comparison), "tactile_cube_compare") as stream:
         branch = Branch(stream)
         _log_robot(branch, comparison, starts)
         for index, joint in enumerate(comparison.recording.joints):
             _log_joint(branch, comparison, index, joint, starts)
         _log_events(branch, comparison, starts)
-        branch.always("summary", rr.TextDocument(summary, media_type="text/markdown"))
+        branch.always("summary", rr.TextDocument(_in_words(comparison), media_type="text/markdown"))
 
 
 def trial_starts(comparison: Comparison) -> list[float]:
@@ -54,7 +48,7 @@ def trial_starts(comparison: Comparison) -> list[float]:
     return [float(start) for start in np.concatenate([[0.0], np.cumsum(lengths)[:-1]])]
 
 
-def blueprint(comparison: Comparison) -> rrb.Blueprint:
+def _blueprint(comparison: Comparison) -> rrb.Blueprint:
     """The robot and a summary on the left, one tab a joint on the right."""
     tabs = [
         rrb.Vertical(
@@ -76,12 +70,18 @@ def blueprint(comparison: Comparison) -> rrb.Blueprint:
         row_shares=[3, 2],
     )
     active = list(comparison.recording.joints).index(worst)
-    return rrb.Blueprint(
-        rrb.Horizontal(left, rrb.Tabs(*tabs, active_tab=active), column_shares=[2, 3]),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-    )
+    return whole(rrb.Horizontal(left, rrb.Tabs(*tabs, active_tab=active), column_shares=[2, 3]))
+
+
+def _in_words(comparison: Comparison) -> str:
+    units, floors = comparison.recording.units, comparison.floor.joints
+    rows = [
+        f"| {joint} | {milli(error, units[joint])} | {milli(floors[joint], units[joint])} |"
+        for joint, error in comparison.errors.joints.items()
+    ]
+    table = ["| joint | error | noise floor |", "|---|---|---|", *rows]
+    where = [f"- {sentence}" for sentence in comparison.sentences]
+    return "\n".join([f"# {comparison.recording.name}", "", outcome(comparison), "", *table, "", *where])
 
 
 def _log_robot(branch: Branch, comparison: Comparison, starts: list[float]) -> None:
@@ -94,30 +94,22 @@ def _log_robot(branch: Branch, comparison: Comparison, starts: list[float]) -> N
     stride = max(1, round(recording.rate / POSE_RATE))
     time = np.concatenate([start + t.time[::stride] for start, t in zip(starts, recording.trials, strict=True)])
     angles = np.concatenate([trial.position[::stride] for trial in recording.trials])
+    moving = {name: angles[:, index] for index, name in enumerate(recording.joints)}
+    for name, coupling in recording.coupled.items():
+        moving.setdefault(name, coupling.ratio * moving[coupling.joint] + coupling.offset)
     for joint in tree.joints():
-        values = _joint_angle(comparison, joint.name, angles)
-        if values is not None:
-            transform = joint.compute_transform_columns(values.tolist(), clamp=False)
+        if joint.name in moving:
+            transform = joint.compute_transform_columns(moving[joint.name].tolist(), clamp=False)
             branch.columns(f"robot/joint_transforms/{joint.name}", time, transform)
-
-
-def _joint_angle(comparison: Comparison, name: str, angles: Array) -> Array | None:
-    recording = comparison.recording
-    if name in recording.joints:
-        return angles[:, recording.joints.index(name)]
-    if name in recording.coupled:
-        coupling = recording.coupled[name]
-        return coupling.ratio * angles[:, recording.joints.index(coupling.joint)] + coupling.offset
-    return None
 
 
 def _log_joint(branch: Branch, comparison: Comparison, index: int, joint: str, starts: list[float]) -> None:
     recording, trials = comparison.recording, comparison.recording.trials
     stride = max(1, round(recording.rate / SIGNAL_RATE))
 
-    def joined(parts: Sequence[Array], pause: float = np.nan) -> Array:
+    def joined(parts: Sequence[Array]) -> Array:
         """All trials on one time line; a missing sample after each interrupts the curve."""
-        return np.concatenate([np.append(part[::stride], pause) for part in parts])
+        return np.concatenate([np.append(part[::stride], np.nan) for part in parts])
 
     time = joined([start + trial.time for start, trial in zip(starts, trials, strict=True)])
     time = np.where(np.isnan(time), np.roll(time, 1) + 1e-3, time)
@@ -125,16 +117,24 @@ def _log_joint(branch: Branch, comparison: Comparison, index: int, joint: str, s
     for number, start in enumerate(starts):
         for begin, end in marked(comparison, number, index):
             failing |= (time >= start + begin) & (time <= start + end)
+
+    def send(entity: str, name: str, colour: tuple[int, int, int], values: Array, width: float = 1.2) -> None:
+        branch.always(entity, rr.SeriesLines(names=[name], colors=[colour], widths=[width]))
+        branch.columns(entity, time, rr.Scalars.columns(scalars=values))
+
     measured = joined([trial.position[:, index] for trial in trials])
     residual = 1e3 * joined([error[:, index] for error in comparison.residuals])
     angle, error = f"joints/{joint}/angle", f"joints/{joint}/error"
     if not recording.torque_controlled:
-        _send(branch, f"{angle}/command", time, joined([trial.command[:, index] for trial in trials]), "command")
+        send(f"{angle}/command", "command", COMMAND, joined([trial.command[:, index] for trial in trials]))
     simulated = joined([one.position[:, index] for one in comparison.simulated])
-    _send(branch, f"{angle}/simulated", time, simulated, "simulated")
-    for entity, name, values in ((angle, "measured", measured), (error, "measured - simulated", residual)):
-        _send(branch, f"{entity}/good", time, np.where(failing, np.nan, values), name)
-        _send(branch, f"{entity}/failing", time, np.where(failing, values, np.nan), f"{name}, failing")
+    send(f"{angle}/simulated", "simulated", SIMULATED, simulated)
+    for entity, name, colour, values in (
+        (angle, "measured", MEASURED, measured),
+        (error, "measured - simulated", SIMULATED, residual),
+    ):
+        send(f"{entity}/good", name, colour, np.where(failing, np.nan, values))
+        send(f"{entity}/failing", f"{name}, failing", FAILING, np.where(failing, values, np.nan), 2.0)
 
 
 def _log_events(branch: Branch, comparison: Comparison, starts: list[float]) -> None:
@@ -145,9 +145,3 @@ def _log_events(branch: Branch, comparison: Comparison, starts: list[float]) -> 
     for one in comparison.failing_intervals:
         line = f"{one.joint} in {one.trial}: {one.start:.2f} .. {one.end:.2f} s, {milli(one.error, units[one.joint])}"
         branch.log("failing", rr.TextLog(line, level=rr.TextLogLevel.WARN), begin[one.trial] + one.start)
-
-
-def _send(branch: Branch, entity: str, time: Array, values: Array, name: str) -> None:
-    width = 2.0 if "failing" in name else 1.2
-    branch.always(entity, rr.SeriesLines(names=[name], colors=[COLORS[name]], widths=[width]))
-    branch.columns(entity, time, rr.Scalars.columns(scalars=values))

@@ -1,12 +1,12 @@
-"""The report of `compare`: how well the model follows, where it fails, how sure that is, what to do next."""
+"""What `compare` says in the terminal and in its report: how well the model follows, where it fails, how sure."""
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.units import common_unit, milli, short
+from tactile_cube.measurement.units import THOUSANDTHS, common_unit, milli, short
 from tactile_cube.visualization import comparison_figures as figures
-from tactile_cube.visualization.comparison_summary import floor_source, outcome
-from tactile_cube.visualization.report import Block, Callout, Figure, Listing, Report, Section, Table, Tile, Tone
+from tactile_cube.visualization.report import Block, Figure, Listing, Report, Section, Table
 
 MOST_OVERLAYS = 6
 MOST_CORRELATIONS = 8
@@ -15,10 +15,63 @@ FLOORS = {
     "repeats": "The noise floor is the scatter of repeats: how much trials of one command differ. It contains sensor "
     "noise and what the machine does not repeat.",
     "guess": "Nothing was repeated, so the noise floor is a guess: the position sensor's noise, from the fast part of "
-    "the signals and the sensor's resolution. It does not contain what the machine does not repeat.",
+    "the signals and the sensor's resolution. It does not contain what the machine does not repeat: repeat each kind "
+    "of trial to measure that.",
     "contact": "The noise floor is the error of a grasp with all true contact effects: drives are known to some 10 % "
     "only, and the contact solver stops early. Joint offsets and the object's place are fitted to each trial.",
 }
+
+
+def summary(comparison: Comparison) -> str:
+    """What the command line prints: the answer, one line a joint, where it fails."""
+    errors, floor, raw = comparison.errors, comparison.floor, comparison.raw[0]
+    unit = common_unit(comparison.recording.units.values())
+    rows = [
+        f"{joint:<16}{_numbers(error, floor.joints[joint], raw.joints[joint])}{comparison.fit[joint]:>7.1f} %"
+        for joint, error in errors.joints.items()
+    ]
+    lines = [
+        outcome(comparison),
+        "",
+        f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor      raw      fit",
+        *rows,
+        f"{'all':<16}{_numbers(errors.overall, floor.overall, raw.overall)}",
+        f"RMS of free runs from the first state, {THOUSANDTHS[unit]}. error: the joint offsets of each initialisation "
+        "removed; raw: nothing removed; fit: 100 % (1 - |raw error| / |motion|)",
+        "",
+        f"noise floor: {_source(floor)}",
+    ]
+    step = f"the simulator's own time step, {1e3 * comparison.step:g} ms,"
+    for name, by_joint in (("sensor noise", floor.sensor), (step, floor.step_size)):
+        if by_joint:
+            size = (sum(value**2 for value in by_joint.values()) / len(by_joint)) ** 0.5
+            lines.append(f"beside it: {name} {milli(size, unit)}")
+    if (band := comparison.band) is not None:
+        share = f"{100 * band.inside:.0f} % of the samples"
+        lines.append(f"measured inside the band of {band.simulations} simulations: {share}")
+    return "\n".join([*lines, "", *(f"- {sentence}" for sentence in comparison.sentences)])
+
+
+def outcome(comparison: Comparison) -> str:
+    """The result in one or two sentences."""
+    unit = common_unit(comparison.recording.units.values())
+    head = (
+        f"The simulated joints are {milli(comparison.errors.overall, unit)} (RMS) away from the measured ones; "
+        f"{milli(comparison.floor.overall, unit)} would be noise alone."
+    )
+    if comparison.at_the_floor:
+        return f"{head} The model is as good as this recording can tell."
+    return f"{head} That is {short(comparison.ratio)} times the noise: {comparison.sentences[0]}."
+
+
+def _numbers(error: float, floor: float, raw: float) -> str:
+    return f"{1e3 * error:>9.3f}{1e3 * floor:>9.3f}{error / floor:>15.2f}{1e3 * raw:>9.3f}"
+
+
+def _source(floor: NoiseFloor) -> str:
+    if floor.source == "contact":
+        return "what a world with the true effects leaves of a grasp"
+    return f"scatter of {floor.repeats} repeats" if floor.source == "repeats" else "sensor noise, a guess: no repeats"
 
 
 def recording_section(recording: Recording, model: ModelFile | None) -> Section:
@@ -26,29 +79,26 @@ def recording_section(recording: Recording, model: ModelFile | None) -> Section:
     seconds = sum(trial.duration for trial in recording.trials)
     kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
     starts = len({trial.initialisation for trial in recording.trials})
+    coupled = f" (coupled: {', '.join(recording.coupled)})" if recording.coupled else ""
     said = "the values stated in recording.yaml"
     if model is not None:
         effects = ", ".join(one.effect for one in model.effects) or "no added effect"
         said = f"a model file: values for {', '.join(model.values) or 'no constant'}; {effects}"
     rows = [
         ("recording", str(recording.folder)),
-        (
-            "joints",
-            ", ".join(recording.joints) + (f" (coupled: {', '.join(recording.coupled)})" if recording.coupled else ""),
-        ),
+        ("joints", ", ".join(recording.joints) + coupled),
         ("trials", f"{len(recording.trials)} of {kinds}; {seconds:.0f} s at {recording.rate:g} Hz"),
         ("robot initialisations", f"{starts}, each with joint offsets of its own"),
         ("simulated with", said),
     ]
-    more = len(recording.warnings) - MOST_WARNINGS
-    shown = [*recording.warnings[:MOST_WARNINGS], *([f"and {more} more, see the terminal"] if more > 0 else [])]
-    odd = Callout(f"{len(recording.warnings)} things were odd about this recording:", "warn")
-    warnings: list[Block] = [odd, Listing(shown)] if shown else []
+    rows += [("odd", warning) for warning in recording.warnings[:MOST_WARNINGS]]
+    if (more := len(recording.warnings) - MOST_WARNINGS) > 0:
+        rows.append(("odd", f"and {more} more, see the terminal"))
     text = [
         "The simulation received the rig's commands. It started where the rig started and ran freely to the end of "
         "each trial: nothing pulls it back to the measurement."
     ]
-    return Section("What was compared", text, [Table(("", ""), rows), *warnings])
+    return Section("What was compared", text, [Table(("", ""), rows)])
 
 
 def error_section(comparison: Comparison) -> Section:
@@ -75,8 +125,7 @@ def error_section(comparison: Comparison) -> Section:
         "what the simulator's time step adds to any model's error."
     ]
     header = ("joint", "error (RMS)", "noise floor", "error / floor", "sensor noise", "time step")
-    guess = [Callout("The noise floor is a guess: repeat each kind of trial to measure it.", "warn")]
-    return Section("How well", text, [Table(header, rows), *(guess if floor.source == "guess" else [])])
+    return Section("How well", text, [Table(header, rows)])
 
 
 def where_section(comparison: Comparison, title: str = "Where it fails") -> Section:
@@ -86,8 +135,7 @@ def where_section(comparison: Comparison, title: str = "Where it fails") -> Sect
         "row hints at what is missing. Friction shows just after reversals and at low speed, delay and inertia at high "
         "speed, gravity and springs by joint position."
     )
-    blocks: list[Block] = [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)]
-    return Section(title, (), blocks)
+    return Section(title, (), [Listing(comparison.sentences), Figure(figures.regime_map(comparison), caption)])
 
 
 def overlay_section(
@@ -105,12 +153,9 @@ def overlay_section(
         fell = error if before is None else f"{milli(before.trials[trial].joints[name], unit)} before, {error} after"
         caption = f"{name}, its worst trial {one.name} ({one.kind}): {fell}."
         blocks.append(Figure(figures.overlay(comparison, trial, joint, before), caption))
-        if before is None:
-            said = "Shaded: more than three noise floors."
-        else:
-            said = "Before and after, beside what noise alone leaves."
+        shaded = "Shaded: more than three noise floors." if before is None else "Before, after and noise alone."
         left = figures.residual(comparison, trial, joint, before)
-        blocks.append(Figure(left, f"What the simulation did not follow. {said}"))
+        blocks.append(Figure(left, f"What the simulation did not follow. {shaded}"))
     return Section(title, (), blocks)
 
 
@@ -124,17 +169,13 @@ def band_section(comparison: Comparison) -> list[Section]:
         f"{100 * comparison.band.inside:.0f} % do."
     ]
     rows = [(joint, f"{100 * share:.0f} %") for joint, share in comparison.band.joints.items()]
-    blocks: list[Figure | Table] = [Table(("joint", "measured samples inside"), rows)]
+    blocks: list[Block] = [Table(("joint", "measured samples inside"), rows)]
     for name in list(comparison.errors.joints)[:MOST_OVERLAYS]:
         joint = comparison.recording.joints.index(name)
         trial = figures.worst_trial(comparison, joint)
-        trial_name = comparison.recording.trials[trial].name
-        blocks.append(
-            Figure(
-                figures.band(comparison, trial, joint),
-                f"{name} in {trial_name}: difference from the simulation with the central values.",
-            )
-        )
+        where = f"{name} in {comparison.recording.trials[trial].name}"
+        caption = f"{where}: difference from the simulation with the central values."
+        blocks.append(Figure(figures.band(comparison, trial, joint), caption))
     return [Section("Among randomised simulations", text, blocks)]
 
 
@@ -143,8 +184,8 @@ def test_section(comparison: Comparison) -> Section:
     floor = comparison.floor.joints
     ratios = {joint: error / floor[joint] for joint, error in comparison.errors.joints.items()}
     memory = {one.joint: f"{1e3 * one.correlation_time:.0f} ms" for one in comparison.whiteness}
-    rows = [(joint, f"{ratio:.2f}", memory[joint], _what_is_left(ratio)) for joint, ratio in ratios.items()]
-    table = Table(("joint", "left, in noise floors", "correlation time of the error", "in words"), rows)
+    rows = [(joint, f"{ratio:.2f}", memory[joint]) for joint, ratio in ratios.items()]
+    table = Table(("joint", "left, in noise floors", "correlation time of the error"), rows)
     above = [joint for joint, ratio in ratios.items() if ratio > AT_THE_FLOOR]
     if not above:
         return Section(
@@ -168,12 +209,6 @@ def test_section(comparison: Comparison) -> Section:
     ][:MOST_CORRELATIONS]
     header = ("", "follows", "correlation", "after", "by chance (p)")
     return Section("Is it noise?", text, [table, *([Table(header, strongest)] if strongest else [])])
-
-
-def _what_is_left(ratio: float) -> str:
-    if ratio <= AT_THE_FLOOR:
-        return "at the noise floor"
-    return f"more than noise, {short(ratio, 2)} times: something is left to be found"
 
 
 def method_section() -> Section:
@@ -208,12 +243,10 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
         command: the command line that made it.
         model_path: the model file, for the suggested next command; None for the owner's values.
     """
-    good = comparison.at_the_floor
     return Report(
         title=f"Model and measurement: {comparison.recording.name}",
         answer=outcome(comparison),
-        tone="good" if good else "warn",
-        tiles=_tiles(comparison),
+        tone="good" if comparison.at_the_floor else "warn",
         sections=[
             recording_section(comparison.recording, comparison.model),
             error_section(comparison),
@@ -226,24 +259,6 @@ def comparison_report(comparison: Comparison, command: str, model_path: str | No
         ],
         footer=f"Made by tactile_cube: {command}",
     )
-
-
-def _tiles(comparison: Comparison) -> list[Tile]:
-    worst = max(comparison.errors.joints, key=lambda j: comparison.errors.joints[j] / comparison.floor.joints[j])
-    tone: Tone = "good" if comparison.at_the_floor else "warn"
-    units = comparison.recording.units
-    unit = common_unit(units.values())
-    tiles = [
-        Tile(milli(comparison.errors.overall, unit), "error, all joints (RMS)", tone),
-        Tile(milli(comparison.floor.overall, unit), f"noise floor ({floor_source(comparison.floor)})"),
-        Tile(f"{short(comparison.ratio)} x", "error / noise floor", tone),
-        Tile(worst, f"worst joint: {milli(comparison.errors.joints[worst], units[worst])}"),
-    ]
-    if comparison.band is not None:
-        tiles.append(
-            Tile(f"{100 * comparison.band.inside:.0f} %", f"measured inside {comparison.band.simulations} simulations")
-        )
-    return tiles
 
 
 def _next_section(comparison: Comparison, model_path: str | None) -> Section:

@@ -1,32 +1,22 @@
-"""The report of `diagnose` and `identify`: what is missing, how sure, how far the error falls, what to record next."""
+"""The reports of `diagnose` and `identify`: what is missing, how sure, how far the error falls, what to record next."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactile_cube.identification.in_words import (
-    PARTIAL,
-    UNPROVEN,
-    UNRELATED,
-    common_offset,
-    disturbed,
-    headline,
-    left_over,
-    sets_in_words,
-    unproven_effects,
-    unseen_effects,
-)
+from tactile_cube.identification.contact.identification import ContactIdentification
+from tactile_cube.identification.in_words import GAIN_OF, answer
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
-from tactile_cube.measurement.units import common_unit, milli, of_joint, short
+from tactile_cube.measurement.units import common_unit, milli
 from tactile_cube.visualization.comparison_report import (
-    band_section,
     overlay_section,
     recording_section,
     test_section,
     where_section,
 )
 from tactile_cube.visualization.diagnosis_sections import (
+    HELD,
     effect_section,
     held_section,
     next_section,
@@ -36,23 +26,27 @@ from tactile_cube.visualization.diagnosis_sections import (
     train_section,
     value_section,
 )
-from tactile_cube.visualization.report import Listing, Report, Section, Tile, Tone
+from tactile_cube.visualization.report import Listing, Report, Section, Table, Tone
 
-VERDICTS: dict[str, tuple[Tone, str]] = {
-    "adequate": ("good", "Nothing is missing: the model is as good as this recording can tell."),
-    "missing_effect": ("good", "The missing effect was found"),
-    "ambiguous": ("warn", "Several effects explain this recording equally well"),
-    "partly_explained": ("warn", "Most of what is missing was found, but not all of it"),
-    "unknown_effect": ("warn", "Something is missing that no effect of the catalogue explains."),
-}
+EXPLANATION = (
+    "The hand holds a known load and loosens its grip until the load slips. Each trial was simulated in the world that "
+    "training uses, with the joint offsets and the place of the load that suit it. An initialisation's value is the "
+    "one with which its trials are followed best: the simulated load slips when the real one did. The scatter of "
+    "these values makes the interval."
+)
+
+
+def _tone(diagnosis: Mapping[str, Any]) -> Tone:
+    """Whether a diagnosis leaves nothing open."""
+    return "good" if diagnosis["verdict"] in ("adequate", "missing_effect") else "warn"
 
 
 def diagnosis_report(
-    diagnosis: Mapping[str, Any],
+    diagnosis: dict[str, Any],
     before: Comparison,
-    after: Comparison | None,
+    after: Comparison,
     command: str,
-    model_path: str | None = None,
+    model_path: str,
     shapes: Sequence[Shape] = (),
     experiment: Experiment | None = None,
 ) -> Report:
@@ -61,45 +55,29 @@ def diagnosis_report(
     Args:
         diagnosis: the content of diagnosis.json.
         before: the model as it was, beside the recording.
-        after: the recommended model beside the recording; None if it is the same.
+        after: the recommended model beside the recording.
         command: the command line that made it.
         model_path: the recommended model's file.
         shapes: shape of what stays unexplained.
         experiment: what would tell the rivals apart.
     """
-    tone, said = VERDICTS[diagnosis["verdict"]]
-    if diagnosis.get("unproven_effects") and diagnosis["verdict"] == "unknown_effect":
-        said = UNPROVEN
-    elif headline(diagnosis) in (PARTIAL, UNRELATED):
-        said = headline(diagnosis)
     units = before.recording.units
-    sets = diagnosis.get("sets", [])
-    names = (
-        sets_in_words(sets)
-        if sets
-        else " and ".join(f"{effect['name']} at {', '.join(effect['joints'])}" for effect in diagnosis["effects"])
-    )
-    sections = [
-        _verdict_section(diagnosis, units),
-        stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
-        *([held_section(diagnosis["contact"])] if "contact" in diagnosis else []),
-        *effect_section(diagnosis["effects"], units),
-        *shape_section(shapes, units),
-        *ranking_section(diagnosis["ranking"]),
-        next_section(diagnosis, model_path, before, experiment),
-        recording_section(before.recording, before.model),
-        where_section(before, "Where the stated model fails"),
-        overlay_section(before)
-        if after is None
-        else overlay_section(after, "Measured and simulated, before and after what was found", before),
-        *([] if after is None else [test_section(after)]),
-    ]
     return Report(
         title=f"What is missing? {before.recording.name}",
-        answer=f"{said}: {names}{left_over(diagnosis)}." if names else said,
-        tone=tone,
-        tiles=_tiles(diagnosis, common_unit(units.values())),
-        sections=sections,
+        answer=answer(diagnosis, None),
+        tone=_tone(diagnosis),
+        sections=[
+            stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
+            *([held_section(diagnosis["contact"])] if "contact" in diagnosis else []),
+            *effect_section(diagnosis["effects"], units),
+            *shape_section(shapes, units),
+            *ranking_section(diagnosis["ranking"]),
+            next_section(diagnosis, model_path, before, experiment),
+            recording_section(before.recording, before.model),
+            where_section(before, "Where the stated model fails"),
+            overlay_section(after, "Measured and simulated, before and after what was found", before),
+            test_section(after),
+        ],
         footer=f"Made by tactile_cube in {diagnosis['seconds']:.0f} s: {command}",
     )
 
@@ -140,7 +118,6 @@ def identification_report(
             recording_section(after.recording, after.model),
             where_section(after),
             overlay_section(after),
-            *band_section(after),
             test_section(after),
             train_section(model_path),
         ],
@@ -148,51 +125,65 @@ def identification_report(
     )
 
 
-def _verdict_section(diagnosis: Mapping[str, Any], units: Mapping[str, str]) -> Section:
-    lines = [_in_a_line(effect, units) for effect in diagnosis["effects"]]
-    if known := diagnosis.get("known_effects"):
-        lines.append(f"beside what was known: {', '.join(known)}")
-    partial = diagnosis.get("partial_effects", [])
-    lines += [f"reduces the error, but more is missing: {_in_a_line(one, units)}" for one in partial]
-    if unproven := diagnosis.get("unproven_effects"):
-        lines += unproven_effects(unproven)
-    lines += [common_offset(entry, units) for entry in diagnosis.get("common_offsets", [])]
-    lines += disturbed(diagnosis)
-    for joint in diagnosis["unexplained_joints"]:
-        lines.append(f"not explained: {joint}{_ceiling(diagnosis, joint)}")
-    return Section("The answer", (), [Listing([*(lines or ["no effect has to be added"]), *unseen_effects(diagnosis)])])
+def contact_sections(found: ContactIdentification, alone: bool = True) -> list[Section]:
+    """What was found of fingertips and object; values only if they stand `alone`, not beside those of the drives."""
+    effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
+    rows = [
+        (effect, parameter, str(one.initialisation), f"{one.value:.4g}", "" if one.telling else "does not show it")
+        for (effect, parameter), said in found.fit.by_initialisation.items()
+        for one in said
+    ]
+    table = Table(("effect", "parameter", "initialisation", "value", ""), rows)
+    stages = {key: one.overall for key, one in found.stages.items()} | {"noise_floor": found.noise_floor}
+    joints = {key: one.joints for key, one in found.stages.items()}
+    by_initialisation = Section("What each initialisation says", [EXPLANATION], [table])
+    return [stage_section(stages, joints, HELD), *(effect_section(effects) if alone else []), by_initialisation]
 
 
-def _in_a_line(effect: Mapping[str, Any], units: Mapping[str, str]) -> str:
-    own = common_unit(units[joint] for joint in effect["joints"] if joint in units)
-    values = [f"{name} {short(p['value'])} {of_joint(p['unit'], own)}" for name, p in effect["parameters"].items()]
-    return f"{effect['name']} at {', '.join(effect['joints'])}: {', '.join(values)}"
-
-
-def _ceiling(diagnosis: Mapping[str, Any], joint: str) -> str:
-    """How much there is to be found at all."""
-    shares = [one["black_box"] for one in diagnosis.get("unexplained", []) if one["joint"] == joint]
-    if not shares:
-        return ""
-    return (
-        "; a black-box model of position, velocity, torque, neighbours and time could still explain "
-        f"{100 * shares[0]:.0f} % of the missing torque"
+def contact_diagnosis_report(
+    result: dict[str, Any], name: str, command: str, recording: str, model_path: str
+) -> Report:
+    """The page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
+    ranking = [
+        {
+            "effect": row["effects"],
+            "held-out error [mrad]": 1e3 * row["held_out_error"],
+            "share that it takes off": row["gain"],
+            "of": GAIN_OF[row["gain_of"]],
+            "p (no better than without)": row["p_value"],
+        }
+        for row in result["ranking"]
+    ]
+    effects = ",".join(one["name"] for one in result["effects"])
+    train = f"python -m tactile_cube.train +experiment=adapt model={model_path}"
+    fit = f"python -m tactile_cube.identify recording={recording} effects=[{effects}]"
+    said, lines = {
+        "adequate": ("Train in the world as it is stated:", [train]),
+        "missing_effect": ("Fit exactly this on all trials, and train with the result:", [fit, train]),
+        "ambiguous": ("Record more loads and initialisations and diagnose again, or see what each would be:", [fit]),
+        "unknown_effect": ("Record free motion too: the drivetrain may lack something that the grasps show.", []),
+    }[result["verdict"]]
+    return Report(
+        title=f"What is missing? {name}",
+        answer=answer(result, None),
+        tone=_tone(result),
+        sections=[
+            held_section(result),
+            *effect_section(result["effects"]),
+            *ranking_section(ranking),
+            Section("What to do next", [said], [Listing(lines, code=True)] if lines else []),
+        ],
+        footer=f"Made by tactile_cube in {result['seconds']:.0f} s: {command}",
     )
 
 
-def _tiles(diagnosis: Mapping[str, Any], unit: str) -> list[Tile]:
-    errors = diagnosis["error"]
-    tiles = [Tile(diagnosis["verdict"].replace("_", " "), "verdict", VERDICTS[diagnosis["verdict"]][0])]
-    guessed = diagnosis.get("noise_floor_source") == "guess"
-    part = "test" if diagnosis.get("tested") else "held-out"
-    for key, label in (
-        ("nominal", f"{part} error as stated"),
-        ("with_effects", f"{part} error with the recommended model"),
-        (
-            "noise_floor",
-            "noise floor (sensor noise, a guess: no repeats)" if guessed else "noise floor (scatter of repeats)",
-        ),
-    ):
-        if errors.get(key) is not None:
-            tiles.append(Tile(milli(errors[key], unit), label))
-    return tiles
+def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:
+    """The page of an identification of contact effects alone."""
+    before, after = found.stages["nominal"].overall, found.stages["with_effects"].overall
+    return Report(
+        title=f"Identified: {name}",
+        answer=f"The error on trials that the fit never saw fell from {milli(before)} to {milli(after)}.",
+        tone="plain" if found.fit.silent() else "good",
+        sections=[*contact_sections(found), train_section(model_path)],
+        footer=f"Made by tactile_cube: {command}",
+    )

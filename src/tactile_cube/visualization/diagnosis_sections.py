@@ -19,7 +19,7 @@ from tactile_cube.visualization.charts import (
     time_chart,
 )
 from tactile_cube.visualization.comparison_report import probability
-from tactile_cube.visualization.report import Callout, Figure, Listing, Section, Table
+from tactile_cube.visualization.report import Block, Figure, Listing, Section, Table
 
 WIDE = 6  # joints from which on a table has them in its rows
 STAGES = {
@@ -53,7 +53,7 @@ def stage_section(
         "RMS position error on trials that were held out from the fit (where there are enough, on trials "
         "that nothing was chosen by either); the dashed line is what noise alone would leave."
     )
-    blocks: list[Figure | Table] = [Figure(bar_chart(bars, unit, None if floor is None else 1e3 * floor), caption)]
+    blocks: list[Block] = [Figure(bar_chart(bars, unit, None if floor is None else 1e3 * floor), caption)]
     if joints:
         names = list(next(iter(joints.values())))
         steps = [STAGES.get(stage, stage) for stage in joints]
@@ -88,13 +88,9 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
                 f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {probability(effect['p_value'])})"
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
-    blocks: list[Listing | Figure] = [Listing(lines)] if lines else []
+    blocks: list[Block] = [Listing(lines)] if lines else []
     blocks.append(Figure(interval_chart(intervals), INTERVALS))
     return [Section("What was found, and how sure that is", (), blocks)]
-
-
-def _percent(share: float) -> str:
-    return "more than 99 %" if share > 0.99 else f"{100 * share:.0f} %"
 
 
 def shape_section(shapes: Sequence[Shape], units: Mapping[str, str] | None = None) -> list[Section]:
@@ -146,47 +142,50 @@ def value_section(comparison: Comparison) -> Section:
 
 def train_section(model_path: str) -> Section:
     """What to type after an identification."""
-    train = Listing([f"python -m tactile_cube.train +experiment=adapt model={model_path}"], code=True)
-    return Section(
-        "What to do next", ["Train with what was found; the intervals become randomisation ranges:"], [train]
-    )
+    said = "Train with what was found; the intervals become randomisation ranges:"
+    train = f"python -m tactile_cube.train +experiment=adapt model={model_path}"
+    return Section("What to do next", [said], [Listing([train], code=True)])
 
 
 def next_section(
-    diagnosis: Mapping[str, Any], model_path: str | None, before: Comparison, experiment: Experiment | None
+    diagnosis: Mapping[str, Any], model_path: str, before: Comparison, experiment: Experiment | None
 ) -> Section:
     """What to record or to type next."""
     if experiment is not None:
-        return experiment_section(experiment, before.recording.units)
-    folder, model = before.recording.folder, model_path or "MODEL.yaml"
-    found = [_typed(effect["name"], joint) for effect in diagnosis["effects"] for joint in effect["joints"]]
+        return _experiment_section(experiment, before.recording.units)
+    # Effects of fingertips and object belong to no joint.
+    found = [
+        one["name"] if joint == "object" else f"{one['name']}@{joint}"
+        for one in diagnosis["effects"]
+        for joint in one["joints"]
+    ]
     names = [*diagnosis.get("known_effects", []), *found]
-    unexplained = (diagnosis["unexplained_joints"] or ["JOINT"])[0]
-    identify = f"python -m tactile_cube.identify recording={folder} effects"
-    train = f"python -m tactile_cube.train +experiment=adapt model={model}"
-    if diagnosis["verdict"] == "adequate":
-        said, lines = "Train with the refitted constants:", [train]
-    elif diagnosis["verdict"] == "missing_effect":
-        said, lines = (
+    own = f"my_rig.MyEffect@{(diagnosis['unexplained_joints'] or ['JOINT'])[0]}"
+    identify = f"python -m tactile_cube.identify recording={before.recording.folder} effects"
+    train = f"python -m tactile_cube.train +experiment=adapt model={model_path}"
+    own_law = ("Look at the shapes above, write the law as an effect of your own, and fit it:", [f"{identify}=[{own}]"])
+    said, lines = {
+        "adequate": ("Train with the refitted constants:", [train]),
+        "missing_effect": (
             "Fit exactly these effects, and train with the result:",
             [f"{identify}=[{','.join(names)}]", train],
-        )
-    elif diagnosis["verdict"] == "partly_explained":
-        said = "The model holds what was found: train with it. For the rest, write a law of the shapes and fit both:"
-        lines = [train, f"{identify}=[{','.join([*names, f'my_rig.MyEffect@{unexplained}'])}]"]
-    else:
-        said = "Look at the shapes above, write the law as an effect of your own, and fit it:"
-        lines = [f"{identify}=[my_rig.MyEffect@{unexplained}]"]
+        ),
+        "partly_explained": (
+            "The model holds what was found: train with it. For the rest, write a law of the shapes and fit both:",
+            [train, f"{identify}=[{','.join([*names, own])}]"],
+        ),
+    }.get(diagnosis["verdict"], own_law)
     return Section("What to do next", [said], [Listing(lines, code=True)])
 
 
-def experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Section:
+def _experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Section:
     """The commands that would decide, what each rival predicts, and between what nothing would decide."""
-    rows, blocks = joint_rows(experiment, units), list[Table | Callout | Figure]()
+    rows, blocks = joint_rows(experiment, units), list[Block]()
     if rows:
         bound = "stop beyond" if experiment.safety.safe else "allowed"
         blocks.append(Table((*REACHED, f"{bound}: position", "speed", "torque"), rows))
-    blocks += [Callout(line, "warn") for line in watch_for(experiment, units)]
+    if warnings := watch_for(experiment, units):
+        blocks.append(Listing(warnings))
     if experiment.decides:
         joint, unit = experiment.joints.index(experiment.joint), units.get(experiment.joint, TURNS)
         predictions = {name: values[:, joint] for name, values in experiment.predictions.items()}
@@ -197,11 +196,6 @@ def experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Sect
         caption = f"What each candidate predicts for {experiment.joint} before any refit, relative to their mean."
         blocks.append(Figure(svg(axes), caption))
     return Section("What to record next", proposal(experiment), blocks)
-
-
-def _typed(effect: str, joint: str) -> str:
-    """An effect as `effects=[...]` takes it: those of fingertips and object belong to no joint."""
-    return effect if joint == "object" else f"{effect}@{joint}"
 
 
 def _cell(value: object) -> str:

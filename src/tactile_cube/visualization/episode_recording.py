@@ -1,27 +1,36 @@
-"""An episode as a Rerun recording: hand, cube and contacts in 3D, the task at 10 Hz, the joints at 500 Hz."""
+"""An episode as a Rerun recording: hand, object and contacts in 3D, the task at 10 Hz, the joints at 500 Hz."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
+from rerun.urdf import UrdfTree
+from scipy.spatial.transform import Rotation
 
+from tactile_cube.env.rotation import TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
 from tactile_cube.evaluation.training_curve import Curve
 from tactile_cube.evaluation.verdict import EpisodeResult
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.visualization.blueprint import episode_blueprint, pair_blueprint
 from tactile_cube.visualization.curves import write_learning_curves
-from tactile_cube.visualization.episode_scene import FINGER_COLOURS, log_hand, log_motion
-from tactile_cube.visualization.rerun_recording import Branch, Colours, recording_file
+from tactile_cube.visualization.rerun_recording import Branch, Colours, log_robot, recording_file
+from tactile_cube.visualization.scene import Part, object_parts
 
+FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215), (150, 90, 200), (90, 190, 200))
 JOINT_COLOURS = ((235, 90, 80), (110, 200, 110), (110, 150, 255), (240, 190, 80), (190, 120, 230), (130, 210, 220))
 SIGNALS = {"q": 1.0, "q_m": 0.75, "q_f": 0.6, "q_d": 0.45, "torque": 1.0}
 """Signals at the physics rate, and how bright their lines are."""
-CONDITIONS = ("filter_time", "gravity_scale")
+ARROW_LENGTH = 0.03
+"""Length of a contact arrow [m/N]."""
+POSE_RATE = 50.0
+"""Rate of the 3D poses [Hz]: smooth to the eye; the joint signals keep the physics rate."""
+TRAIL = 50
+"""Policy steps for which the way of the object's corner stays visible: 5 s."""
 
 
 def write_episode(record: EpisodeRecord, path: Path, hand: Hand = DLR_HAND2, summary: str = "") -> None:
@@ -34,88 +43,7 @@ def write_episode(record: EpisodeRecord, path: Path, hand: Hand = DLR_HAND2, sum
         summary: Markdown shown beside the episode.
     """
     with recording_file(path, episode_blueprint(record.fingers, hand.name)) as stream:
-        log_episode(Branch(stream), record, hand, summary)
-
-
-def log_episode(branch: Branch, record: EpisodeRecord, hand: Hand, summary: str = "") -> None:
-    """Write one episode into a recording: hand, object, contacts, task, joints, and what went through the policy.
-
-    Args:
-        branch: where in the recording.
-        record: the episode.
-        hand: the hand that acted.
-        summary: Markdown shown beside the episode.
-    """
-    log_motion(branch, record, hand, log_hand(branch, hand))
-    _log_task(branch, record)
-    _log_joints(branch, record)
-    _log_policy(branch, record, hand)
-    text = summary or f"ended: {record.ending}"
-    branch.log("episode", rr.TextDocument(text, media_type="text/markdown"))
-
-
-def description(result: EpisodeResult) -> str:
-    """Return what is said beside the episode in the viewer, in Markdown."""
-    lines = [f"# {result.verdict.value.replace('_', ' ')}", "", "| | |", "|---|---|"]
-    lines += [f"| {name} | {value} |" for name, value in result.as_dict().items()]
-    return "\n".join(lines)
-
-
-def _log_task(branch: Branch, record: EpisodeRecord) -> None:
-    """Write theta, the terms of the reward, the fingers' forces and the conditions of the episode."""
-    branch.lines("task/theta", record.time, record.theta, ["theta"])
-    forces = np.zeros((record.steps + 1, len(record.fingers)))
-    np.add.at(forces, (record.contacts.step, record.contacts.finger), record.contacts.normal_force)
-    colours = [FINGER_COLOURS[index % len(FINGER_COLOURS)] for index in range(len(record.fingers))]
-    branch.lines("task/force", record.time, forces, list(record.fingers), colours)
-    for name, values in record.reward_terms.items():
-        if np.any(values):  # terms that are switched off would only fill the legend
-            branch.lines(f"task/reward/{name}", record.time[1:], values, [name])
-    branch.lines("task/reward/sum", record.time[1:], record.reward, ["sum"])
-    for name in CONDITIONS:
-        if name in record.constants:
-            branch.lines(f"curriculum/{name}", record.time, np.full(record.steps + 1, record.constants[name]), [name])
-
-
-def _log_joints(branch: Branch, record: EpisodeRecord) -> None:
-    """Write the joint signals of each finger at the physics rate, and its targets at the policy's."""
-    for index, finger in enumerate(record.fingers):
-        mine, entity = record.of_finger(index), f"joints/{finger}"
-        for signal, brightness in SIGNALS.items():
-            if signal in record.trace:
-                colours = [tuple(round(brightness * part) for part in colour) for colour in JOINT_COLOURS]
-                time, values = record.trace["time"][:: branch.stride], record.trace[signal][:: branch.stride, mine]
-                _joint_lines(branch, f"{entity}/{signal}", time, values, signal, colours)
-        _joint_lines(branch, f"{entity}/q_n", record.time[:-1], record.target[:, mine], "q_n")
-
-
-def _log_policy(branch: Branch, record: EpisodeRecord, hand: Hand) -> None:
-    """Write what the policy got of each finger, q_m and e_q with offset and noise, and what it asked for [rad].
-
-    The action differs from the target q_n where the one before was repeated (sticky actions).
-    """
-    if not record.policy:
-        return
-    middle = 0.5 * (hand.action_lower + hand.action_upper)
-    asked = middle + 0.5 * (hand.action_upper - hand.action_lower) * record.policy["action"]
-    for index, finger in enumerate(record.fingers):
-        mine = record.of_finger(index)
-        for name, values in (("q_m", record.policy["q_m"]), ("e_q", record.policy["e_q"]), ("action", asked)):
-            entity = f"policy/{finger}/{name}"
-            _joint_lines(branch, entity, record.time[:-1], values[:, mine], name, JOINT_COLOURS)
-
-
-def _joint_lines(
-    branch: Branch, entity: str, time: Array, values: Array, signal: str, colours: Colours | None = None
-) -> None:
-    """A signal (n, joints) of one finger; colours go round where it has more joints than there are."""
-    count = values.shape[1]
-    painted = None if colours is None else [colours[joint % len(colours)] for joint in range(count)]
-    branch.lines(entity, time, values, [f"{signal}, joint {joint + 1}" for joint in range(count)], painted)
-
-
-PICTURE = (6.0, 6.0)
-"""Size of the learning curves [inch]: a column beside the episodes."""
+        _log_episode(Branch(stream), record, hand, summary)
 
 
 def write_pair(
@@ -138,16 +66,150 @@ def write_pair(
     fingers = next(iter(episodes.values()))[0].fingers
     with recording_file(path, pair_blueprint(fingers, hand.name, names, curve is not None)) as stream:
         for root, (record, _, described) in episodes.items():
-            log_episode(Branch(stream, f"{root}/"), record, hand, described)
+            _log_episode(Branch(stream, f"{root}/"), record, hand, described)
         branch = Branch(stream)
-        if curve is not None:
-            log_curves(branch, curve)
+        if curve is not None:  # as a picture: a plot of the viewer would share the time line of the episodes
+            with tempfile.TemporaryDirectory() as folder:
+                file = Path(folder) / "curves.png"
+                write_learning_curves(curve, file)
+                branch.log("curves", rr.EncodedImage(path=file))
         branch.always("run", rr.TextDocument(words, media_type="text/markdown"))
 
 
-def log_curves(branch: Branch, curve: Curve) -> None:
-    """Write the learning curves as a picture: a plot of the viewer would share the time line of the episodes."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "curves.png"
-        write_learning_curves([curve], file, curve.label, PICTURE)
-        branch.log("curves", rr.EncodedImage(path=file))
+def description(result: EpisodeResult) -> str:
+    """Return what is said beside the episode in the viewer, in Markdown."""
+    lines = [f"# {result.verdict.value.replace('_', ' ')}", "", "| | |", "|---|---|"]
+    lines += [f"| {name} | {value} |" for name, value in result.as_dict().items()]
+    return "\n".join(lines)
+
+
+def _log_episode(branch: Branch, record: EpisodeRecord, hand: Hand, summary: str) -> None:
+    _log_motion(branch, record, hand, _log_hand(branch, hand))
+    for number, part in enumerate(object_parts(record.cube_size, record.object_shape)):
+        branch.log(f"cube/part{number}", _drawn(part))
+    _log_trail(branch, record)
+    _log_contacts(branch, record)
+    _log_task(branch, record)
+    _log_joints(branch, record)
+    if record.policy:
+        _log_policy(branch, record, hand)
+    branch.log("episode", rr.TextDocument(summary or f"ended: {record.ending}", media_type="text/markdown"))
+
+
+def _log_hand(branch: Branch, hand: Hand) -> UrdfTree:
+    prefix = branch.root.replace("/", "_")
+    tree = log_robot(branch.stream, hand.urdf(), branch.hand.root.rstrip("/"), prefix or None)
+    root = rr.Transform3D(
+        translation=hand.position,
+        quaternion=rr.Quaternion(xyzw=Rotation.from_matrix(hand.rotation).as_quat()),
+        parent_frame="tf#/",
+        child_frame=prefix + tree.root_link().name,
+    )
+    branch.hand.always("pose", root)
+    return tree
+
+
+def _log_motion(branch: Branch, record: EpisodeRecord, hand: Hand, tree: UrdfTree) -> None:
+    """Write joints (a coupled one with the angle of its neighbour) and object at about 50 Hz; 10 Hz without a trace."""
+    time, q, position, quaternion = record.time, record.joint_position, record.cube_position, record.cube_quaternion
+    if record.trace:
+        time = record.trace["time"]
+        stride = max(1, round(1.0 / (POSE_RATE * float(time[1] - time[0]))))
+        names = ("time", "q", "cube_position", "cube_quaternion")
+        time, q, position, quaternion = (record.trace[name][::stride] for name in names)
+    columns = {name: index for index, name in enumerate(hand.joint_names)}
+    for joint in tree.joints():
+        actuated = hand.followed(joint.name)
+        if actuated in columns:
+            transform = joint.compute_transform_columns(q[:, columns[actuated]].tolist(), clamp=False)
+            branch.hand.columns(f"joint_transforms/{joint.name}", time, transform)
+    branch.columns("cube", time, rr.Transform3D.columns(translation=position, quaternion=quaternion))
+
+
+def _drawn(part: Part) -> rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D | rr.Mesh3D:
+    colour, half = [round(255 * share) for share in part.colour], part.size / 2
+    if part.kind == "mesh":
+        count = 3 * len(part.size)
+        triangles = np.arange(count).reshape(-1, 3)
+        return rr.Mesh3D(
+            vertex_positions=part.size.reshape(-1, 3), triangle_indices=triangles, vertex_colors=[colour] * count
+        )
+    if part.kind == "box":
+        return rr.Boxes3D(centers=[part.centre], half_sizes=[half], colors=[colour], fill_mode="solid")
+    if part.kind == "sphere":
+        return rr.Ellipsoids3D(centers=[part.centre], half_sizes=[half], colors=[colour], fill_mode="solid")
+    return rr.Cylinders3D(lengths=[part.size[2]], radii=[half[0]], colors=[colour], fill_mode="solid")
+
+
+def _log_trail(branch: Branch, record: EpisodeRecord) -> None:
+    """Write the way of one upper corner of the cube: its turning about the vertical and its creeping in one line."""
+    corners = record.cube_position + Rotation.from_quat(record.cube_quaternion).apply(0.5 * record.cube_size)
+    for sample, time in enumerate(record.time.tolist()):
+        way = corners[max(0, sample - TRAIL) : sample + 1]
+        branch.log("trail", rr.LineStrips3D([way], colors=[(225, 180, 0)], radii=0.0008), time)
+
+
+def _log_contacts(branch: Branch, record: EpisodeRecord) -> None:
+    """Write the contact forces on the cube as arrows, all fingers in their colour, at the policy's rate."""
+    table = record.contacts
+    for sample, time in enumerate(record.time.tolist()):
+        rows = (table.step == sample) & (table.normal_force > TOUCH_FORCE)
+        # The arrow ends where the finger pushes: it stands outside the cube and can be seen.
+        vectors = ARROW_LENGTH * table.force[rows]
+        arrows = rr.Arrows3D(
+            origins=table.position[rows] - vectors,
+            vectors=vectors,
+            colors=_cycled(FINGER_COLOURS, table.finger[rows].tolist()),
+            radii=0.0018,
+        )
+        branch.log("contacts", arrows, time)
+
+
+def _log_task(branch: Branch, record: EpisodeRecord) -> None:
+    """Write theta, the terms of the reward and the fingers' forces."""
+    branch.lines("task/theta", record.time, record.theta, ["theta"])
+    forces = np.zeros((record.steps + 1, len(record.fingers)))
+    np.add.at(forces, (record.contacts.step, record.contacts.finger), record.contacts.normal_force)
+    colours = _cycled(FINGER_COLOURS, range(len(record.fingers)))
+    branch.lines("task/force", record.time, forces, list(record.fingers), colours)
+    for name, values in record.reward_terms.items():
+        if np.any(values):  # terms that are switched off would only fill the legend
+            branch.lines(f"task/reward/{name}", record.time[1:], values, [name])
+    branch.lines("task/reward/sum", record.time[1:], record.reward, ["sum"])
+
+
+def _log_joints(branch: Branch, record: EpisodeRecord) -> None:
+    """Write the joint signals of each finger at the physics rate, and its targets at the policy's."""
+    for index, finger in enumerate(record.fingers):
+        mine, entity = record.of_finger(index), f"joints/{finger}"
+        for signal, brightness in SIGNALS.items():
+            if signal in record.trace:
+                colours = [tuple(round(brightness * part) for part in colour) for colour in JOINT_COLOURS]
+                values = record.trace[signal][:, mine]
+                _joint_lines(branch, f"{entity}/{signal}", record.trace["time"], values, colours)
+        _joint_lines(branch, f"{entity}/q_n", record.time[:-1], record.target[:, mine])
+
+
+def _log_policy(branch: Branch, record: EpisodeRecord, hand: Hand) -> None:
+    """Write what the policy got of each finger, q_m and e_q with offset and noise, and what it asked for [rad].
+
+    The action differs from the target q_n where the one before was repeated (sticky actions).
+    """
+    middle = 0.5 * (hand.action_lower + hand.action_upper)
+    asked = middle + 0.5 * (hand.action_upper - hand.action_lower) * record.policy["action"]
+    for index, finger in enumerate(record.fingers):
+        mine = record.of_finger(index)
+        for name, values in (record.policy | {"action": asked}).items():
+            _joint_lines(branch, f"policy/{finger}/{name}", record.time[:-1], values[:, mine], JOINT_COLOURS)
+
+
+def _joint_lines(branch: Branch, entity: str, time: Array, values: Array, colours: Colours | None = None) -> None:
+    """A signal (n, joints) of one finger."""
+    joints, signal = range(values.shape[1]), entity.rpartition("/")[2]
+    painted = None if colours is None else _cycled(colours, joints)
+    branch.lines(entity, time, values, [f"{signal}, joint {joint + 1}" for joint in joints], painted)
+
+
+def _cycled(colours: Colours, places: Sequence[int]) -> Colours:
+    """Colours go round where there are more joints or fingers than colours."""
+    return [colours[place % len(colours)] for place in places]

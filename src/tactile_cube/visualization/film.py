@@ -1,4 +1,4 @@
-"""A small film of an episode, a sheet of stills on which a person can check the regrasps, and both of the best ones."""
+"""A small film of an episode, on which a person can check the regrasps, and the best episodes of an evaluation."""
 
 from __future__ import annotations
 
@@ -26,13 +26,7 @@ TOUCH, FREE = (40, 160, 70), (205, 205, 205)
 
 
 def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path) -> None:
-    """Run the best episodes of the first variant again and show them; say where and how to look.
-
-    Args:
-        evaluation: what ran the episodes.
-        variants: what came of it.
-        folder: where the files go.
-    """
+    """Run the best episodes of the first variant again and show them in `folder`; say where and how to look."""
     first = variants[0]
     best = sorted(first.results, key=lambda result: result.final_angle, reverse=True)[: evaluation.protocol.film]
     for result in best:
@@ -41,9 +35,8 @@ def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path
         record.save(file.with_suffix(".npz"))
         hand = evaluation.hand
         write_film(record, file.with_suffix(".gif"), hand=hand)
-        write_stills(record, file.with_suffix(".png"), every=max(5, record.steps // 30), hand=hand)
         write_episode(record, file.with_suffix(".rrd"), hand, summary=description(result))
-        print(f"episode {result.episode}: {file}.gif, stills {file}.png; look inside: rerun {file}.rrd")
+        print(f"episode {result.episode}: {file}.gif; look inside: rerun {file}.rrd")
 
 
 def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand = DLR_HAND2) -> None:
@@ -66,19 +59,6 @@ def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand
         if path.stat().st_size <= MAX_BYTES:
             return
     _save_gif([frame.resize((frame.width * 2 // 3, frame.height * 2 // 3)) for frame in frames], path, duration, 24)
-
-
-def write_stills(
-    record: EpisodeRecord, path: Path, *, every: int = 5, columns: int = 6, view: int = 160, hand: Hand = DLR_HAND2
-) -> None:
-    """Write a PNG sheet with one pair of pictures every `every` policy steps, read row by row."""
-    frames = _frames(record, list(range(0, record.steps + 1, every)), view, hand)
-    width, height = frames[0].size
-    rows = -(-len(frames) // columns)
-    sheet = Image.new("RGB", (columns * width, rows * height), "white")
-    for index, frame in enumerate(frames):
-        sheet.paste(frame, ((index % columns) * width, (index // columns) * height))
-    sheet.save(path, optimize=True)
 
 
 def _frames(record: EpisodeRecord, samples: list[int], view: int, hand: Hand) -> list[Image.Image]:

@@ -1,7 +1,7 @@
 """A self-contained HTML page that a stranger can read: what was done, what came out, how sure it is."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Literal
@@ -14,7 +14,7 @@ Tone = Literal["good", "warn", "plain"]
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawing (SVG text) and the sentence that says what to see in it."""
+    """A drawing (SVG text, put into the page as it is) and the sentence that says what to see in it."""
 
     svg: str
     caption: str
@@ -22,7 +22,7 @@ class Figure:
 
     @property
     def drawing(self) -> Markup:
-        """The SVG, to be put into the page as it is."""
+        """The SVG as the template takes it."""
         return Markup(self.svg)
 
 
@@ -32,7 +32,6 @@ class Table:
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
-    caption: str = ""
     kind: Literal["table"] = "table"
 
     @property
@@ -40,15 +39,6 @@ class Table:
         """Style of each column: `number` where every cell begins like a number."""
         columns = list(zip(*self.rows, strict=True)) or [() for _ in self.header]
         return ["number" if all(cell[:1] in "+-<0123456789" for cell in column) else "text" for column in columns]
-
-
-@dataclass(frozen=True)
-class Callout:
-    """A sentence that must not be missed: good, warn or plain."""
-
-    text: str
-    tone: Tone = "plain"
-    kind: Literal["callout"] = "callout"
 
 
 @dataclass(frozen=True)
@@ -60,7 +50,7 @@ class Listing:
     kind: Literal["listing"] = "listing"
 
 
-Block = Figure | Table | Callout | Listing
+Block = Figure | Table | Listing
 
 
 @dataclass(frozen=True)
@@ -74,25 +64,14 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Tile:
-    """One number at the top of the page."""
-
-    value: str
-    label: str
-    tone: Tone = "plain"
-
-
-@dataclass(frozen=True)
 class Report:
-    """A page: its title, the answer in one sentence, a few numbers, sections."""
+    """A page: its title, the answer in a few lines, sections."""
 
     title: str
     answer: str
     tone: Tone
-    tiles: Sequence[Tile] = ()
-    sections: Sequence[Section] = ()
-    footer: str = ""
-    contents: bool = field(default=True)
+    sections: Sequence[Section]
+    footer: str
 
 
 def write_report(report: Report, path: Path) -> None:

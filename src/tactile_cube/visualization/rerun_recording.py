@@ -30,14 +30,10 @@ class Branch:
     Attributes:
         stream: the recording.
         root: path that all entities stand below, "" or e.g. "best/".
-        start: when the episode begins on the time line [s].
-        stride: every how many samples of the physics rate are written.
     """
 
     stream: rr.RecordingStream
     root: str = ""
-    start: float = 0.0
-    stride: int = 1
 
     @property
     def hand(self) -> Branch:
@@ -46,7 +42,7 @@ class Branch:
 
     def log(self, entity: str, archetype: Any, time: float = 0.0) -> None:
         """Write what holds from `time` [s] of the episode on."""
-        self.stream.set_time(TIMELINE, duration=self.start + time)
+        self.stream.set_time(TIMELINE, duration=time)
         self.stream.log(self.root + entity, archetype)
         self.stream.reset_time()
 
@@ -56,7 +52,7 @@ class Branch:
 
     def columns(self, entity: str, time: Array, columns: Iterable[Any]) -> None:
         """Write values at times `(n,)` [s] of the episode in one piece."""
-        self.stream.send_columns(self.root + entity, [rr.TimeColumn(TIMELINE, duration=self.start + time)], columns)
+        self.stream.send_columns(self.root + entity, [rr.TimeColumn(TIMELINE, duration=time)], columns)
 
     def lines(self, entity: str, time: Array, values: Array, names: list[str], colours: Colours | None = None) -> None:
         """Write curves: values `(n,)` or `(n, lines)`."""

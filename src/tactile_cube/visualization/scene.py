@@ -1,10 +1,11 @@
-"""The hand and a cube with six distinguishable faces in PyBullet's software renderer."""
+"""The hand and an object with six distinguishable sides in PyBullet's software renderer."""
 
 from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import pybullet
@@ -15,42 +16,89 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.object_mesh import ObjectMesh
-from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half
+from tactile_cube.hand.object_shape import ObjectShape, straight_half
 
-FACE_COLOURS = {
-    "+x": (0.85, 0.15, 0.15),
-    "-x": (0.95, 0.60, 0.10),
-    "+y": (0.15, 0.60, 0.20),
-    "-y": (0.15, 0.35, 0.85),
-    "+z": (0.95, 0.90, 0.20),
-    "-z": (0.92, 0.92, 0.92),
-}
-FACE_NORMALS = {
-    "+x": (1, 0, 0),
-    "-x": (-1, 0, 0),
-    "+y": (0, 1, 0),
-    "-y": (0, -1, 0),
-    "+z": (0, 0, 1),
-    "-z": (0, 0, -1),
-}
+Colour = tuple[float, float, float]
+
+SIDES = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
+RED: Colour = (0.85, 0.15, 0.15)
+SIDE_COLOURS: tuple[Colour, ...] = (
+    RED, (0.95, 0.60, 0.10), (0.15, 0.60, 0.20), (0.15, 0.35, 0.85), (0.95, 0.90, 0.20), (0.92, 0.92, 0.92),
+)  # fmt: skip
+DARK: Colour = (0.12, 0.12, 0.12)
+GREY: Colour = (0.30, 0.30, 0.32)
 STICKER = 0.84
 """Edge of the coloured sticker as a share of the cube's edge: a dark frame remains, so edges stay visible."""
 STICKER_HEIGHT = 0.0006
-MESH_FILE = "object.obj"
 WEIGHT = '<inertial><mass value="0.01"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial>'
-"""Nothing moves here by itself; without it PyBullet warns about every link."""
+"""Nothing moves here by itself; without it PyBullet warns about the palm."""
 LINK_COLOUR = (0.62, 0.66, 0.72, 1.0)
 TIP_COLOUR = (0.20, 0.22, 0.26, 1.0)
 
 
 @dataclass(frozen=True)
+class Part:
+    """A solid of which the drawn object is made.
+
+    Attributes:
+        kind: a cylinder stands upright.
+        size: edges of its bounding box `(3,)`; of a mesh the corners of its triangles `(n, 3, 3)` [m].
+        centre: in the object `(3,)` [m].
+        colour: red, green and blue, 0 to 1.
+    """
+
+    kind: Literal["box", "cylinder", "sphere", "mesh"]
+    size: Array
+    centre: Array
+    colour: Colour
+
+
+def object_parts(size: Array, shape: ObjectShape = "box") -> list[Part]:
+    """Return what an object is drawn with: sides of different colours show how it is turned.
+
+    A cube has a sticker on each side, a round object four stripes, both a bar on the lower side that shows a turn from
+    below; a mesh is painted by where its faces look.
+
+    Args:
+        size: edge lengths of its bounding box `(3,)` [m].
+        shape: what it is.
+    """
+    middle, parts = np.zeros(3), list[Part]()
+    if isinstance(shape, ObjectMesh):
+        corners = (shape.vertices * size)[shape.faces]
+        looks = np.argmax(_normals(corners) @ SIDES.T, axis=1)
+        return [Part("mesh", corners[looks == k], middle, SIDE_COLOURS[k]) for k in np.unique(looks).tolist()]
+    if shape == "box":
+        parts.append(Part("box", size, middle, DARK))
+        for side, colour in zip(SIDES, SIDE_COLOURS, strict=True):
+            parts.append(Part("box", np.where(side != 0, STICKER_HEIGHT, STICKER * size), side * size / 2, colour))
+    else:
+        radius = 0.5 * float(size[0])
+        length = 2.0 * straight_half(0.5 * size) if shape == "capsule" else float(size[2])
+        parts.append(Part("cylinder", np.array([size[0], size[0], length]), middle, GREY))
+        if shape == "capsule":
+            ends = (np.array([0.0, 0.0, end]) for end in (0.5 * length, -0.5 * length))
+            parts += [Part("sphere", np.full(3, size[0]), end, GREY) for end in ends]
+        for side, colour in zip(SIDES[:4], SIDE_COLOURS[:4], strict=True):
+            stripe = np.where(side != 0, 0.06, 0.22) * size[0]
+            stripe[2] = max(0.9 * length, 0.2 * radius)
+            parts.append(Part("box", stripe, side * radius * 0.96, colour))
+    return [*parts, Part("box", size * [0.40, 0.10, 0.03], size * [0.20, 0.0, -0.5], RED)]
+
+
+def _normals(corners: Array) -> Array:
+    """Directions in which triangles `(n, 3, 3)` look `(n, 3)`."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+@dataclass(frozen=True)
 class Camera:
-    """A view on the cube: angles of `computeViewMatrixFromYawPitchRoll` [deg], distance [m], field of view [deg]."""
+    """A view on the cube: angles of `computeViewMatrixFromYawPitchRoll` [deg], distance and height [m]."""
 
     yaw: float
     pitch: float
-    distance: float = 0.36
-    field_of_view: float = 45.0
+    distance: float
     height: float = 0.0
 
 
@@ -58,113 +106,34 @@ SIDE = Camera(yaw=35.0, pitch=-10.0, distance=0.33, height=0.03)
 BELOW = Camera(yaw=0.0, pitch=72.0, distance=0.30)
 
 
-def object_urdf(size: Array, shape: ObjectShape = "box") -> str:
-    """Return the object: a cube with a coloured sticker on each face, a round one with four coloured stripes.
-
-    Both have a bar on the lower side.
-
-    Args:
-        size: edge lengths of its bounding box `(3,)` [m].
-        shape: what it is.
-    """
-    if isinstance(shape, ObjectMesh):
-        return _mesh_urdf(size)
-    return cube_urdf(size) if shape == "box" else _round_urdf(size, shape)
-
-
-def _mesh_urdf(size: Array) -> str:
-    """A mesh whose file stands beside the URDF, stretched, with a small bar that shows how it is turned from below."""
-    scale = " ".join(f"{edge:.6f}" for edge in size)
-    body = _part(f'<mesh filename="{MESH_FILE}" scale="{scale}"/>', (0.0, 0.0, 0.0), "body", (0.55, 0.55, 0.58))
-    return _urdf([body, _box(size * [0.40, 0.10, 0.03], size * [0.20, 0.0, -0.5], "bar", (0.85, 0.15, 0.15))])
-
-
-def obj_text(mesh: ObjectMesh) -> str:
-    """A mesh as the text of an OBJ file, each face with corners and a normal of its own; without one none is drawn."""
-    corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in corners.reshape(-1, 3)]
-    lines += [f"vn {x:.6f} {y:.6f} {z:.6f}" for x, y, z in normals]
-    lines += [f"f {3 * k + 1}//{k + 1} {3 * k + 2}//{k + 1} {3 * k + 3}//{k + 1}" for k in range(len(normals))]
-    return "\n".join([*lines, ""])
-
-
-def _round_urdf(size: Array, shape: NamedShape) -> str:
-    radius, length = 0.5 * float(size[0]), 2.0 * straight_half(0.5 * size) if shape == "capsule" else float(size[2])
-    ends = [0.5 * length, -0.5 * length] if shape == "capsule" else []
-    grey = (0.30, 0.30, 0.32)
-    shapes = [_part(f'<cylinder radius="{radius:.6f}" length="{length:.6f}"/>', (0.0, 0.0, 0.0), "body", grey)]
-    shapes += [_part(f'<sphere radius="{radius:.6f}"/>', (0.0, 0.0, z), f"end{z:+.4f}", grey) for z in ends]
-    for face in ("+x", "-x", "+y", "-y"):
-        normal = np.array(FACE_NORMALS[face])
-        extent = np.where(np.abs(normal) == 1, 0.06, 0.22) * size[0]
-        extent[2] = max(0.9 * length, 0.2 * radius)
-        shapes.append(_box(extent, normal * radius * 0.96, f"stripe{face}", FACE_COLOURS[face]))
-    shapes.append(_box(size * [0.40, 0.10, 0.03], size * [0.20, 0.0, -0.5], "bar", (0.85, 0.15, 0.15)))
-    return _urdf(shapes)
-
-
-def cube_urdf(size: Array) -> str:
-    """Return a cube with a dark frame, a coloured sticker on each face, and a bar on the lower face.
-
-    Args:
-        size: edge lengths `(3,)` [m].
-    """
-    shapes = [_box(size, (0.0, 0.0, 0.0), "frame", (0.12, 0.12, 0.12))]
-    for face, normal in FACE_NORMALS.items():
-        axis = np.abs(normal)
-        extent = np.where(axis == 1, STICKER_HEIGHT, STICKER * size)
-        centre = np.asarray(normal) * size / 2
-        shapes.append(_box(extent, centre, f"face{face}", FACE_COLOURS[face]))
-    # The bar from the centre of the lower face to its +x edge makes a turn visible from below.
-    shapes.append(_box(size * [0.40, 0.10, 0.03], size * [0.20, 0.0, -0.5], "bar", (0.85, 0.15, 0.15)))
-    return _urdf(shapes)
-
-
-def _box(extent: Array, centre: Array | tuple[float, ...], name: str, colour: tuple[float, ...]) -> tuple[str, str]:
-    numbers = " ".join(f"{value:.6f}" for value in extent)
-    return _part(f'<box size="{numbers}"/>', centre, name, colour)
-
-
-def _part(geometry: str, centre: Array | tuple[float, ...], name: str, colour: tuple[float, ...]) -> tuple[str, str]:
-    place = " ".join(f"{value:.6f}" for value in centre)
-    rgb = " ".join(str(value) for value in colour)
-    link = (
-        f'<link name="{name}">{WEIGHT}<visual><geometry>{geometry}</geometry>'
-        f'<material name="{name}"><color rgba="{rgb} 1"/></material></visual></link>'
-    )
-    joint = (
-        f'<joint name="{name}_joint" type="fixed"><parent link="cube"/><child link="{name}"/>'
-        f'<origin xyz="{place}"/></joint>'
-    )
-    return link, joint
-
-
-def _urdf(shapes: list[tuple[str, str]]) -> str:
-    body = "".join(link + joint for link, joint in shapes)
-    return f'<robot name="cube"><link name="cube">{WEIGHT}</link>{body}</robot>'
-
-
 class Scene:
-    """Poses hand and cube and takes pictures; owns one PyBullet client until `close`."""
+    """Poses hand and object and takes pictures; owns one PyBullet client until `close`."""
 
     def __init__(self, cube_size: Array, hand: Hand = DLR_HAND2, shape: ObjectShape = "box") -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
-        self._hand = self._load(hand.urdf())
-        self._cube = self._load(object_urdf(cube_size, shape), shape)
-        orientation = Rotation.from_matrix(hand.rotation).as_quat()
-        pybullet.resetBasePositionAndOrientation(self._hand, hand.position, orientation, physicsClientId=self._client)
-        self._columns = self._joint_columns(hand)
-        self._tips = {hand.link_names(k)[-1] for k in range(len(hand.fingers))}
-        self._paint()
+        self._hand, self._columns = self._load(hand)
+        parts = object_parts(cube_size, shape)
+        count = len(parts)
+        self._cube = pybullet.createMultiBody(
+            linkMasses=[0.0] * count,
+            linkCollisionShapeIndices=[-1] * count,
+            linkVisualShapeIndices=[self._visual(part) for part in parts],
+            linkPositions=[part.centre.tolist() for part in parts],
+            linkOrientations=[(0.0, 0.0, 0.0, 1.0)] * count,
+            linkInertialFramePositions=[(0.0, 0.0, 0.0)] * count,
+            linkInertialFrameOrientations=[(0.0, 0.0, 0.0, 1.0)] * count,
+            linkParentIndices=[0] * count,
+            linkJointTypes=[pybullet.JOINT_FIXED] * count,
+            linkJointAxis=[(0.0, 0.0, 1.0)] * count,
+            physicsClientId=self._client,
+        )
 
     def close(self) -> None:
         """Give the client back."""
         pybullet.disconnect(self._client)
 
     def pose(self, joint_position: Array, cube_position: Array, cube_quaternion: Array) -> None:
-        """Place the hand's joints (the coupled ones follow) and the cube."""
+        """Place the hand's joints (the coupled ones follow) and the object."""
         for joint, column in self._columns.items():
             pybullet.resetJointState(self._hand, joint, joint_position[column], physicsClientId=self._client)
         pybullet.resetBasePositionAndOrientation(
@@ -176,7 +145,7 @@ class Scene:
         view = pybullet.computeViewMatrixFromYawPitchRoll(
             [0.0, 0.0, camera.height], camera.distance, camera.yaw, camera.pitch, 0.0, upAxisIndex=2
         )
-        projection = pybullet.computeProjectionMatrixFOV(camera.field_of_view, width / height, 0.02, 2.0)
+        projection = pybullet.computeProjectionMatrixFOV(45.0, width / height, 0.02, 2.0)
         _, _, pixels, _, _ = pybullet.getCameraImage(
             width,
             height,
@@ -193,28 +162,38 @@ class Scene:
         array: NDArray[np.uint8] = np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))
         return Image.fromarray(array[:, :, :3].copy())
 
-    def _load(self, urdf: str, shape: ObjectShape = "box") -> int:
-        with tempfile.TemporaryDirectory() as folder:
-            if isinstance(shape, ObjectMesh):
-                (Path(folder) / MESH_FILE).write_text(obj_text(shape), encoding="utf-8")
-            path = Path(folder) / "body.urdf"
-            path.write_text(urdf.replace('<link name="palm">', f'<link name="palm">{WEIGHT}'), encoding="utf-8")
-            return int(pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self._client))
+    def _visual(self, part: Part) -> int:
+        look: dict[str, Any]
+        if part.kind == "box":
+            look = {"shapeType": pybullet.GEOM_BOX, "halfExtents": (part.size / 2).tolist()}
+        elif part.kind == "cylinder":
+            look = {"shapeType": pybullet.GEOM_CYLINDER, "radius": part.size[0] / 2, "length": part.size[2]}
+        elif part.kind == "sphere":
+            look = {"shapeType": pybullet.GEOM_SPHERE, "radius": part.size[0] / 2}
+        else:  # without normals none of it is drawn
+            look = {
+                "shapeType": pybullet.GEOM_MESH,
+                "vertices": part.size.reshape(-1, 3).tolist(),
+                "indices": list(range(3 * len(part.size))),
+                "normals": np.repeat(_normals(part.size), 3, axis=0).tolist(),
+            }
+        return int(pybullet.createVisualShape(rgbaColor=[*part.colour, 1.0], physicsClientId=self._client, **look))
 
-    def _joint_columns(self, hand: Hand) -> dict[int, int]:
-        """Map PyBullet's joint index to the column of q; a coupled joint reads that of the one it follows."""
-        columns = {}
-        for index in range(pybullet.getNumJoints(self._hand, physicsClientId=self._client)):
-            name = pybullet.getJointInfo(self._hand, index, physicsClientId=self._client)[1].decode()
-            actuated = hand.followed(name)
+    def _load(self, hand: Hand) -> tuple[int, dict[int, int]]:
+        """Load and paint the hand; gives its body and, by PyBullet's index of a joint, the column of q it reads."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "hand.urdf"
+            path.write_text(hand.urdf().replace('<link name="palm">', f'<link name="palm">{WEIGHT}'), encoding="utf-8")
+            body = int(pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self._client))
+        orientation = Rotation.from_matrix(hand.rotation).as_quat()
+        pybullet.resetBasePositionAndOrientation(body, hand.position, orientation, physicsClientId=self._client)
+        pybullet.changeVisualShape(body, -1, rgbaColor=LINK_COLOUR, physicsClientId=self._client)
+        tips, columns = tuple(hand.link_names(k)[-1] for k in range(len(hand.fingers))), {}
+        for index in range(pybullet.getNumJoints(body, physicsClientId=self._client)):
+            about = pybullet.getJointInfo(body, index, physicsClientId=self._client)
+            colour = TIP_COLOUR if about[12].decode().endswith(tips) else LINK_COLOUR
+            pybullet.changeVisualShape(body, index, rgbaColor=colour, physicsClientId=self._client)
+            actuated = hand.followed(about[1].decode())  # of a coupled joint the one that it follows
             if actuated in hand.joint_names:
                 columns[index] = list(hand.joint_names).index(actuated)
-        return columns
-
-    def _paint(self) -> None:
-        for index in range(-1, pybullet.getNumJoints(self._hand, physicsClientId=self._client)):
-            name = "palm"
-            if index >= 0:
-                name = pybullet.getJointInfo(self._hand, index, physicsClientId=self._client)[12].decode()
-            colour = TIP_COLOUR if name.endswith(tuple(self._tips)) else LINK_COLOUR
-            pybullet.changeVisualShape(self._hand, index, rgbaColor=colour, physicsClientId=self._client)
+        return body, columns

@@ -10,8 +10,8 @@ from benchmarks.paper.model_card import read_card
 from benchmarks.paper.page import DIFFERENCES, paper_page
 from benchmarks.paper.rows import HEAD, ROWS, read_comparison
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.evaluation import FORMAT
 from tactile_cube.evaluation.policy_path import SHIPPED
-from tactile_cube.evaluation.results_file import FORMAT
 
 
 def results(protocol: str, label: str = "cube", angle: float = 12.0, table: bool = False) -> dict[str, Any]:

@@ -4,10 +4,9 @@ import pytest
 
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.evaluation import VariantResult
+from tactile_cube.evaluation.evaluation import EvaluationRun, VariantResult, read_results, write_results
 from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
 from tactile_cube.evaluation.protocol import Protocol
-from tactile_cube.evaluation.results_file import EvaluationRun, read_results, write_results
 from tactile_cube.evaluation.summary import summarise
 from tactile_cube.evaluation.variant import Variant
 from tactile_cube.evaluation.verdict import judge_episode
