@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf, tip_positions
+from tactile_cube.hand import DLR_HAND2, tip_positions
 from tactile_cube.hand.urdf import roll_pitch_yaw
 
 Chain = dict[str, ElementTree.Element]
@@ -36,7 +36,7 @@ def test_the_urdf_puts_fingertips_where_the_kinematics_do() -> None:
     rng = np.random.default_rng(1)
     q = rng.uniform(DLR_HAND2.action_lower, DLR_HAND2.action_upper)
     tips = tip_positions(DLR_HAND2, q)
-    joints = joints_by_child(hand_urdf(DLR_HAND2))
+    joints = joints_by_child(DLR_HAND2.urdf())
     for k, finger in enumerate(DLR_HAND2.fingers):
         own = [*q[3 * k : 3 * k + 3], q[3 * k + 2]]
         angles = {f"{finger.name}_q{j + 1}": angle for j, angle in enumerate(own)}
@@ -46,22 +46,23 @@ def test_the_urdf_puts_fingertips_where_the_kinematics_do() -> None:
 
 
 def test_finger_and_hand_have_the_same_links() -> None:
-    finger = ElementTree.fromstring(finger_urdf(DLR_HAND2, "thumb_"))
-    hand = ElementTree.fromstring(hand_urdf(DLR_HAND2))
+    finger = ElementTree.fromstring(DLR_HAND2.finger_urdf(3))
+    hand = ElementTree.fromstring(DLR_HAND2.urdf())
     of_hand = {link.attrib["name"]: ElementTree.tostring(link) for link in hand.iter("link")}
-    shared = [link for link in finger.iter("link") if link.attrib["name"] != "thumb_base"]
+    shared = [link for link in finger.iter("link") if link.attrib["name"] != "base"]
     assert len(shared) == 4
     for link in shared:
-        assert ElementTree.tostring(link).strip() == of_hand[link.attrib["name"]].strip()
+        same = ElementTree.tostring(link).replace(b'name="', b'name="thumb_')
+        assert same.strip() == of_hand["thumb_" + link.attrib["name"]].strip()
 
 
 def test_the_last_joint_mimics_the_third() -> None:
-    joint = joints_by_child(hand_urdf(DLR_HAND2))["fore_distal"]
+    joint = joints_by_child(DLR_HAND2.urdf())["fore_distal"]
     assert joint.find("mimic").attrib["joint"] == "fore_q3"  # type: ignore[union-attr]
 
 
 def test_capsules_are_centred_on_the_centres_of_mass() -> None:
-    for link in ElementTree.fromstring(finger_urdf(DLR_HAND2)).iter("link"):
+    for link in ElementTree.fromstring(DLR_HAND2.finger_urdf(0)).iter("link"):
         if (shape := link.find("collision/origin")) is not None:
             assert shape.attrib["xyz"] == link.find("inertial/origin").attrib["xyz"]  # type: ignore[union-attr]
 

@@ -5,7 +5,7 @@ import pytest
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects import MOTOR_POSITION, TORQUE, find_effect
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation import RigWorld
 
@@ -29,7 +29,7 @@ def both(plant: Plant, memory: np.ndarray, rows: int = 400, history: int = 0) ->
 
 
 def finger_plant(*effects: str) -> Plant:
-    return Plant([RigidBodyTree.from_urdf(finger_urdf(DLR_HAND2))], 0.002, [find_effect(name) for name in effects])
+    return Plant([RigidBodyTree.from_urdf(DLR_HAND2.finger_urdf(0))], 0.002, [find_effect(name) for name in effects])
 
 
 def test_free_motion_in_bullet_agrees_with_the_fast_rollout() -> None:
@@ -42,7 +42,7 @@ def test_free_motion_in_bullet_agrees_with_the_fast_rollout() -> None:
 
 
 def test_the_whole_hand_branches_and_moves_in_bullet_too() -> None:
-    plant = Plant([RigidBodyTree.from_urdf(hand_urdf(DLR_HAND2), DLR_HAND2.joint_names)], 0.002)
+    plant = Plant([RigidBodyTree.from_urdf(DLR_HAND2.urdf(), DLR_HAND2.joint_names)], 0.002)
     memory = plant.memory(DrivetrainConstants(), gravity=(3.0, -2.0, -9.0))
     plant.reset(memory, np.linspace(0.1, 0.5, 12))
     fast, slow = both(plant, memory, rows=100)
@@ -82,6 +82,6 @@ def test_posture_offsets_move_into_the_frames() -> None:
 
 
 def test_a_hand_of_several_chains_is_refused() -> None:
-    tree = RigidBodyTree.from_urdf(finger_urdf(DLR_HAND2))
+    tree = RigidBodyTree.from_urdf(DLR_HAND2.finger_urdf(0))
     with pytest.raises(InputError, match="moves one chain, this plant has 2"):
         RigWorld(Plant([tree, tree], 0.002))

@@ -57,7 +57,7 @@ class Recorder:
     def __init__(self, task: RotationEnv, joint_offset: Array) -> None:
         self._task, self._joint_offset = task, joint_offset
         self._fingers = tuple(finger.name for finger in task.hand.fingers)
-        self._tips = [task.hand.link_names(finger)[-1] for finger in range(len(self._fingers))]
+        self._tips = [task.hand.fingers[finger].links[-1] for finger in range(len(self._fingers))]
         self._rows: dict[str, list[Array]] = {name: [] for name in WORLD_SIGNALS}
         self._contacts: list[tuple[int, int, bool, Array, Array, float, float]] = []
         self._trace: list[dict[str, Array]] = []

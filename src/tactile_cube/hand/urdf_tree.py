@@ -16,11 +16,14 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_elements import Body, Joint, Mimic, Placement, attribute, body_of, joint_of
 from tactile_cube.untrusted_file import below, regular
 
+Homes = dict[str, tuple[str, Placement]]
+"""The link that each link moves with, itself or the root's included, and where its frame is in that link's."""
+
 
 def read_movable_joints(
     text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Mimic] | None = None
-) -> tuple[list[Joint], tuple[str, ...]]:
-    """The joints that move, parents before children, and the names of the actuated ones in order.
+) -> tuple[list[Joint], Homes, tuple[str, ...]]:
+    """The joints that move, parents before children; where all links are; the actuated joints' names in order.
 
     See `RigidBodyTree.from_urdf` for the arguments.
     """
@@ -31,7 +34,7 @@ def read_movable_joints(
     actuated = _actuated(every, joints)
     _check_couplings(every)
     every = [j if _moves(j, actuated) else replace(j, kind="fixed") for j in every]
-    return _merge_fixed(_parents_first(every, bodies)), actuated
+    return *_merge_fixed(*_parents_first(every, bodies)), actuated
 
 
 def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
@@ -108,8 +111,8 @@ def _moves(joint: Joint, actuated: tuple[str, ...]) -> bool:
     return joint.name in actuated or (joint.coupling is not None and joint.coupling.joint in actuated)
 
 
-def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> list[Joint]:
-    """Branch after branch to its end, which is PyBullet's order too."""
+def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> tuple[str, list[Joint]]:
+    """The root link, and the joints branch after branch to its end, which is PyBullet's order too."""
     children = [j.link for j in every]
     for name in children:
         if children.count(name) > 1:
@@ -127,24 +130,25 @@ def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> list[Joint
     if len(ordered) < len(every):
         lost = next(j.name for j in every if j not in ordered)
         raise InputError(f"URDF: joint '{lost}' does not hang on the root link '{reached[0]}'; connect it")
-    return ordered
+    return reached[0], ordered
 
 
-def _merge_fixed(ordered: list[Joint]) -> list[Joint]:
+def _merge_fixed(root: str, ordered: list[Joint]) -> tuple[list[Joint], Homes]:
     """Moves what hangs on a fixed joint into the link before it, and its children with it."""
-    home: dict[str, tuple[str, Placement]] = {}
+    homes: Homes = {root: (root, Placement())}
     moving: dict[str, Joint] = {}
     for joint in ordered:
-        carrier, place = home.get(joint.parent, (joint.parent, Placement()))
+        carrier, place = homes[joint.parent]
         placed = place.then(joint.placement)
         if joint.kind != "fixed":
+            homes[joint.link] = joint.link, Placement()
             moving[joint.link] = replace(joint, parent=carrier, placement=placed)
             continue
-        home[joint.link] = carrier, placed
+        homes[joint.link] = carrier, placed
         if carrier in moving:
             merged = moving[carrier].body.joined(joint.body.seen_from(placed))
             moving[carrier] = replace(moving[carrier], body=merged)
-    return list(moving.values())
+    return list(moving.values()), homes
 
 
 SHAPES = ("visual", "collision")

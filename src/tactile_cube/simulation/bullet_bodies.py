@@ -99,8 +99,8 @@ class BulletBodies:
         self._cube_size = self._cube_com = np.zeros(3)
         self._cube_kind: ObjectShape = "box"
         self._links = range(hand.links_per_finger)
-        self._axes = hand.spin_axes()
-        self._bare = [[link for link in self._links if not hand.shapes(k)[link]] for k in range(len(hand.fingers))]
+        self._axes = hand.axes
+        self._bare = [[link for link in self._links if not finger.shapes[link]] for finger in hand.fingers]
         self.table, self.cube = self._new_table(0.0), self._new_table(0.0)  # hold the places before the fingers'
         bases = [hand.base_in_world(k) for k in range(len(hand.fingers))]
         self.fingers = [load_chain(self.client, urdf, *base) for urdf, base in zip(finger_urdfs, bases, strict=True)]
@@ -143,7 +143,7 @@ class BulletBodies:
         """Contacts with the cube and between fingers in the last physics step."""
         names = {body: finger.name for body, finger in zip(self.fingers, self.hand.fingers, strict=True)}
         names |= {self.cube: "cube", self.table: "table"}
-        links = {body: self.hand.link_names(k) for k, body in enumerate(self.fingers)}
+        links = {body: self.hand.fingers[k].links for k, body in enumerate(self.fingers)}
         return [read_contact(row, names, links) for row in pybullet.getContactPoints(physicsClientId=self.client)]
 
     def close(self) -> None:

@@ -50,7 +50,7 @@ class HandDrive:
         texts = []
         for k, (text, tree) in enumerate(zip(self._urdfs, self._trees, strict=True)):
             same = np.array_equal(mass[k], tree.mass) and np.array_equal(com[k], tree.com)
-            changed = (self._hand.link_names(k), mass[k], com[k], inertia[k])
+            changed = (self._hand.fingers[k].links, mass[k], com[k], inertia[k])
             texts.append(text if same else with_inertias(text, *changed))
         return texts
 

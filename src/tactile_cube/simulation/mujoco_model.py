@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.hand.hand import CollisionShape
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import NamedShape, straight_half, unit_inertia
+from tactile_cube.hand.urdf import CollisionShape
 from tactile_cube.simulation.constants import EpisodeConstants
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Surface, surfaces
 from tactile_cube.simulation.drive import HandDrive
@@ -93,8 +93,7 @@ class HandSpec:
         parent = self.spec.worldbody.add_body(name=f"{finger.name} base", pos=position, quat=_wxyz(rotation))
         rigid = [2.0 * self.spec.option.timestep, 1.0]
         parts = []
-        names, shapes, limits = self._hand.link_names(k), self._hand.shapes(k), self._hand.link_limits(k)
-        for i, link in enumerate(names):
+        for i, link in enumerate(finger.links):
             place = {
                 "pos": view("placement_translation")[k, i],
                 "quat": _wxyz(view("placement_rotation")[k, i]),
@@ -105,14 +104,14 @@ class HandSpec:
                 type=self._mujoco.mjtJoint.mjJNT_HINGE,
                 axis=view("axis")[k, i],
                 limited=self._mujoco.mjtLimited.mjLIMITED_TRUE,
-                range=limits[i].tolist(),
+                range=finger.limits[i].tolist(),
                 solref_limit=rigid,
                 solimp_limit=RIGID,
             )
-            for number, shape in enumerate(shapes[i]):
+            for number, shape in enumerate(finger.shapes[i]):
                 name = f"{finger.name} {link}" + (f"#{number}" if number else "")
                 self._add_shape(body, name, shape)
-                self._shapes[name] = "tip" if link == names[-1] else "link"
+                self._shapes[name] = "tip" if link == finger.links[-1] else "link"
             parts.append((body, joint))
             parent = body
         for follower, leader in self._hand.coupled():

@@ -156,7 +156,7 @@ class Scene:
         orientation = Rotation.from_matrix(hand.rotation).as_quat()
         pybullet.resetBasePositionAndOrientation(self._hand, hand.position, orientation, physicsClientId=self._client)
         self._columns = self._joint_columns(hand)
-        self._tips = {hand.link_names(k)[-1] for k in range(len(hand.fingers))}
+        self._tips = {hand.fingers[k].links[-1] for k in range(len(hand.fingers))}
         self._paint()
 
     def close(self) -> None:
