@@ -34,11 +34,11 @@ def test_the_plain_broadphase_gives_the_same_bits_as_the_tree(
 
 def test_links_that_are_spared_the_broadphase_have_no_shape() -> None:
     world = World()
-    scene = world._engine._bodies
+    scene = world._engine
     for body in scene.fingers:
         for link in (-1, *range(4)):
             shapes = pybullet.getCollisionShapeData(body, link, physicsClientId=scene.client)
-            assert bool(shapes) == (link >= 0 and HAND.links[link].capsule is not None)
+            assert bool(shapes) == (link >= 0 and bool(HAND.fingers[0].shapes[link]))
     world.close()
 
 

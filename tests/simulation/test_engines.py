@@ -1,7 +1,6 @@
 """Both engines move the same hand: geometry, inertia and free motion agree."""
 
 import dataclasses
-import sys
 from pathlib import Path
 
 import mujoco
@@ -9,10 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, mujoco_model
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 
 ENGINES = ("bullet", "mujoco")
 NOWHERE, FLOATS = (0.0, 0.0, 9.0), 10**6
@@ -126,9 +124,3 @@ def columns(paths: list[Path]) -> list[np.ndarray]:
         np.concatenate([table.select(names).to_numpy().astype(float)[:rows] for table in tables], axis=1)
         for names in parts
     ]
-
-
-def test_without_mujoco_the_error_names_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(InputError, match="pip install mujoco"):
-        mujoco_model.load_mujoco()

@@ -23,7 +23,9 @@ def both(plant: Plant, memory: np.ndarray, rows: int = 400, history: int = 0) ->
     plant.kernel.rollout(sent, history, 1, memory.copy(), SIGNALS, fast)
     slow = np.empty_like(fast)
     world = RigWorld(plant)
-    world.rollout(sent, history, 1, memory, SIGNALS, slow)
+    memory = memory.copy()
+    plant.kernel.rollout(sent[:history], history, 1, memory, SIGNALS, slow[:0])
+    world.rollout(sent[history:], memory, SIGNALS, slow)
     world.close()
     return fast, slow
 
@@ -55,9 +57,9 @@ def test_it_is_bullet_that_moves_the_rig() -> None:
     memory = plant.memory(DrivetrainConstants())
     world = RigWorld(plant)
     out, heavier = np.empty((50, 2, 3)), np.empty((50, 2, 3))
-    world.rollout(commands(50, 3), 0, 1, memory, SIGNALS, out)
+    world.rollout(commands(50, 3), memory, SIGNALS, out)
     pybullet.changeDynamics(world._body, 1, mass=1.0, physicsClientId=world._client)
-    world.rollout(commands(50, 3), 0, 1, memory, SIGNALS, heavier)
+    world.rollout(commands(50, 3), memory, SIGNALS, heavier)
     assert np.abs(out - heavier).max() > 1e-3
     world.close()
 

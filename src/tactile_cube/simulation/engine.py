@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,6 @@ OBJECT_STATE = 13
 
 class Engine(Protocol):
     """One hand, one object and perhaps a table. Joint arrays are (fingers, links), from the palm to the tip."""
-
-    @property
-    def loop(self) -> Literal["c", "python"]:
-        """Which loop runs the physics steps; both give the same bits."""
-        ...
 
     @property
     def q(self) -> Array:

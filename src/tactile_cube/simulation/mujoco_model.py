@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from itertools import combinations
-from types import ModuleType
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import NamedShape, straight_half, unit_inertia
@@ -31,29 +30,15 @@ RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]
 """Impedance of tendons and joint stops, as hard as MuJoCo has it."""
 
 
-def load_mujoco() -> ModuleType:
-    """The package.
-
-    Raises:
-        InputError: it is not installed.
-    """
-    try:
-        import mujoco
-    except ImportError as error:
-        raise InputError("engine=mujoco needs the package mujoco: pip install mujoco") from error
-    module: ModuleType = mujoco
-    return module
-
-
 class HandSpec:
     """Description of one world, from which a model is compiled for each episode.
 
     The joints come first in the state, finger by finger, q1..q4 each; the cube's free joint is last.
     """
 
-    def __init__(self, mujoco: ModuleType, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
+    def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         """Describes the fingers; their masses are the drive's."""
-        self._mujoco, self._hand, self._drive = mujoco, hand, drive
+        self._hand, self._drive = hand, drive
         self.spec = mujoco.MjSpec()
         self.spec.compiler.degree = False
         self._set_options(options)
@@ -78,7 +63,7 @@ class HandSpec:
         return model
 
     def _set_options(self, options: SimulationOptions) -> None:
-        mujoco, option = self._mujoco, self.spec.option
+        option = self.spec.option
         option.timestep = options.dt
         option.integrator = mujoco.mjtIntegrator.mjINT_EULER
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
@@ -101,9 +86,9 @@ class HandSpec:
             body = parent.add_body(name=f"{finger.name} {link}", explicitinertial=True, **place)
             joint = body.add_joint(
                 name=f"{finger.name}_q{i + 1}",
-                type=self._mujoco.mjtJoint.mjJNT_HINGE,
+                type=mujoco.mjtJoint.mjJNT_HINGE,
                 axis=view("axis")[k, i],
-                limited=self._mujoco.mjtLimited.mjLIMITED_TRUE,
+                limited=mujoco.mjtLimited.mjLIMITED_TRUE,
                 range=finger.limits[i].tolist(),
                 solref_limit=rigid,
                 solimp_limit=RIGID,
@@ -120,7 +105,7 @@ class HandSpec:
 
     def _add_shape(self, body: Any, name: str, shape: CollisionShape) -> None:
         """A link's collision shape; capsules and cylinders have half their length in MuJoCo."""
-        kinds, size = self._mujoco.mjtGeom, shape.size
+        kinds, size = mujoco.mjtGeom, shape.size
         kind, numbers = {
             "capsule": (kinds.mjGEOM_CAPSULE, [size[0], 0.5 * size[-1], 0.0]),
             "cylinder": (kinds.mjGEOM_CYLINDER, [size[0], 0.5 * size[-1], 0.0]),
@@ -137,8 +122,8 @@ class HandSpec:
     def _add_tendon(self, finger: str, follower: int, leader: int, rigid: list[float]) -> None:
         """Holds a coupled joint at the one it follows."""
         tendon = self.spec.add_equality(
-            type=self._mujoco.mjtEq.mjEQ_JOINT,
-            objtype=self._mujoco.mjtObj.mjOBJ_JOINT,
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
             name1=f"{finger}_q{follower + 1}",
             name2=f"{finger}_q{leader + 1}",
             solref=rigid,
@@ -153,7 +138,7 @@ class HandSpec:
 
     def _add_box(self, name: str, body: Any, half: tuple[float, ...]) -> Any:
         self._shapes[name] = name
-        box = self._mujoco.mjtGeom.mjGEOM_BOX
+        box = mujoco.mjtGeom.mjGEOM_BOX
         return body.add_geom(name=name, type=box, size=half, contype=0, conaffinity=0)
 
     def _add_pairs(self) -> list[tuple[str, str]]:
@@ -199,11 +184,11 @@ class HandSpec:
         self._mesh.uservert = (mesh.vertices * size).ravel().tolist()
         self._mesh.userface = mesh.faces.ravel().tolist()
         _, shape = self._cube
-        shape.type, shape.meshname = self._mujoco.mjtGeom.mjGEOM_MESH, "object"
+        shape.type, shape.meshname = mujoco.mjtGeom.mjGEOM_MESH, "object"
 
     def _object_geometry(self, kind: NamedShape, half: Array) -> tuple[Any, Array]:
         """MuJoCo's type and size of an object with half edges (3,) [m]."""
-        kinds = self._mujoco.mjtGeom
+        kinds = mujoco.mjtGeom
         if kind == "box":
             return kinds.mjGEOM_BOX, half
         if kind == "cylinder":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +52,7 @@ class World:
             effects: Further physical effects of the drivetrain, each at a joint.
 
         Raises:
-            InputError: The engine is not installed, or the options name no single one.
+            InputError: The options name no single engine.
         """
         self.hand = hand
         self.options = options or SimulationOptions()
@@ -61,7 +60,7 @@ class World:
         self.fault = ""
         self.trace: dict[str, Array] = {}
         self._drive = HandDrive(hand, self.options, effects)
-        self._engine = make_engine(hand, self.options, self._drive)
+        self._engine = _make_engine(hand, self.options, self._drive)
         self._cube = np.zeros(OBJECT_STATE)
         self._push = np.zeros(6)
         self._coupled = np.array(hand.coupled(), dtype=np.int64).reshape(-1, 2)
@@ -193,11 +192,6 @@ class World:
         """Time since the reset [s]."""
         return self.steps * self.options.policy_dt
 
-    @property
-    def loop(self) -> Literal["c", "python"]:
-        """Which loop runs the physics steps."""
-        return self._engine.loop
-
     def contacts(self) -> list[Contact]:
         """Contacts of the last physics step."""
         return self._engine.contacts()
@@ -236,12 +230,7 @@ class World:
         return np.stack(columns, axis=1)
 
 
-def make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
-    """The engine that the options name.
-
-    Raises:
-        InputError: it is not installed.
-    """
+def _make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
     if options.single_engine == "mujoco":
         from tactile_cube.simulation.mujoco_engine import MujocoEngine
 
