@@ -47,7 +47,7 @@ class NativeLoop:
         if pybullet.loadPlugin(str(native_library()), "_steps", physicsClientId=client) < 0:
             raise OSError("PyBullet refused the compiled loop")
         self._handle = self._library.physics_client()
-        self._control = plant.kernel.control_address
+        self._control = plant.kernel.control_callback()[1]
 
     def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
         """Says what the steps work on, in place.
