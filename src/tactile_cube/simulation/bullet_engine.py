@@ -21,7 +21,7 @@ from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half, unit_inertia
 from tactile_cube.simulation.bullet_loop import make_loop, object_state
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, read_contact
+from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import OBJECT_STATE
 from tactile_cube.simulation.options import SimulationOptions
@@ -160,10 +160,16 @@ class BulletEngine:
 
     def contacts(self) -> list[Contact]:
         """See `Engine.contacts`."""
-        names = {body: finger.name for body, finger in zip(self.fingers, self._hand.fingers, strict=True)}
-        names |= {self.cube: "cube", self.table: "table"}
-        links = {body: self._hand.fingers[k].links for k, body in enumerate(self.fingers)}
-        return [read_contact(row, names, links) for row in pybullet.getContactPoints(physicsClientId=self.client)]
+        names = {(body, -1): (name, "") for body, name in ((self.cube, "cube"), (self.table, "table"))}
+        for body, finger in zip(self.fingers, self._hand.fingers, strict=True):
+            names |= {(body, k): (finger.name, link) for k, link in enumerate(finger.links)}
+        found = []
+        for row in pybullet.getContactPoints(physicsClientId=self.client):
+            first, second = names[row[1], row[3]], names[row[2], row[4]]
+            middle = 0.5 * (np.array(row[5]) + np.array(row[6]))
+            friction_on_first = row[10] * np.array(row[11]) + row[12] * np.array(row[13])
+            found.append(named_contact(first, second, middle, -np.array(row[7]), row[8], row[9], -friction_on_first))
+        return found
 
     def close(self) -> None:
         """Ends the physics server."""

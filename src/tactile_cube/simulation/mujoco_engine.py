@@ -95,16 +95,11 @@ class MujocoEngine:
         contact, wrench = self._data.contact[index], np.zeros(6)
         mujoco.mj_contactForce(self._model, self._data, index, wrench)
         frame = np.reshape(contact.frame, (3, 3))
-        names = [self._model.geom(shape).name.partition(" ") for shape in contact.geom]
-        return named_contact(
-            bodies=(names[0][0], names[1][0]),
-            links=(names[0][2].partition("#")[0], names[1][2].partition("#")[0]),
-            middle=np.array(contact.pos),
-            normal=np.array(frame[0]),
-            distance=float(contact.dist),
-            force=float(wrench[0]),
-            friction=wrench[1:3] @ frame[1:],
-        )
+        names = [self._model.geom(shape).name.partition("#")[0].partition(" ") for shape in contact.geom]
+        first, second = ((body, link) for body, _, link in names)
+        friction = wrench[1:3] @ frame[1:]
+        middle, normal = np.array(contact.pos), np.array(frame[0])
+        return named_contact(first, second, middle, normal, float(contact.dist), float(wrench[0]), friction)
 
 
 def _in_world(states: Array) -> Array:
