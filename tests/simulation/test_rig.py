@@ -1,3 +1,5 @@
+from typing import Literal
+
 import numpy as np
 import pybullet
 import pytest
@@ -34,9 +36,11 @@ def finger_plant(*effects: str) -> Plant:
     return Plant([RigidBodyTree.from_urdf(DLR_HAND2.finger_urdf(0))], 0.002, [find_effect(name) for name in effects])
 
 
-def test_free_motion_in_bullet_agrees_with_the_fast_rollout() -> None:
+@pytest.mark.parametrize("sign", ["physical", "printed"])
+def test_free_motion_in_bullet_agrees_with_the_fast_rollout(sign: Literal["physical", "printed"]) -> None:
     plant = finger_plant()
-    memory = plant.memory(DrivetrainConstants(), gravity=(3.0, -2.0, -9.0))
+    constants = DrivetrainConstants(sign=sign, reflected_inertia=(1.5e-3, 2e-3, 3e-3))
+    memory = plant.memory(constants, gravity=(3.0, -2.0, -9.0))
     plant.reset(memory, np.array([0.1, 0.2, 0.3]), np.array([1.0, -1.0, 0.5]))
     fast, slow = both(plant, memory)
     assert np.abs(fast[:, 0]).max() > 0.3

@@ -255,11 +255,3 @@ def test_the_trace_holds_every_physics_step_and_joins_up() -> None:
     position = np.concatenate([piece["q"] for piece in pieces])
     np.testing.assert_allclose(np.diff(position, axis=0), 0.002 * velocity[1:], atol=1e-12)
     world.close()
-
-
-def test_without_the_option_there_is_no_trace() -> None:
-    world = World()
-    world.reset(EpisodeConstants(), Start(DLR_HAND2.start_angles))
-    world.step(DLR_HAND2.start_angles)
-    assert world.trace == {}
-    world.close()

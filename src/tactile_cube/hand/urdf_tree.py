@@ -28,12 +28,29 @@ def read_movable_joints(
     See `RigidBodyTree.from_urdf` for the arguments.
     """
     every, bodies = read_joints(text)
+    movable = [j.name for j in every if j.kind != "fixed"]
+    for name in (*(coupled or ()), *(joints or ())):
+        if name not in movable:
+            raise InputError(f"URDF: it has no movable joint '{name}'; movable: {', '.join(movable) or 'none'}")
     if coupled:
-        _refuse_unknown(coupled, every)
         every = [replace(j, coupling=coupled[j.name]) if j.name in coupled else j for j in every]
-    actuated = _actuated(every, joints)
-    _check_couplings(every)
-    every = [j if _moves(j, actuated) else replace(j, kind="fixed") for j in every]
+    leaders = [j.name for j in every if j.kind != "fixed" and j.coupling is None]
+    actuated = tuple(leaders if joints is None else joints)
+    if not actuated:
+        raise InputError("URDF: no joint of it can move; a mechanism needs at least one")
+    if len(set(actuated)) < len(actuated):
+        raise InputError(f"joints: {', '.join(actuated)} names a joint twice; name each once")
+    for k, joint in enumerate(every):
+        leader = joint.coupling.joint if joint.coupling else joint.name
+        if joint.coupling and joint.name in actuated:
+            raise InputError(f"joint '{joint.name}' is actuated and follows '{leader}'; choose one")
+        if joint.coupling and leader not in leaders:
+            known = ", ".join(sorted(leaders)) or "none"
+            raise InputError(
+                f"joint '{joint.name}' follows '{leader}', which does not move on its own; name one of {known}"
+            )
+        if leader not in actuated:  # locked; a follower of a locked joint too
+            every[k] = replace(joint, kind="fixed")
     return *_merge_fixed(*_parents_first(every, bodies)), actuated
 
 
@@ -69,46 +86,6 @@ def robot_of(text: str) -> ElementTree.Element:
     if robot.tag != "robot":
         raise InputError(f"URDF: the root element is <{robot.tag}>; it must be <robot>")
     return robot
-
-
-def _refuse_unknown(names: Mapping[str, Mimic] | Sequence[str], every: list[Joint]) -> None:
-    movable = [j.name for j in every if j.kind != "fixed"]
-    for name in names:
-        if name not in movable:
-            raise InputError(f"URDF: it has no movable joint '{name}'; movable: {', '.join(movable) or 'none'}")
-
-
-def _actuated(every: list[Joint], joints: Sequence[str] | None) -> tuple[str, ...]:
-    if joints is None:
-        names = tuple(j.name for j in every if j.kind != "fixed" and j.coupling is None)
-    else:
-        names = tuple(joints)
-        _refuse_unknown(names, every)
-    if not names:
-        raise InputError("URDF: no joint of it can move; a mechanism needs at least one")
-    if len(set(names)) < len(names):
-        raise InputError(f"joints: {', '.join(names)} names a joint twice; name each once")
-    for joint in every:
-        if joint.name in names and joint.coupling is not None:
-            raise InputError(f"joint '{joint.name}' is actuated and follows '{joint.coupling.joint}'; choose one")
-    return names
-
-
-def _check_couplings(every: list[Joint]) -> None:
-    leaders = {j.name for j in every if j.kind != "fixed" and j.coupling is None}
-    for joint in every:
-        if joint.coupling is not None and joint.coupling.joint not in leaders:
-            raise InputError(
-                f"joint '{joint.name}' follows '{joint.coupling.joint}', which does not move on its own; name one of "
-                f"{', '.join(sorted(leaders)) or 'none'}"
-            )
-
-
-def _moves(joint: Joint, actuated: tuple[str, ...]) -> bool:
-    """Whether a joint is actuated or follows one that is; a follower of a locked joint is locked with it."""
-    if joint.kind == "fixed":
-        return False
-    return joint.name in actuated or (joint.coupling is not None and joint.coupling.joint in actuated)
 
 
 def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> tuple[str, list[Joint]]:
