@@ -59,7 +59,13 @@ def hand_from_urdf(
     Raises:
         InputError: what does not fit, by its key.
     """
-    file, text, digest = _read(urdf, sha256)
+    file = urdf_file(urdf)
+    text, left_out = with_own_files(read_text(file), file, package_of(file), ("collision",))
+    if left_out:
+        raise InputError(left_out[0])
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    if sha256 not in (None, digest):
+        raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
     if not fingers:
         raise InputError("hand.fingers is empty; describe at least one finger")
     chains, columns = zip(*(_finger(str(key), one, text) for key, one in fingers.items()), strict=True)
@@ -87,19 +93,12 @@ def hand_from_urdf(
     )
     lower, upper = _action_limits(action, np.stack([hand.lower, hand.upper], axis=1), len(chains))
     hand = replace(hand, action_lower=lower, action_upper=upper)
-    return replace(hand, start_angles=_start(hand, start))
-
-
-def _read(urdf: str, sha256: str | None) -> tuple[Path, str, str]:
-    """A hand's URDF: its file, its text with the absolute names of its own meshes, and its SHA-256."""
-    file = urdf_file(urdf)
-    text, left_out = with_own_files(read_text(file), file, package_of(file), ("collision",))
-    if left_out:
-        raise InputError(left_out[0])
-    digest = hashlib.sha256(file.read_bytes()).hexdigest()
-    if sha256 not in (None, digest):
-        raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
-    return file, text, digest
+    if start is None:
+        return replace(hand, start_angles=grasp_angles(hand, NOMINAL_OBJECT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+    angles = np.asarray(start, dtype=np.float64)
+    if angles.shape != hand.lower.shape:
+        raise InputError(f"hand.start has {angles.size} angles; the hand has {hand.lower.size} joints")
+    return replace(hand, start_angles=angles)
 
 
 def urdf_file(urdf: str) -> Path:
@@ -142,15 +141,6 @@ def _action_limits(action: Mapping[str, Sequence[float]] | None, limits: Array, 
     if not np.all(ends[0] < ends[1]):
         raise InputError("hand.action: each lower must be below its upper")
     return np.maximum(ends[0], limits[:, 0]), np.minimum(ends[1], limits[:, 1])
-
-
-def _start(hand: Hand, start: Sequence[float] | None) -> Array:
-    if start is None:
-        return grasp_angles(hand, NOMINAL_OBJECT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-    angles = np.asarray(start, dtype=np.float64)
-    if angles.shape != hand.lower.shape:
-        raise InputError(f"hand.start has {angles.size} angles; the hand has {hand.lower.size} joints")
-    return angles
 
 
 def _vector(key: str, values: Sequence[float]) -> Array:

@@ -107,31 +107,31 @@ class BulletEngine:
         self.fingers = [
             load_chain(self.client, urdf, *base) for urdf, base in zip(drive.finger_urdfs(), bases, strict=True)
         ]
-        self._inertias = [[self._inertia(body, link) for link in self._links] for body in self.fingers]
+        self._inertias = [
+            [pybullet.getDynamicsInfo(body, link, physicsClientId=self.client)[2] for link in self._links]
+            for body in self.fingers
+        ]
         for body, bare in zip(self.fingers, self._bare, strict=True):  # Bullet boxes links without a shape too
             for link in (-1, *bare):
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
-        self._joints = np.zeros((2, len(hand.fingers), hand.links_per_finger))
+        self.q, self.v = np.zeros((2, len(hand.fingers), hand.links_per_finger))
         self._loop = make_loop(self.client, drive.plant)
-        q, v = self._joints.reshape(2, -1)
-        self._loop.bind(self.fingers, q, v, drive.memory)
-
-    @property
-    def q(self) -> Array:
-        """See `Engine.q`."""
-        return np.asarray(self._joints[0])
-
-    @property
-    def v(self) -> Array:
-        """See `Engine.v`."""
-        return np.asarray(self._joints[1])
+        self._loop.bind(self.fingers, self.q.reshape(-1), self.v.reshape(-1), drive.memory)
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
         """See `Engine.place`."""
         self._constants = constants
-        self._joints[0], self._joints[1] = q, v
-        self._remove_objects()
-        self._set_table(constants)
+        self.q[:], self.v[:] = q, v
+        # the table goes last: a new body gets the place in the broadphase that was left last, and the solver goes
+        # through contacts in the order of these places, which must be the same in every episode
+        for body in (self.cube, self.table):
+            if body >= 0:
+                pybullet.removeBody(body, physicsClientId=self.client)
+        self.table = -1
+        if constants.table_height is not None:  # even a distant body takes 6 % of the time
+            self.table = self._new_table(constants.table_height)
+            friction = {"lateralFriction": constants.table_friction}
+            pybullet.changeDynamics(self.table, -1, **friction, physicsClientId=self.client)
         self._set_cube(constants, start)
         for body, position, velocity in zip(self.fingers, q, v, strict=True):
             for k in self._links:
@@ -184,19 +184,6 @@ class BulletEngine:
             state[7:10] -= np.cross(state[10:13], arm)
         return state
 
-    def _inertia(self, body: int, link: int) -> tuple[float, float, float]:
-        diagonal = pybullet.getDynamicsInfo(body, link, physicsClientId=self.client)[2]
-        return (float(diagonal[0]), float(diagonal[1]), float(diagonal[2]))
-
-    def _remove_objects(self) -> None:
-        """Takes cube and table away, the table last: a new body gets the place in the broadphase that was left last.
-
-        The solver goes through contacts in the order of these places, which must be the same in every episode.
-        """
-        for body in (self.cube, self.table):
-            if body >= 0:
-                pybullet.removeBody(body, physicsClientId=self.client)
-
     def _new_table(self, height: float) -> int:
         centre = [0.0, 0.0, height - 0.5 * float(_TABLE_SIZE[2])]
         return int(
@@ -204,14 +191,6 @@ class BulletEngine:
                 0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, physicsClientId=self.client
             )
         )
-
-    def _set_table(self, constants: EpisodeConstants) -> None:
-        """A table where the episode has one; else none, for even a distant body takes 6 % of the time."""
-        self.table = -1
-        if constants.table_height is None:
-            return
-        self.table = self._new_table(constants.table_height)
-        pybullet.changeDynamics(self.table, -1, lateralFriction=constants.table_friction, physicsClientId=self.client)
 
     def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
         """A new body each time: Bullet keeps the inertia in the world of a used one for a step after it is moved.

@@ -17,17 +17,15 @@ OBJECT_STATE = 13
 
 
 class Engine(Protocol):
-    """One hand, one object and perhaps a table. Joint arrays are (fingers, links), from the palm to the tip."""
+    """One hand, one object and perhaps a table. Joint arrays are (fingers, links), from the palm to the tip.
 
-    @property
-    def q(self) -> Array:
-        """Positions of all joints (fingers, links) [rad]."""
-        ...
+    Attributes:
+        q: Positions of all joints [rad].
+        v: Their velocities [rad/s].
+    """
 
-    @property
-    def v(self) -> Array:
-        """Velocities of all joints (fingers, links) [rad/s]."""
-        ...
+    q: Array
+    v: Array
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
         """Puts everything at the start of an episode; nothing of the past remains, to the bit.

@@ -26,19 +26,8 @@ class MujocoEngine:
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         """Describes the bodies; the model comes with each episode."""
         self._spec = HandSpec(hand, options, drive)
-        self._links = hand.links_per_finger
-        self._dofs = self._links * len(hand.fingers)
+        self._dofs = hand.links_per_finger * len(hand.fingers)
         self._control, self._memory = drive.plant.kernel.control_step, drive.memory
-
-    @property
-    def q(self) -> Array:
-        """See `Engine.q`."""
-        return np.asarray(self._data.qpos[: self._dofs].reshape(-1, self._links))
-
-    @property
-    def v(self) -> Array:
-        """See `Engine.v`."""
-        return np.asarray(self._data.qvel[: self._dofs].reshape(-1, self._links))
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
         """See `Engine.place`."""
@@ -51,6 +40,7 @@ class MujocoEngine:
         self._data.qvel[:] = [*v.ravel(), *np.asarray(start.cube_linear_velocity), *angular]
         data = self._data
         self._driven = data.qpos[: self._dofs], data.qvel[: self._dofs], data.qfrc_applied[: self._dofs]
+        self.q, self.v = (joints.reshape(q.shape) for joints in self._driven[:2])
 
     def set_gravity(self, acceleration: Array) -> None:
         """See `Engine.set_gravity`."""
