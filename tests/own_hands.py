@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 from tactile_cube.command_help import CONFIG
-from tactile_cube.hand import UrdfHand, hand_from_urdf
+from tactile_cube.hand import Hand, hand_from_urdf
 
 
 def description(which: tuple[str, ...] = ("left", "right", "thumb"), **changes: Any) -> dict[str, Any]:
@@ -18,6 +18,6 @@ def description(which: tuple[str, ...] = ("left", "right", "thumb"), **changes: 
     return plain | changes
 
 
-def own_hand(*fingers: str, **changes: Any) -> UrdfHand:
+def own_hand(*fingers: str, **changes: Any) -> Hand:
     """A hand of the pattern; all its fingers where none is named."""
     return hand_from_urdf(**description(fingers or ("left", "right", "thumb"), **changes))

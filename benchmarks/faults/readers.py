@@ -27,7 +27,6 @@ from tactile_cube.env import Task
 from tactile_cube.evaluation.environment import environment
 from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
 from tactile_cube.hand.dlr_hand2 import DLR_HAND2
-from tactile_cube.hand.model import finger_urdf
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.rig import read_rig
@@ -234,7 +233,9 @@ READERS = (
     Reader("import of CSV", 15, _csv, _import_csv),
     Reader("import of a ROS 2 bag (MCAP)", 8, _bag, _import_bag),
     Reader("URDF of two joints", 10, lambda folder: (folder / "rig.urdf").write_text(URDF), _read_urdf),
-    Reader("URDF of a finger", 8, lambda folder: (folder / "rig.urdf").write_text(finger_urdf(DLR_HAND2)), _read_urdf),
+    Reader(
+        "URDF of a finger", 8, lambda folder: (folder / "rig.urdf").write_text(DLR_HAND2.finger_urdf(0)), _read_urdf
+    ),
     Reader("model file", 12, lambda folder: write_model(model(), folder / "model.yaml"), _read_model),
     Reader("policy", 8, _policy, _read_policy, _damage_policy),
     Reader("checkpoint", 10, _checkpoint, _read_checkpoint, _damage_checkpoint),

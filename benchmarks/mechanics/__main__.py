@@ -42,7 +42,7 @@ def main() -> None:
     given, commit = asked(), current_commit()
     options = {f"{engine} {name}": ACCURACY[name](engine) for engine in given.engines for name in given.accuracy}
     found = measure(options, {name: CASES[name] for name in given.cases}, say=print)
-    finer = [row for one in given.engines for row in refine(SimulationOptions.fast(one), given.spinning, say=print)]
+    finer = [row for one in given.engines for row in refine(SimulationOptions(one), given.spinning, say=print)]
     words = shlex.join(["python", "-m", "benchmarks.mechanics", *sys.argv[1:]])
     given.page.parent.mkdir(parents=True, exist_ok=True)
     command = f"{words}` at commit `{commit}" if commit else words

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.mechanics.case import Answer
-from tactile_cube.hand import DLR_HAND2, finger_urdf, grasp_angles, tip_positions
-from tactile_cube.hand.model import JOINTS_PER_FINGER
+from tactile_cube.hand import DLR_HAND2, grasp_angles, tip_positions
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.options import SimulationOptions
@@ -31,7 +30,7 @@ _NOTHING = 1e-9
 def impact(options: SimulationOptions) -> Answer:
     """Speed of the cube's centre 20 ms after the finger set out; it arrives after 5 ms."""
     world = World(options=SimulationOptions(options.engine, options.dt, round(_DURATION / options.dt)))
-    own = slice(JOINTS_PER_FINGER * FINGER, JOINTS_PER_FINGER * (FINGER + 1))
+    own = DLR_HAND2.of_finger(FINGER)
     angles, normal = _angles(own), -DLR_HAND2.fingers[FINGER].face
     jacobian = _jacobian(angles)[:, own]
     velocities = np.zeros(len(angles))
@@ -77,4 +76,4 @@ def _jacobian(angles: Array) -> Array:
 
 def _inertia(q: Array, rotors: Array) -> Array:
     """Inertia that the drives feel, rotors included (3, 3) [kg m^2]."""
-    return RigidBodyTree.from_urdf(finger_urdf(DLR_HAND2)).actuated_mass_matrix(q) + np.diag(rotors)
+    return RigidBodyTree.from_urdf(DLR_HAND2.finger_urdf(0)).actuated_mass_matrix(q) + np.diag(rotors)

@@ -6,6 +6,8 @@ friction takes with t (a + b), where t is the torque that both tips bear.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import brentq
 
@@ -44,9 +46,7 @@ _PARTS = 5
 
 def _finer(options: SimulationOptions) -> SimulationOptions:
     """Policy steps a fifth as long."""
-    return SimulationOptions(
-        options.engine, options.dt, options.substeps // _PARTS, options.solver_iterations, options.loop
-    )
+    return replace(options, substeps=options.substeps // _PARTS)
 
 
 def _turning_point(first: float, weight: float, friction: float) -> float:

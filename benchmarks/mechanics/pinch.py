@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand import DLR_HAND2, HandModel, grasp_angles
-from tactile_cube.hand.model import Capsule
+from tactile_cube.hand import DLR_HAND2, Hand, grasp_angles
+from tactile_cube.hand.urdf import CollisionShape
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.world import World
 
@@ -29,11 +29,15 @@ _CLEARANCE, _RETRACTED = 1e-3, 2e-2
 _TAKING_PART = np.array([False, True, False, True])
 
 
-def _with_round_tips(hand: HandModel) -> HandModel:
+def _with_round_tips(hand: Hand) -> Hand:
     """The hand with spheres for fingertips: a capsule along a face touches at two points, which bear more than one."""
-    *others, distal = hand.links
-    sphere = Capsule(hand.tip_radius, hand.tip_reach[2] - 1e-4, hand.tip_reach[2])
-    return replace(hand, links=(*others, replace(distal, capsule=sphere)))
+    fingers = []
+    for finger in hand.fingers:
+        tip = finger.shapes[-1][0]
+        end = 0.5 * (tip.size[1] - 1e-4) * tip.rotation[:, 2]
+        sphere = CollisionShape("capsule", (hand.tip_radius, 1e-4), tip.position + end)
+        fingers.append(replace(finger, shapes=(*finger.shapes[:-1], (sphere,))))
+    return replace(hand, fingers=tuple(fingers))
 
 
 ROUND_TIPS = _with_round_tips(DLR_HAND2)

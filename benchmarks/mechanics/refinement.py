@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.mechanics.held_cube import measure_accuracy
 from tactile_cube.hand import DLR_HAND2, Gait
-from tactile_cube.hand.gait import joint_angles
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.world import World
@@ -89,7 +88,7 @@ def _walk(options: SimulationOptions, constants: EpisodeConstants) -> Array:
     world.reset(replace(constants, filter_time=0.25), Start(DLR_HAND2.start_angles))
     rows = []
     for step in range(GAIT_STEPS):
-        world.step(joint_angles(DLR_HAND2, gait.tips(step)))
+        world.step(DLR_HAND2.angles_at(gait.tips(step)[None])[0])
         turn = Rotation.from_quat(world.cube_quaternion)
         upright = float(np.clip(turn.as_matrix()[2, 2], -1.0, 1.0))
         rows.append([turn.as_euler("ZYX")[0], np.arccos(upright), world.cube_position[2]])

@@ -12,7 +12,7 @@ from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.options import SimulationOptions
 from tactile_cube.simulation.world import World
 
-ACCURACY = {"fast": SimulationOptions.fast, "faithful": SimulationOptions.faithful}
+ACCURACY = {"fast": SimulationOptions, "faithful": SimulationOptions.faithful}
 _TIMED = 50
 
 

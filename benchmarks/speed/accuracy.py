@@ -11,11 +11,11 @@ from benchmarks.speed.report import Figure, Section
 from tactile_cube.simulation import SimulationOptions
 
 OPTIONS = {
-    "fast": SimulationOptions.fast(),
+    "fast": SimulationOptions(),
     "fast, 20 iterations": SimulationOptions(solver_iterations=20),
     "fast, 50 iterations": SimulationOptions(solver_iterations=50),
     "faithful": SimulationOptions.faithful(),
-    "engine=mujoco, fast": SimulationOptions.fast("mujoco"),
+    "engine=mujoco, fast": SimulationOptions("mujoco"),
     "engine=mujoco, faithful": SimulationOptions.faithful("mujoco"),
 }
 REFERENCE_NAME = "reference: 0.5 ms, 500 iterations"

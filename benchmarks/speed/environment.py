@@ -43,13 +43,12 @@ def _measure(section: Section, worlds: dict[str, Holding], rounds: int, calls: i
 
 
 def _worlds(peers: bool, missing: list[str]) -> dict[str, Holding]:
-    fast = SimulationOptions.fast()
+    fast = SimulationOptions()
     worlds: dict[str, Holding] = {
         "tactile_cube": our_world(fast),
         "tactile_cube, 3 effects on each joint": our_world(fast, EFFECTS),
-        "tactile_cube, loop in Python": our_world(SimulationOptions(loop="python")),
         "tactile_cube, faithful": our_world(SimulationOptions.faithful()),
-        "tactile_cube, engine=mujoco": our_world(SimulationOptions.fast("mujoco")),
+        "tactile_cube, engine=mujoco": our_world(SimulationOptions("mujoco")),
         "tactile_cube, engine=mujoco, faithful": our_world(SimulationOptions.faithful("mujoco")),
     }
     if not peers:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand import DLR_HAND2, hand_urdf
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.simulation import EpisodeConstants
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ class MujocoHand:
 
 
 def _model(mujoco: ModuleType, c: EpisodeConstants, impratio: float, noslip: int) -> Any:
-    spec = mujoco.MjSpec.from_string(hand_urdf(DLR_HAND2))
+    spec = mujoco.MjSpec.from_string(DLR_HAND2.urdf())
     option = spec.option
     option.timestep, option.impratio, option.noslip_iterations = DT, impratio, noslip
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC

@@ -10,7 +10,7 @@ import pybullet
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand import DLR_HAND2, hand_urdf
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.simulation import EpisodeConstants
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ class NaivePyBullet:
         quaternion = Rotation.from_matrix(DLR_HAND2.rotation).as_quat().tolist()
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "hand.urdf"
-            file.write_text(hand_urdf(DLR_HAND2).replace(_PALM, _PALM + _INERTIAL), encoding="utf-8")
+            file.write_text(DLR_HAND2.urdf().replace(_PALM, _PALM + _INERTIAL), encoding="utf-8")
             pose = DLR_HAND2.position.tolist(), quaternion
             return int(
                 pybullet.loadURDF(

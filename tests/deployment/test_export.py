@@ -13,7 +13,7 @@ from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, hand_urdf, tip_positions
+from tactile_cube.hand import DLR_HAND2, tip_positions
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_the_contract_says_what_a_robot_must_know(network: Network, tmp_path: Pa
 def test_the_contract_says_which_hand_it_is_and_how_it_is_held(network: Network) -> None:
     """A robot is set up from this alone: the tips are where its own kinematics put them, gravity where it pulls."""
     contract = interface_contract(network)["hand"]
-    assert contract["urdf"]["sha256"] == hashlib.sha256(hand_urdf(DLR_HAND2).encode()).hexdigest()
+    assert contract["urdf"]["sha256"] == hashlib.sha256(DLR_HAND2.urdf().encode()).hexdigest()
     assert contract["coupled_joints"][0] == {"joint": "ring_q4", "follows": "ring_q3", "ratio": 1.0}
     rotation = np.array(contract["palm"]["rotation"])
     np.testing.assert_allclose(rotation @ contract["palm"]["gravity"]["value"], [0.0, 0.0, -9.81], atol=1e-12)

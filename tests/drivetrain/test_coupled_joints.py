@@ -3,9 +3,7 @@ import numpy as np
 from tactile_cube.drivetrain.coupled_joints import (
     add_tendons,
     estimate_contact,
-    expand,
     link_torques,
-    reduce_equations,
 )
 
 FOLLOW, LEADER = np.array([0, 1, 1]), np.array([0, 1])
@@ -17,30 +15,6 @@ def equations(seed: int = 0):
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(3, 3))
     return root @ root.T, rng.normal(size=3), rng
-
-
-def test_coupled_dofs_follow_their_leader() -> None:
-    q, v = np.zeros(3), np.zeros(3)
-    expand(FOLLOW, RATIO, OFFSET, np.array([0.3, 0.5]), np.array([1.0, 2.0]), q, v)
-    np.testing.assert_allclose(q, [0.3, 0.5, 0.5])
-    np.testing.assert_allclose(v, [1.0, 2.0, 1.6])
-
-
-def test_reduced_equations_are_projected_and_carry_the_rotors() -> None:
-    M, h, _ = equations()
-    reduced, bias = np.zeros((2, 2)), np.zeros(2)
-    reduce_equations(FOLLOW, RATIO, M, h, np.array([0.1, 0.2]), reduced, bias)
-    np.testing.assert_allclose(reduced, J.T @ M @ J + np.diag([0.1, 0.2]))
-    np.testing.assert_allclose(bias, J.T @ h)
-
-
-def test_contact_is_what_the_torques_do_not_explain() -> None:
-    M, h, rng = equations()
-    torque, contact = rng.normal(size=(2, 3))
-    acceleration = np.linalg.solve(M, torque + contact - h)
-    found = np.zeros(2)
-    estimate_contact(FOLLOW, RATIO, M, h, torque, acceleration, 100.0, found)
-    np.testing.assert_allclose(found, J.T @ contact)
 
 
 def test_an_impact_is_believed_up_to_a_limit() -> None:

@@ -37,18 +37,6 @@ def test_friction_opposes_what_moves_and_holds_what_stands(n: int, creeping: boo
     assert moved > 20
 
 
-def test_a_joint_within_its_friction_has_a_speed_of_exactly_zero() -> None:
-    M = np.array([[2.0, 0.7], [0.7, 1.0]])
-    v = solve(M, np.array([0.5, -0.4]), [1.0, 1.0], [0.0, 0.0], [0.3, -0.2])
-    assert v.tolist() == [0.0, 0.0]
-
-
-def test_without_friction_the_momentum_is_divided_by_the_inertia() -> None:
-    M = np.array([[2.0, 0.7], [0.7, 1.0]])
-    b = np.array([0.5, -0.4])
-    np.testing.assert_allclose(solve(M, b, [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]), np.linalg.solve(M, b), rtol=1e-14)
-
-
 def test_the_result_does_not_depend_on_the_first_guess() -> None:
     rng = np.random.default_rng(7)
     for _ in range(100):

@@ -81,7 +81,7 @@ def test_an_effect_that_cannot_be_imported_is_refused() -> None:
 
 
 def c_function(plant: Plant) -> Callable[..., None]:
-    return ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 4)(plant.kernel.control_address)
+    return ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 4)(plant.kernel.control_callback()[1])
 
 
 def test_the_c_function_gives_the_same_torques_to_the_bit() -> None:

@@ -82,13 +82,6 @@ def test_a_joint_pushed_with_less_than_its_friction_does_not_move_by_a_bit() -> 
     assert np.all(q == np.array([0.1, 0.4, 0.2]))
 
 
-def test_a_joint_pushed_with_more_than_its_friction_breaks_away() -> None:
-    plant = Plant([wheel()], dt=0.002)
-    memory = plant.memory(DrivetrainConstants(static_friction=0.02))
-    q = roll(plant, memory, np.full((500, 1), 0.02 / 3.69 * 1.5))[:, 1, 0]
-    assert q[-1] > 1e-3
-
-
 def test_creeping_friction_creeps_with_its_rate() -> None:
     plant = Plant([wheel()], dt=0.002)
     memory = plant.memory(DrivetrainConstants(kp=0.0, kd=0.0))
@@ -161,24 +154,6 @@ def test_a_reset_forgets_everything_but_the_constants() -> None:
     first = roll(plant, memory, commands)
     plant.reset(memory, np.zeros(3))
     assert np.array_equal(roll(plant, memory, commands), first)
-
-
-def test_a_batch_equals_its_blocks_one_by_one() -> None:
-    plant = Plant([finger()], dt=0.002)
-    base = plant.memory(DrivetrainConstants())
-    memory = np.tile(base, (3, 1))
-    plant.view(memory, "kd")[:, 1] = [0.1, 0.2, 0.3]
-    plant.reset(memory, np.random.default_rng(0).normal(size=(3, 3)) * 0.1)
-    alone = memory.copy()
-    commands = np.stack([waves(100), -waves(100)])
-    which, lengths = np.array([0, 1, 0]), np.array([90, 80])
-    out = np.zeros((3, 90, 4, 3))
-    plant.kernel.rollout_batch(commands, which, lengths, 10, 1, memory, ROWS, out)
-    for b in range(3):
-        rows = lengths[which[b]]
-        single = roll(plant, alone[b], commands[which[b]][: 10 + rows], history=10)
-        assert np.array_equal(out[b, :rows], single)
-    assert np.all(out[1, 80:] == 0.0)
 
 
 def test_history_fills_what_effects_remember_without_moving_the_joints() -> None:

@@ -166,10 +166,10 @@ def test_episode_depends_on_seed_index_and_number_only(rotation_task: MakeTask) 
 def test_normal_forces_are_those_on_the_object_by_finger_and_kind_of_link() -> None:
     first, second = (finger.name for finger in DLR_HAND2.fingers[:2])
     touches = [
-        (first, DLR_HAND2.link_names(0)[-1], "cube", 1.0),
-        (first, DLR_HAND2.link_names(0)[-1], "cube", 0.5),
-        (second, DLR_HAND2.link_names(1)[1], "cube", 2.0),
-        (first, DLR_HAND2.link_names(0)[1], second, 9.0),
+        (first, DLR_HAND2.fingers[0].links[-1], "cube", 1.0),
+        (first, DLR_HAND2.fingers[0].links[-1], "cube", 0.5),
+        (second, DLR_HAND2.fingers[1].links[1], "cube", 2.0),
+        (first, DLR_HAND2.fingers[0].links[1], second, 9.0),
         ("table", "", "cube", 9.0),
     ]
     contacts = [SimpleNamespace(finger=f, link=k, other=o, force=n) for f, k, o, n in touches]
@@ -210,7 +210,7 @@ def test_a_turn_counts_as_the_links_own_only_while_one_touches(
 ) -> None:
     world = scripted_world(turn=0.05)
     name = DLR_HAND2.fingers[2].name
-    touch = SimpleNamespace(finger=name, link=DLR_HAND2.link_names(2)[link], other="cube", force=1.0)
+    touch = SimpleNamespace(finger=name, link=DLR_HAND2.fingers[2].links[link], other="cube", force=1.0)
     world.contacts, world.hand = lambda: [touch], DLR_HAND2
     env = rotation_task(world, task=Task("full", direction=1), reward=Reward(link_spin=8.0))
     env.reset()

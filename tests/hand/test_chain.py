@@ -5,11 +5,11 @@ from tests.own_hands import own_hand
 
 def test_velocity_of_the_tip_is_the_slope_of_its_place() -> None:
     hand = own_hand()
-    chain, q = hand.chains[2].chain(*hand.base_in_world(2)), np.array([[0.2, -0.3, 0.5, 0.9]])
-    jacobian = chain.tips(q)[1][0]
+    chain, base, q = hand.fingers[2].chain, hand.base_in_world(2), np.array([[0.2, -0.3, 0.5, 0.9]])
+    jacobian = chain.motion(*base, q)[1][0]
     for joint in range(4):
         step = np.where(np.arange(4) == joint, 1e-6, 0.0)
-        slope = (chain.tips(q + step)[0] - chain.tips(q - step)[0])[0] / 2e-6
+        slope = (chain.tips(*base, q + step) - chain.tips(*base, q - step))[0] / 2e-6
         np.testing.assert_allclose(jacobian[:, joint], slope, atol=1e-8)
 
 

@@ -17,11 +17,6 @@ def test_finger_bases_agree_with_the_second_published_form() -> None:
         np.testing.assert_allclose(finger.rotation, Rotation.from_euler("xyz", rpy).as_matrix(), atol=1e-4)
 
 
-def test_joints_are_ordered_finger_by_finger() -> None:
-    assert DLR_HAND2.joint_names[:4] == ("ring_q1", "ring_q2", "ring_q3", "middle_q1")
-    assert len(DLR_HAND2.joint_names) == 12
-
-
 def test_start_pose_has_every_tip_one_millimetre_off_its_face_at_mid_height() -> None:
     tips = tip_positions(DLR_HAND2, DLR_HAND2.start_angles)
     for finger, tip in zip(DLR_HAND2.fingers, tips, strict=True):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand import UrdfHand, hand_from_urdf, tip_positions
+from tactile_cube.hand import Hand, hand_from_urdf, tip_positions
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
 from tests.meshes import CUBE, write_obj
@@ -114,7 +114,7 @@ def test_a_joint_without_limits_is_refused(tmp_path: Path) -> None:
 MATERIAL = "newmtl m\nmap_Kd -bm 1 {}\n"
 
 
-def with_mesh(folder: Path, name: str) -> UrdfHand:
+def with_mesh(folder: Path, name: str) -> Hand:
     """The pattern in `folder/hand/urdf` with a mesh as a finger's shape; there are meshes in and outside of `hand`."""
     inner = folder / "hand" / "urdf"
     inner.mkdir(parents=True)
@@ -138,7 +138,7 @@ def with_mesh(folder: Path, name: str) -> UrdfHand:
 @pytest.mark.parametrize("name", ["object.obj", "own.obj", "package://any/object.obj", "file://object.obj"])
 def test_a_mesh_below_the_urdf_is_taken(tmp_path: Path, name: str) -> None:
     file = tmp_path / "hand" / "urdf" / name.rpartition("/")[2]
-    assert [shape.file for shape in with_mesh(tmp_path, name).shapes(0)[-1] if shape.file] == [str(file)]
+    assert [shape.file for shape in with_mesh(tmp_path, name).fingers[0].shapes[-1] if shape.file] == [str(file)]
 
 
 @pytest.mark.parametrize("name", ["../object.obj", "package://any/object.obj"])
@@ -146,7 +146,7 @@ def test_a_package_xml_above_the_urdf_says_what_its_folder_is(tmp_path: Path, na
     (tmp_path / "hand").mkdir()
     (tmp_path / "hand" / "package.xml").touch()
     file = str(tmp_path / "hand" / "object.obj")
-    assert [shape.file for shape in with_mesh(tmp_path, name).shapes(0)[-1] if shape.file] == [file]
+    assert [shape.file for shape in with_mesh(tmp_path, name).fingers[0].shapes[-1] if shape.file] == [file]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@ import pytest
 
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation import Contact, EpisodeConstants, SimulationOptions, Start, World
+from tactile_cube.simulation.options import EngineName
 
 
 @pytest.fixture(scope="module", params=["bullet", "mujoco"])
@@ -36,3 +37,18 @@ def test_friction_stays_within_the_cone(squeezed: list[Contact]) -> None:
     for contact in squeezed:
         assert np.linalg.norm(contact.friction) <= 0.9 * contact.force * 1.02
         assert abs(contact.friction @ contact.normal) < 1e-6
+
+
+@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
+def test_fingers_touch_the_table_and_each_other_but_not_themselves(engine: EngineName) -> None:
+    world, pairs, away = World(options=SimulationOptions(engine)), set(), Start(DLR_HAND2.start_angles, (0.0, 0.0, 3.0))
+    world.reset(EpisodeConstants(table_height=-0.01, filter_time=0.1, gravity_onset=99), away)
+    crossing = DLR_HAND2.start_angles.copy()
+    crossing[[3, 6]] = np.radians([-28.0, 28.0])
+    for _ in range(12):
+        world.step(crossing)
+        pairs |= {frozenset((contact.finger, contact.other)) for contact in world.contacts()}
+    assert frozenset(("fore", "middle")) in pairs
+    assert any("table" in pair for pair in pairs)
+    assert all(len(pair) == 2 for pair in pairs)
+    world.close()

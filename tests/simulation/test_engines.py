@@ -1,7 +1,6 @@
 """Both engines move the same hand: geometry, inertia and free motion agree."""
 
 import dataclasses
-import sys
 from pathlib import Path
 
 import mujoco
@@ -9,11 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, HandModel, finger_urdf, tip_positions
-from tactile_cube.hand.hand import FingerBase
+from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, mujoco_model
+from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 
 ENGINES = ("bullet", "mujoco")
 NOWHERE, FLOATS = (0.0, 0.0, 9.0), 10**6
@@ -32,7 +29,7 @@ def test_fingertips_of_mujoco_are_those_of_the_kinematics_to_a_nanometre(world: 
         world.reset(EpisodeConstants(), Start(q, NOWHERE))
         model, data = world._engine._model, world._engine._data  # type: ignore[attr-defined]
         mujoco.mj_kinematics(model, data)
-        ends = [0.0, 0.0, DLR_HAND2.tip_reach[2]]
+        ends = [0.0, 0.0, DLR_HAND2.fingers[0].chain.reach[2]]
         tips = [
             data.body(f"{f.name} distal").xpos + data.body(f"{f.name} distal").xmat.reshape(3, 3) @ ends
             for f in DLR_HAND2.fingers
@@ -41,7 +38,7 @@ def test_fingertips_of_mujoco_are_those_of_the_kinematics_to_a_nanometre(world: 
 
 
 def test_the_mass_matrix_of_mujoco_is_that_of_the_rigid_body_equations_with_rotors(world: World) -> None:
-    tree, rng = RigidBodyTree.from_urdf(finger_urdf(DLR_HAND2)), np.random.default_rng(3)
+    tree, rng = RigidBodyTree.from_urdf(DLR_HAND2.finger_urdf(0)), np.random.default_rng(3)
     rotor = rng.uniform(1e-3, 2e-3, 12)
     q = rng.uniform(DLR_HAND2.lower, DLR_HAND2.upper)
     world.reset(EpisodeConstants(reflected_inertia=rotor), Start(q, NOWHERE))
@@ -87,7 +84,7 @@ OF_PLAIN = {
 def test_mujoco_follows_a_measured_finger_to_a_milliradian(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four trials of finger_plain at once, one by each finger of a hand whose fingers are that finger."""
     rig = (PLAIN / "rig.urdf").read_text()
-    monkeypatch.setattr(HandModel, "finger_urdf", lambda hand, finger: rig)
+    monkeypatch.setattr(Hand, "finger_urdf", lambda hand, finger: rig)
     world = World(fingers_apart(), SimulationOptions("mujoco", dt=5e-4, substeps=4))
     known = {key: np.tile(values, 4) for key, values in OF_PLAIN.items()}
     constants = EpisodeConstants(filter_time=1e-9, gravity_onset=FLOATS, **known)
@@ -109,10 +106,10 @@ def milliradians(error: np.ndarray) -> np.ndarray:
     return 1e3 * np.std(error, axis=0)
 
 
-def fingers_apart() -> HandModel:
+def fingers_apart() -> Hand:
     """Fingers in a row, too far from each other to meet, their bases upright."""
     fingers = tuple(
-        FingerBase(finger.name, np.array([1.0 * k, 0.0, 0.0]), np.eye(3), finger.face)
+        dataclasses.replace(finger, position=np.array([1.0 * k, 0.0, 0.0]), rotation=np.eye(3))
         for k, finger in enumerate(DLR_HAND2.fingers)
     )
     return dataclasses.replace(DLR_HAND2, fingers=fingers, position=np.zeros(3), rotation=np.eye(3))
@@ -127,9 +124,3 @@ def columns(paths: list[Path]) -> list[np.ndarray]:
         np.concatenate([table.select(names).to_numpy().astype(float)[:rows] for table in tables], axis=1)
         for names in parts
     ]
-
-
-def test_without_mujoco_the_error_names_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(InputError, match="pip install mujoco"):
-        mujoco_model.load_mujoco()

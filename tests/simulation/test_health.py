@@ -9,6 +9,7 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 from tactile_cube.simulation.health import find_fault, unresolved, unresolved_among
 from tactile_cube.transforms import EnvConfig
 
+TENDON = np.array([[3, 2]])  # q4 follows q3
 CALM, STILL = np.full((4, 4), 0.4), np.zeros((4, 4))
 CUBE = np.array([0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0], dtype=float)
 
@@ -20,7 +21,7 @@ def changed(array: np.ndarray, index: object, value: float) -> np.ndarray:
 
 
 def test_a_calm_state_has_no_fault() -> None:
-    assert find_fault(CALM, STILL, CUBE, [-0.001, 0.002]) == ""
+    assert find_fault(CALM, STILL, CUBE, [-0.001, 0.002], TENDON) == ""
 
 
 @pytest.mark.parametrize(
@@ -37,7 +38,7 @@ def test_a_calm_state_has_no_fault() -> None:
     ],
 )
 def test_what_cannot_be_is_named(state: tuple[np.ndarray, np.ndarray, np.ndarray, list[float]], word: str) -> None:
-    assert word in find_fault(*state)
+    assert word in find_fault(*state, TENDON)
 
 
 PAPER = 0.1

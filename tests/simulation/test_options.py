@@ -5,7 +5,7 @@ from tactile_cube.simulation import SimulationOptions
 
 
 def test_a_policy_step_of_the_presets_lasts_a_tenth_of_a_second() -> None:
-    for options in (SimulationOptions(), SimulationOptions.fast(), SimulationOptions.faithful()):
+    for options in (SimulationOptions(), SimulationOptions.faithful()):
         assert options.policy_dt == pytest.approx(0.1)
 
 

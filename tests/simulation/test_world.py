@@ -135,15 +135,6 @@ def test_accelerations_agree_with_the_lagrangian_of_a_finger(engine: str) -> Non
     world.close()
 
 
-def test_the_motor_is_ahead_of_a_driven_joint_unless_the_printed_sign_is_chosen(world: World) -> None:
-    for sign in (1, -1):
-        world.reset(EpisodeConstants(elasticity_sign=sign), Start(HAND.start_angles))
-        for _ in range(15):
-            world.step(squeeze())
-        np.testing.assert_allclose(world.q_m - world.q, sign * world.torque / 25.0, atol=2e-3)
-        assert np.abs(world.torque).max() > 0.05
-
-
 def test_a_joint_offset_shifts_what_is_read_and_what_is_commanded_alike(world: World) -> None:
     offset = np.linspace(-0.05, 0.05, 12)
     runs = []
@@ -153,13 +144,6 @@ def test_a_joint_offset_shifts_what_is_read_and_what_is_commanded_alike(world: W
             world.step(squeeze() + shift)
         runs.append((world.q, world.q_m - shift, world.q_f - shift))
     np.testing.assert_allclose(runs[1], runs[0], atol=1e-9)
-
-
-def test_the_filtered_target_lags_with_the_filter_time(world: World) -> None:
-    goal = HAND.start_angles + 0.1
-    world.reset(EpisodeConstants(filter_time=0.25), Start(HAND.start_angles, NOWHERE))
-    world.step(goal)
-    np.testing.assert_allclose(goal - world.q_f, 0.1 * np.exp(-0.1 / 0.25), atol=1e-9)
 
 
 def test_pushes_move_the_cube_by_force_and_torque(world: World) -> None:
@@ -254,12 +238,4 @@ def test_the_trace_holds_every_physics_step_and_joins_up() -> None:
     velocity = np.concatenate([piece["dq"] for piece in pieces])
     position = np.concatenate([piece["q"] for piece in pieces])
     np.testing.assert_allclose(np.diff(position, axis=0), 0.002 * velocity[1:], atol=1e-12)
-    world.close()
-
-
-def test_without_the_option_there_is_no_trace() -> None:
-    world = World()
-    world.reset(EpisodeConstants(), Start(DLR_HAND2.start_angles))
-    world.step(DLR_HAND2.start_angles)
-    assert world.trace == {}
     world.close()

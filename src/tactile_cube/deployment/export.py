@@ -15,7 +15,7 @@ from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.limits import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
-from tactile_cube.hand import Hand, HandModel
+from tactile_cube.hand import DLR_HAND2, Hand
 
 FORMAT = "tactile_cube contract 3"
 FINGER = {
@@ -123,7 +123,7 @@ def _hand(setting: TrainingSetting) -> dict[str, Any]:
         "fingertips": [
             {
                 "finger": finger.name,
-                "link": hand.link_names(k)[-1],
+                "link": hand.fingers[k].links[-1],
                 "radius": hand.tip_radius,
                 "at_start": _plain(hand.rotation.T @ (tip - hand.position)),
             }
@@ -140,7 +140,7 @@ def _coupled(hand: Hand, finger: int, link: int, leader: int) -> dict[str, Any]:
 
 def _meanings(hand: Hand) -> list[str]:
     """What each joint does: known of the DLR-Hand II, else as its URDF says."""
-    if isinstance(hand, HandModel):
+    if hand.name == DLR_HAND2.name:
         return [FINGER[name[-2:]] for name in hand.joint_names]
     return ["as in the URDF of the hand"] * hand.joints
 

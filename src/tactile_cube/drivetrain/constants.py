@@ -16,6 +16,7 @@ from tactile_cube.hand.rigid_body import RigidBodyTree
 
 Array = npt.NDArray[np.float64]
 PerJoint = float | tuple[float, ...] | Array
+_POSITIVE = ("stiffness", "torque_limit", "rate_limit")
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,15 @@ class DrivetrainConstants:
 
     def __post_init__(self) -> None:
         """Refuses values that no drive has."""
-        for entry in fields(self):
-            if entry.name != "sign":
-                _check(entry.name, getattr(self, entry.name), positive=entry.name in _POSITIVE)
+        for name in [entry.name for entry in fields(self) if entry.name != "sign"]:
+            value, positive = getattr(self, name), name in _POSITIVE
+            try:
+                numbers = np.asarray(value, dtype=float)
+            except (TypeError, ValueError):
+                raise InputError(f"drivetrain {name} is {value!r}; give a number or one per joint") from None
+            if numbers.ndim > 1 or not np.all(numbers > 0 if positive else numbers >= 0):
+                wanted = "positive" if positive else "non-negative"
+                raise InputError(f"drivetrain {name} is {value}; give {wanted} numbers")
         if self.sign not in ("physical", "printed"):
             raise InputError(f"stiffness sign is '{self.sign}'; use 'physical' or 'printed'")
         if self.sign == "printed" and np.any(np.asarray(self.kp) >= np.asarray(self.stiffness)):
@@ -64,23 +71,6 @@ class DrivetrainConstants:
         sign = 1.0 if self.sign == "physical" else -1.0
         return sign / np.asarray(self.stiffness, dtype=float)
 
-    @property
-    def damping_gain(self) -> Array:
-        """Damping that reaches the joint [N m s/rad]: the elasticity scales both gains by 1 / (1 +- K_P / K_e)."""
-        return np.asarray(self.kd / (1.0 + self.compliance * np.asarray(self.kp)))
-
-
-_POSITIVE = ("stiffness", "torque_limit", "rate_limit")
-
-
-def _check(name: str, value: PerJoint, positive: bool) -> None:
-    try:
-        numbers = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"drivetrain {name} is {value!r}; give a number or one per joint") from None
-    if numbers.ndim > 1 or np.any(np.isnan(numbers)) or np.any(numbers < 0) or (positive and np.any(numbers == 0)):
-        raise InputError(f"drivetrain {name} is {value}; give {'positive' if positive else 'non-negative'} numbers")
-
 
 BOUND = 2.0
 MOST_CORNERS = 64
@@ -93,7 +83,8 @@ def damping_number(tree: RigidBodyTree, constants: DrivetrainConstants, dt: floa
     """
     n = len(tree.joint_names)
     M = tree.actuated_mass_matrix(q) + np.diag(np.broadcast_to(constants.reflected_inertia, n))
-    damping = np.broadcast_to(np.maximum(constants.kd, constants.damping_gain), n)
+    reaching = constants.kd / (1.0 + constants.compliance * np.asarray(constants.kp))  # through the elasticity
+    damping = np.broadcast_to(np.maximum(constants.kd, reaching), n)
     return float(dt * eigh(np.diag(damping), M, eigvals_only=True)[-1])
 
 

@@ -7,8 +7,7 @@ import inspect
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
-from functools import cached_property
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -28,41 +27,11 @@ _STEPS = Path(__file__).parent / "steps"
 _ENTRY_POINTS = "entry_points"
 
 
-class Kernel:
-    """The compiled steps of a plant; all are Numba functions that can be called inside other compiled code.
-
-    Attributes:
-        control_step: (i, q (D,), v (D,), torque_out (D,), memory): torques for PyBullet.
-        step: (command (n,), memory): one step of the mechanism without contacts.
-        rollout: (commands (H + T, n), H, substeps, memory, rows (R,), out (T, R, n)): signals of each command row.
-        rollout_batch: (commands (S, L, n), which (B,), lengths (S,), H, substeps, memory (B, size), rows (R,),
-            out (B, T, R, n)).
-        segments_batch: as rollout_batch, started anew from measured states every `segment` rows (multiple shooting).
-        starts_batch: puts each memory where segments_batch begins.
-    """
-
-    def __init__(self, topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> None:
-        self._module = load_kernel(topology, effects, layout)
-        self.control_step: Callable[..., None] = self._module.control_step
-        self.step: Callable[..., None] = self._module.step
-        self.rollout: Callable[..., None] = self._module.rollout
-        self.rollout_batch: Callable[..., None] = self._module.rollout_batch
-        self.segments_batch: Callable[..., None] = self._module.segments_batch
-        self.starts_batch: Callable[..., None] = self._module.starts_batch
-
-    @cached_property
-    def _callback(self) -> tuple[object, int]:
-        made: tuple[object, int] = self._module.control_callback()
-        return made
-
-    @property
-    def control_address(self) -> int:
-        """Address of the control step as void(int64 i, double *q, double *v, double *torque, double *memory)."""
-        return self._callback[1]
-
-
 def load_kernel(topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> ModuleType:
-    """The entry points of the steps for a plant, in a package of its own: a folder in the cache, and the steps' own."""
+    """The compiled steps of a plant, see `steps.entry_points`; they can be called inside other compiled code.
+
+    They are in a package of their own: a folder in the cache, and the steps' own.
+    """
     plant = kernel_source(topology, effects, layout)
     name = "kernel_" + _fingerprint(plant, effects)
     if name not in sys.modules:

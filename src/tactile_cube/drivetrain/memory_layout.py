@@ -40,11 +40,6 @@ class Topology:
         """Actuated joints of all chains."""
         return self.chains * len(self.leader)
 
-    @property
-    def dofs(self) -> int:
-        """All degrees of freedom of all chains."""
-        return self.chains * len(self.parent)
-
 
 @dataclass(frozen=True)
 class MemoryLayout:
@@ -67,99 +62,36 @@ class MemoryLayout:
 
 def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, trace_rows: int) -> MemoryLayout:
     """The layout for a topology and the effects that may act on its joints."""
-    shapes = {
-        **dict.fromkeys(("size", "dt", "step", "seen", "trace_rows", "trace_offset", "reading", "unsure"), (1,)),
-        **_joint_constants(topology.joints),
-        **_mechanism(topology.chains, len(topology.parent)),
-        **_state(topology),
-        **_scratch(len(topology.parent), len(topology.leader)),
-        **_effects(topology.joints, effects),
-    }
-    shapes |= {f"state:{e.name}": (topology.joints, e.kept(dt)) for e in effects}
-    shapes["trace"] = (trace_rows, topology.chains, ROWS, len(topology.leader))
+    C, N, n, joints = topology.chains, len(topology.parent), len(topology.leader), topology.joints
+    keys: list[tuple[Shape, str]] = [
+        ((1,), "size dt step seen trace_rows trace_offset reading unsure"),
+        ((1,), "time_constant tendon_stiffness tendon_damping contact_torque_limit weighed"),
+        # of each joint: constants, then its state
+        ((joints,), "kp kd compliance static_friction reflected_inertia torque_limit command_torque_limit rate_limit"),
+        ((joints,), "brake friction_creep external_torque angle_offset goal"),
+        ((joints,), "q v filtered limited extra extra_compliance held_back contact"),
+        ((C, ROWS, n), "signals"),
+        # of each chain: its mechanism, then what the last step left
+        ((C, 3), "gravity engine_gravity"),
+        ((C, N), "ratio offset mass spin_inertia armature last_speed last_torque last_bias"),
+        ((C, N, 3), "placement_translation axis com"),
+        ((C, N, 3, 3), "placement_rotation inertia"),
+        ((C, N, N), "last_mass_matrix"),
+        # scratch of one chain at a time
+        ((N + 1, WORK_COLUMNS), "work"),
+        ((N, N), "mass_matrix"),
+        ((N,), "bias weight q_all v_all"),
+        ((n, n), "joint_mass_matrix factor"),
+        ((n,), "joint_bias momentum friction_impulse grip speed side trial joint_acceleration"),
+        ((len(effects),), "state_offset state_size"),
+        *(((joints,), f"active:{effect.name}") for effect in effects),
+        *(((joints, len(effect.parameters)), f"parameters:{effect.name}") for effect in effects),
+        *(((joints, effect.kept(dt)), f"state:{effect.name}") for effect in effects),
+        ((trace_rows, C, ROWS, n), "trace"),
+    ]
     entries, offset = {}, 0
-    for key, shape in shapes.items():
-        entries[key] = offset, shape
-        offset += prod(shape)
+    for shape, names in keys:
+        for key in names.split():
+            entries[key] = offset, shape
+            offset += prod(shape)
     return MemoryLayout(entries, offset)
-
-
-def _joint_constants(joints: int) -> dict[str, Shape]:
-    per_joint = (
-        "kp",
-        "kd",
-        "compliance",
-        "static_friction",
-        "reflected_inertia",
-        "torque_limit",
-        "command_torque_limit",
-        "rate_limit",
-        "brake",
-        "friction_creep",
-        "external_torque",
-        "angle_offset",
-        "goal",
-    )
-    single = ("time_constant", "tendon_stiffness", "tendon_damping", "contact_torque_limit", "weighed")
-    return {**dict.fromkeys(per_joint, (joints,)), **dict.fromkeys(single, (1,))}
-
-
-def _mechanism(chains: int, dofs: int) -> dict[str, Shape]:
-    return {
-        "gravity": (chains, 3),
-        "engine_gravity": (chains, 3),
-        "ratio": (chains, dofs),
-        "offset": (chains, dofs),
-        "placement_rotation": (chains, dofs, 3, 3),
-        "placement_translation": (chains, dofs, 3),
-        "axis": (chains, dofs, 3),
-        "mass": (chains, dofs),
-        "com": (chains, dofs, 3),
-        "inertia": (chains, dofs, 3, 3),
-        "spin_inertia": (chains, dofs),
-        "armature": (chains, dofs),
-    }
-
-
-def _state(topology: Topology) -> dict[str, Shape]:
-    joints, chains, dofs = topology.joints, topology.chains, len(topology.parent)
-    return {
-        **{
-            key: (joints,)
-            for key in ("q", "v", "filtered", "limited", "extra", "extra_compliance", "held_back", "contact")
-        },
-        "signals": (chains, ROWS, len(topology.leader)),
-        "last_speed": (chains, dofs),
-        "last_torque": (chains, dofs),
-        "last_bias": (chains, dofs),
-        "last_mass_matrix": (chains, dofs, dofs),
-    }
-
-
-def _scratch(dofs: int, joints: int) -> dict[str, Shape]:
-    return {
-        "work": (dofs + 1, WORK_COLUMNS),
-        "mass_matrix": (dofs, dofs),
-        "bias": (dofs,),
-        "weight": (dofs,),
-        "q_all": (dofs,),
-        "v_all": (dofs,),
-        "joint_mass_matrix": (joints, joints),
-        "joint_bias": (joints,),
-        "factor": (joints, joints),
-        "momentum": (joints,),
-        "friction_impulse": (joints,),
-        "grip": (joints,),
-        "speed": (joints,),
-        "side": (joints,),
-        "trial": (joints,),
-        "joint_acceleration": (joints,),
-    }
-
-
-def _effects(joints: int, effects: Sequence[type[Effect]]) -> dict[str, Shape]:
-    shapes: dict[str, Shape] = {"state_offset": (len(effects),), "state_size": (len(effects),)}
-    for effect in effects:
-        shapes[f"active:{effect.name}"] = (joints,)
-        shapes[f"parameters:{effect.name}"] = (joints, len(effect.parameters))
-    return shapes

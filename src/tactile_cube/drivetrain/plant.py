@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from tactile_cube.drivetrain.constants import DrivetrainConstants
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
 from tactile_cube.drivetrain.effects.effect import Effect, Place, Stage
-from tactile_cube.drivetrain.kernel import Kernel
+from tactile_cube.drivetrain.kernel import load_kernel
 from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology, plan_memory
 from tactile_cube.drivetrain.signals import COMMAND, FRICTION, MOTOR_POSITION, POSITION, VELOCITY
 from tactile_cube.errors import InputError
@@ -20,16 +21,7 @@ from tactile_cube.hand.rigid_body import RigidBodyTree
 Array = npt.NDArray[np.float64]
 EffectClass = type[Effect]
 
-_TREE_KEYS = (
-    "ratio",
-    "offset",
-    "placement_rotation",
-    "placement_translation",
-    "axis",
-    "mass",
-    "com",
-    "inertia",
-)
+_TREE_KEYS = ("ratio", "offset", "placement_rotation", "placement_translation", "axis", "mass", "com", "inertia")
 _CONSTANT_KEYS = ("kp", "kd", "compliance", "static_friction", "reflected_inertia", "torque_limit", "rate_limit")
 _STARTING_ROWS = {POSITION: "q", VELOCITY: "v", MOTOR_POSITION: "q", COMMAND: "q", FRICTION: "static_friction"}
 CONTACT_TORQUE_LIMIT = 5.0
@@ -89,9 +81,9 @@ class Plant:
         return self.layout.size
 
     @cached_property
-    def kernel(self) -> Kernel:
-        """The compiled steps, generated when first used."""
-        return Kernel(self.topology, self.effects, self.layout)
+    def kernel(self) -> Any:
+        """The compiled steps, generated when first used; see `steps.entry_points`."""
+        return load_kernel(self.topology, self.effects, self.layout)
 
     def view(self, memory: Array, key: str) -> Array:
         """A writable view (..., shape) of memory (..., size)."""
@@ -116,7 +108,12 @@ class Plant:
             effects: effects to switch on; their classes must be among the plant's.
         """
         memory = np.zeros(self.size)
-        self._fill_header(memory)
+        header = {"size": self.size, "dt": self.dt, "trace_rows": self.trace_rows, "reading": LAST_SUBSTEP}
+        for key, value in {**header, "trace_offset": self.layout.entries["trace"][0], "unsure": UNSURE}.items():
+            self.view(memory, key)[...] = value
+        states = [self.layout.entries[f"state:{effect.name}"] for effect in self.effects]
+        self.view(memory, "state_offset")[...] = [offset for offset, _ in states]
+        self.view(memory, "state_size")[...] = [shape[1] for _, shape in states]
         for key in _TREE_KEYS:
             self.view(memory, key)[...] = np.stack([getattr(tree, key) for tree in self.trees])
         for key in ("gravity", "engine_gravity"):
@@ -186,22 +183,6 @@ class Plant:
         for row, key in _STARTING_ROWS.items():
             rows[..., row, :] = self.view(memory, key).reshape(by_chain)
 
-    def _fill_header(self, memory: Array) -> None:
-        first_state, _ = self.layout.entries["trace"]
-        header = {
-            "size": self.size,
-            "dt": self.dt,
-            "trace_rows": self.trace_rows,
-            "trace_offset": first_state,
-            "reading": LAST_SUBSTEP,
-            "unsure": UNSURE,
-        }
-        for key, value in header.items():
-            self.view(memory, key)[...] = value
-        states = [self.layout.entries[f"state:{effect.name}"] for effect in self.effects]
-        self.view(memory, "state_offset")[...] = [offset for offset, _ in states]
-        self.view(memory, "state_size")[...] = [shape[1] for _, shape in states]
-
     def _per_joint(self, value: Array, key: str) -> Array:
         count, every = len(self.topology.leader), self.topology.joints
         if value.ndim and value.shape[-1] not in (count, every):
@@ -215,16 +196,14 @@ class Plant:
 
 
 def _common_topology(trees: Sequence[RigidBodyTree]) -> Topology:
-    found = [_topology(tree, len(trees)) for tree in trees]
+    found = []
+    for tree in trees:
+        leader = tuple(tree.dof_names.index(name) for name in tree.joint_names)
+        parent, prismatic, follow = (tuple(map(int, part)) for part in (tree.parent, tree.prismatic, tree.follow))
+        found.append(Topology(len(trees), parent, prismatic, follow, leader))
     if not found or any(topology != found[0] for topology in found):
         raise InputError(f"a plant needs chains of equal structure; got {len(found)} that differ; use one tree for all")
     return found[0]
-
-
-def _topology(tree: RigidBodyTree, chains: int) -> Topology:
-    leader = tuple(tree.dof_names.index(name) for name in tree.joint_names)
-    parent, prismatic, follow = (tuple(map(int, part)) for part in (tree.parent, tree.prismatic, tree.follow))
-    return Topology(chains, parent, prismatic, follow, leader)
 
 
 def _joint_names(trees: Sequence[RigidBodyTree], names: Sequence[str] | None) -> tuple[str, ...]:

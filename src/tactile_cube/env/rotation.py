@@ -207,7 +207,7 @@ def normal_forces(world: World) -> NDArray[np.float64]:
     for contact in world.contacts():
         if contact.other == "cube" and contact.finger in fingers:
             finger = fingers.index(contact.finger)
-            force[int(contact.link == world.hand.link_names(finger)[-1]), finger] += contact.force
+            force[int(contact.link == world.hand.fingers[finger].links[-1]), finger] += contact.force
     return force
 
 

@@ -140,6 +140,6 @@ def _held(
 def _tips_only(world: World) -> bool:
     """Whether `TOUCHING` fingertips bear the object, and no other link or finger does."""
     pressing = [contact for contact in world.contacts() if contact.force > 0.0]
-    tip_links = {finger.name: world.hand.link_names(k)[-1] for k, finger in enumerate(world.hand.fingers)}
+    tip_links = {finger.name: world.hand.fingers[k].links[-1] for k, finger in enumerate(world.hand.fingers)}
     proper = all(one.other == "cube" and one.link == tip_links[one.finger] for one in pressing)
     return proper and len({one.finger for one in pressing}) >= TOUCHING

@@ -58,7 +58,7 @@ class Recorder:
         offset = next(part.offset for part in env.transform if isinstance(part, JointOffset))
         self._task, self._joint_offset = task, np.broadcast_to(offset.double().numpy(), (1, task.hand.joints))[0]
         self._fingers = tuple(finger.name for finger in task.hand.fingers)
-        self._tips = [task.hand.link_names(finger)[-1] for finger in range(len(self._fingers))]
+        self._tips = [task.hand.fingers[finger].links[-1] for finger in range(len(self._fingers))]
         self._rows: dict[str, list[Array]] = {name: [] for name in WORLD_SIGNALS}
         self._contacts: list[tuple[int, int, bool, Array, Array, float, float]] = []
         self._trace: list[dict[str, Array]] = []

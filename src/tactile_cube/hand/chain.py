@@ -1,8 +1,4 @@
-"""Fingertips from joint angles and back: for any chain of revolute joints, and in closed form for the DLR-Hand II.
-
-A finger of the DLR-Hand II is planar behind q1: with e = exp(i q3) the tip's centre lies at exp(i q2) (a + b e + c e^2)
-in the plane that q1 turns about the base's z axis, where `reach` (a, b, c) are the distances q2-q3, q3-q4 and q4-tip.
-"""
+"""Fingertips from joint angles and back: for any chain of revolute joints, and in closed form for the DLR-Hand II."""
 
 from __future__ import annotations
 
@@ -28,8 +24,8 @@ class Chain:
     """L joints in a row, each turning about z of its frame, of which some move with an actuated one.
 
     Attributes:
-        rotations: frame of each joint in the frame of the link before it, the first one's in the world (L, 3, 3).
-        translations: likewise (L, 3) [m].
+        rotations: frame of each further joint in the frame of the link before it (L - 1, 3, 3).
+        translations: likewise (L - 1, 3) [m].
         columns: the actuated joint that each joint moves with (L,).
         tip: middle of the fingertip in the last link's frame (3,) [m].
     """
@@ -39,14 +35,19 @@ class Chain:
     columns: tuple[int, ...]
     tip: Array
 
-    def tips(self, q: Array) -> tuple[Array, Array]:
-        """Tip in the world (n, 3) [m] and its velocity per joint velocity (n, 3, J), for angles q (n, J) [rad]."""
+    def tips(self, position: Array, rotation: Array, q: Array) -> Array:
+        """Tip in the world (n, 3) [m] for angles q (n, J) [rad], the first joint's frame at `position` (3,) [m]."""
+        return self.motion(position, rotation, q)[0]
+
+    def motion(self, position: Array, rotation: Array, q: Array) -> tuple[Array, Array]:
+        """Tip in the world (n, 3) [m] and its velocity per joint velocity (n, 3, J)."""
         count = len(q)
         place, turn = np.zeros((count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3))
+        translations, rotations = (position, *self.translations), (rotation, *self.rotations)
         origins, axes = [], []
-        for k, column in enumerate(self.columns):
-            place = place + turn @ self.translations[k]
-            turn = turn @ self.rotations[k]
+        for shift, frame, column in zip(translations, rotations, self.columns, strict=True):
+            place = place + turn @ shift
+            turn = turn @ frame
             origins.append(place)
             axes.append(turn[:, :, 2])
             turn = turn @ _about_z(q[:, column])
@@ -56,7 +57,7 @@ class Chain:
             jacobian[:, :, column] += np.cross(axis, tip - origin)
         return tip, jacobian
 
-    def angles(self, targets: Array, lower: Array, upper: Array) -> Array:
+    def angles(self, position: Array, rotation: Array, targets: Array, lower: Array, upper: Array) -> Array:
         """Angles (n, J) [rad] within limits (J,) that bring the tip to world points (n, 3) [m], or near them.
 
         Of many solutions it takes one near the middle of the range: damped least squares, with a pull towards the
@@ -66,7 +67,7 @@ class Chain:
         q = np.tile(middle, (len(targets), 1))
         pull = 1.0
         for _ in range(_ROUNDS):
-            tip, jacobian = self.tips(q)
+            tip, jacobian = self.motion(position, rotation, q)
             miss = targets - tip
             if np.all(np.linalg.norm(miss, axis=1) < _CLOSE):
                 break
@@ -96,31 +97,39 @@ def _about_z(angle: Array) -> Array:
     return turn
 
 
-def planar_tips(reach: tuple[float, float, float], q: Array) -> Array:
-    """Tip centres of a planar finger in the frame of its base (n, 3) [m] for its joint angles (n, 3) [rad]."""
-    a, b, c = reach
-    planar = np.exp(1j * q[:, 1]) * (a + b * np.exp(1j * q[:, 2]) + c * np.exp(2j * q[:, 2]))
-    return np.stack([planar.real * np.cos(q[:, 0]), planar.real * np.sin(q[:, 0]), planar.imag], axis=1)
+@dataclass(frozen=True)
+class PlanarChain:
+    """A finger that is planar behind q1, and whose last joint follows q3.
 
+    With e = exp(i q3) the tip's centre lies at exp(i q2) (a + b e + c e^2) in the plane that q1 turns about the base's
+    z axis.
 
-def planar_angles(reach: tuple[float, float, float], targets: Array) -> Array:
-    """Joint angles (n, 3) [rad] that bring a planar finger's tip to points in the frame of its base (n, 3) [m].
-
-    Of the two solutions the flexed one (q3 >= 0) is given. A point out of reach gives the straight or the fully folded
-    finger that points at it. Joint limits are not applied.
+    Attributes:
+        reach: distances a, b, c: q2-q3, q3-q4 and q4-centre of the fingertip's sphere [m].
     """
-    q1 = np.arctan2(targets[:, 1], targets[:, 0])
-    planar = np.hypot(targets[:, 0], targets[:, 1]) + 1j * targets[:, 2]
-    q3 = _flexion(reach, np.abs(planar) ** 2)
-    a, b, c = reach
-    q2 = np.angle(planar) - np.angle(a + b * np.exp(1j * q3) + c * np.exp(2j * q3))
-    return np.stack([q1, q2, q3], axis=1)
 
+    reach: tuple[float, float, float]
 
-def _flexion(reach: tuple[float, float, float], squared_distance: Array) -> Array:
-    """q3 >= 0 [rad] from |a + b e + c e^2|^2, a quadratic equation in cos q3."""
-    a, b, c = reach
-    linear = 2.0 * b * (a + c)
-    constant = a * a + b * b + c * c - 2.0 * a * c - squared_distance
-    root = np.sqrt(np.maximum(linear**2 - 16.0 * a * c * constant, 0.0))
-    return np.arccos(np.clip((root - linear) / (8.0 * a * c), -1.0, 1.0))
+    def tips(self, position: Array, rotation: Array, q: Array) -> Array:
+        """See `Chain.tips`."""
+        a, b, c = self.reach
+        planar = np.exp(1j * q[:, 1]) * (a + b * np.exp(1j * q[:, 2]) + c * np.exp(2j * q[:, 2]))
+        local = np.stack([planar.real * np.cos(q[:, 0]), planar.real * np.sin(q[:, 0]), planar.imag], axis=1)
+        return np.asarray(position + local @ rotation.T)
+
+    def angles(self, position: Array, rotation: Array, targets: Array, lower: Array, upper: Array) -> Array:
+        """Angles (n, 3) [rad] that bring the tip to world points (n, 3) [m]; limits are not applied.
+
+        Of the two solutions the flexed one (q3 >= 0) is given. A point out of reach gives the straight or the fully
+        folded finger that points at it.
+        """
+        a, b, c = self.reach
+        local = (targets - position) @ rotation
+        planar = np.hypot(local[:, 0], local[:, 1]) + 1j * local[:, 2]
+        # |a + b e + c e^2| is known: a quadratic equation in cos q3
+        linear = 2.0 * b * (a + c)
+        constant = a * a + b * b + c * c - 2.0 * a * c - np.abs(planar) ** 2
+        root = np.sqrt(np.maximum(linear**2 - 16.0 * a * c * constant, 0.0))
+        q3 = np.arccos(np.clip((root - linear) / (8.0 * a * c), -1.0, 1.0))
+        q2 = np.angle(planar) - np.angle(a + b * np.exp(1j * q3) + c * np.exp(2j * q3))
+        return np.stack([np.arctan2(local[:, 1], local[:, 0]), q2, q3], axis=1)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand.hand import Array, FingerBase
-from tactile_cube.hand.model import Capsule, HandModel, Link
+from tactile_cube.hand.chain import PlanarChain
+from tactile_cube.hand.hand import Finger, Hand
+from tactile_cube.hand.urdf import Array, CollisionShape, origin_element
 
 KP = 3.69
 """Stiffness of the impedance law [N m/rad]. Source: W, table."""
@@ -27,26 +28,66 @@ gear ratios 120 and 200 with rotors of this size give 1.4e-3..6e-3, critical dam
 TORQUE_LIMIT = 1.0
 """Largest joint torque [N m]. Source: the authors' follow-up, ICRA 2023 page."""
 
-_FOUR = 4
+_LIMITS = np.radians([(-30.0, 30.0), (-20.0, 86.0), (-10.0, 105.0), (-10.0, 105.0)])
+"""Of q1 .. q4 [rad]. Source: W, "theta_min .. theta_max" of the hardware."""
 
 # Masses are estimates from the volumes of the public meshes; the finger with its drive base weighs 375 g (data sheet).
 # The middle link's capsule and the proximal one's are convex stand-ins; the tip is the published shape (scene), a
 # capsule from 16.5 mm to 33 mm, continued towards q4. All begin where their middle is the centre of mass: Bullet then
 # needs no compound shape around them, which is faster. The middle link is slimmer than the tip: with 15 mm an upright
 # finger would press on the cube's upper edge with its smooth middle link instead of its tip.
-_LINKS = (
-    Link("knuckle", 0.0, 0.040, 0.0, None),
-    Link("proximal", 0.075, 0.110, 0.0366, Capsule(0.0175, 0.0082, 0.065)),
-    Link("middle", 0.040, 0.055, 0.0177, Capsule(0.0130, -0.0026, 0.038)),
-    Link("distal", 0.045, 0.035, 0.0202, Capsule(0.01425, 0.0074, 0.033)),
-)
+_LINKS = {  # length to the next joint's axis [m], mass [kg], centre of mass along z [m]
+    "knuckle": (0.0, 0.040, 0.0),
+    "proximal": (0.075, 0.110, 0.0366),
+    "middle": (0.040, 0.055, 0.0177),
+    "distal": (0.045, 0.035, 0.0202),
+}
+_CAPSULES = {  # along z: radius, centres of the two half spheres [m]; nothing touches the knuckle
+    "proximal": (0.0175, 0.0082, 0.065),
+    "middle": (0.0130, -0.0026, 0.038),
+    "distal": (0.01425, 0.0074, 0.033),
+}
+_ACROSS = f'<origin xyz="0 0 0" rpy="{np.pi} {-np.pi / 2.0} 0"/>'
+"""From q1's frame to q2's: z along the finger, which is x of the base, y against y of the base."""
 
 
 def _finger(
     name: str, position: tuple[float, ...], rotation_vector: tuple[float, ...], face: tuple[float, ...]
-) -> FingerBase:
-    """A finger's base from position [m] and rotation vector [rad]. Source: scene."""
-    return FingerBase(name, np.array(position), Rotation.from_rotvec(rotation_vector).as_matrix(), np.array(face))
+) -> Finger:
+    """A finger with its base at a position [m] and rotation vector [rad]. Source: scene.
+
+    Its root is the frame of q1, which turns about z. Every further link's z axis points along the link and its joint
+    turns about y; q4 follows q3.
+    """
+    proximal, middle = _LINKS["proximal"][0], _LINKS["middle"][0]
+    return Finger(
+        name=name,
+        position=np.array(position),
+        rotation=Rotation.from_rotvec(rotation_vector).as_matrix(),
+        face=np.array(face),
+        joints=("q1", "q2", "q3", "q4"),
+        links=tuple(_LINKS),
+        limits=_LIMITS,
+        origins=(_ACROSS, *(origin_element(np.array([0.0, 0.0, length])) for length in (proximal, middle))),
+        mass=np.array([mass for _, mass, _ in _LINKS.values()]),
+        com=np.array([[0.0, 0.0, along] for _, _, along in _LINKS.values()]),
+        inertia=np.array([_moments(link) for link in _LINKS]),
+        shapes=tuple((_capsule(*_CAPSULES[link]),) if link in _CAPSULES else () for link in _LINKS),
+        chain=PlanarChain((proximal, middle, _CAPSULES["distal"][2])),
+        prefix=f"{name}_",
+    )
+
+
+def _moments(link: str) -> tuple[float, float, float]:
+    """Moments about the centre of mass, of a solid cylinder in the capsule's place (x, y, z) [kg m^2]."""
+    length, mass, _ = _LINKS[link]
+    radius, length = (_CAPSULES[link][0], length) if link in _CAPSULES else (0.012, 0.02)
+    across = mass * (3.0 * radius**2 + length**2) / 12.0
+    return across, across, 0.5 * mass * radius**2
+
+
+def _capsule(radius: float, start: float, end: float) -> CollisionShape:
+    return CollisionShape("capsule", (radius, end - start), np.array([0.0, 0.0, 0.5 * (start + end)]))
 
 
 _LIKE_RING = (-1.63850239, -0.74407776, -1.79289304)
@@ -59,29 +100,38 @@ _FINGERS = (
 )
 
 
+def _palm() -> CollisionShape:
+    """A slab under the finger bases, for pictures only: nothing ever reaches it."""
+    bases = np.array([finger.position for finger in _FINGERS])
+    low, high = bases.min(axis=0), bases.max(axis=0)
+    size = (high[0] - low[0], high[1] - low[1] + 0.03, 0.10)
+    return CollisionShape("box", size, np.array([*(0.5 * (low + high))[:2], low[2] - 0.05]))
+
+
 def _every_finger(*degrees: float) -> Array:
     """The same (q1, q2, q3) for all fingers: [deg] -> (12,) [rad]."""
-    return np.tile(np.radians(degrees), _FOUR)
+    return np.tile(np.radians(degrees), len(_FINGERS))
 
 
-DLR_HAND2 = HandModel(
+DLR_HAND2 = Hand(
+    name="dlr_hand2",
     fingers=_FINGERS,
-    links=_LINKS,
-    # Source: W, "theta_min .. theta_max" of the hardware and "theta_lower .. theta_upper" of the simulation's actions.
-    lower=_every_finger(-30.0, -20.0, -10.0),
-    upper=_every_finger(30.0, 86.0, 105.0),
+    columns=(0, 1, 2, 2),
+    axes=(2, 1, 1, 1),
+    tip_radius=_CAPSULES["distal"][0],
+    # Source: W, "theta_lower .. theta_upper" of the simulation's actions.
     action_lower=_every_finger(-30.0, -10.0, -5.0),
     action_upper=_every_finger(30.0, 30.0, 30.0),
-    coupled_upper=float(np.radians(105.0)),
     # Palm down. The scene's pose is for a cube of 0.932 x 8 cm; this one, fitted for an 8 cm cube, lets all four tips
     # reach their faces at mid height within the action limits, one finger per face.
     position=np.array([-0.0576, 0.0136, 0.2559]),
     rotation=Rotation.from_euler("ZYX", [191.98, 17.82, 184.69], degrees=True).as_matrix(),
     start_angles=np.radians([14.4, -1.6, 28.0, -3.9, 16.7, 7.1, -16.0, 21.1, 25.9, 9.9, 7.8, 14.2]),
+    palm=(_palm(),),
 )
 """The hand of the paper, palm down over a cube at the origin."""
 
 
-def published_hand() -> HandModel:
+def published_hand() -> Hand:
     """The same, for conf/hand."""
     return DLR_HAND2

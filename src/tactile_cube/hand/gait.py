@@ -29,11 +29,6 @@ def places(hand: Hand) -> Array:
     return np.array([np.arctan2(finger.face[1], finger.face[0]) for finger in hand.fingers])
 
 
-def even_phases(fingers: int) -> tuple[float, ...]:
-    """Phases of fingers that go back one after the other."""
-    return tuple(finger / fingers for finger in range(fingers))
-
-
 @dataclass(frozen=True)
 class Gait:
     """Shape of the walk.
@@ -77,7 +72,9 @@ class Gait:
     def of(self, hand: Hand) -> Gait:
         """The same walk for a hand: where it has other fingers than there are phases, they go back in turn."""
         fingers = len(hand.fingers)
-        return self if fingers == len(self.phases) else replace(self, phases=even_phases(fingers))
+        if fingers == len(self.phases):
+            return self
+        return replace(self, phases=tuple(finger / fingers for finger in range(fingers)))
 
     def tips(self, step: int, direction: int = -1, around: Array = PLACES) -> Array:
         """Return the targets of the fingertips `(fingers, 3)` [m] at a policy step; direction +1 turns about +z.
@@ -101,7 +98,7 @@ class Gait:
 
     def action(self, hand: Hand, step: int, direction: int = -1) -> Array:
         """Return the action `(joints,)` in [-1, 1] of a policy step."""
-        return hand.action_of(joint_angles(hand, self.of(hand).tips(step, direction, places(hand))))
+        return hand.action_of(hand.angles_at(self.of(hand).tips(step, direction, places(hand))[None])[0])
 
     def actions(self, hand: Hand, steps: int, direction: int = -1) -> Array:
         """Return the actions `(steps, joints)` of an episode; a cycle's inverse kinematics is solved once."""
@@ -110,11 +107,6 @@ class Gait:
         first = hand.action_of(hand.angles_at(np.array(tips)))
         cycle = self.closing + (np.arange(steps) - self.closing) % self.period
         return first[np.where(np.arange(steps) < self.closing, np.arange(steps), cycle)]
-
-
-def joint_angles(hand: Hand, tips: Array) -> Array:
-    """Return the joint angles `(joints,)` [rad] that bring the tips to their targets `(fingers, 3)` [m]."""
-    return np.asarray(hand.angles_at(tips[None])[0])
 
 
 @dataclass(frozen=True)

@@ -3,40 +3,34 @@
 from __future__ import annotations
 
 import hashlib
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tactile_cube.hand.chain import Chain, PlanarChain
+from tactile_cube.hand.urdf import (
+    Array,
+    CollisionShape,
+    collision_element,
+    inertial_element,
+    origin_element,
+    robot_element,
+    visual_elements,
+)
 
-
-@dataclass(frozen=True)
-class CollisionShape:
-    """A convex shape in a link's frame, in plain numbers that every engine can build.
-
-    Attributes:
-        kind: what it is.
-        size: of a box its edges (3,), of a cylinder or capsule radius and length of the straight part (2,), of a sphere
-            its radius (1,), of a mesh its scale (3,).
-        position: of its middle (3,) [m].
-        rotation: of its axes (3, 3); cylinders and capsules lie along z.
-        file: of a mesh.
-    """
-
-    kind: Literal["box", "cylinder", "capsule", "sphere", "mesh"]
-    size: tuple[float, ...]
-    position: Array = field(default_factory=lambda: np.zeros(3))
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-    file: str = ""
+_COLOURS = {"palm": "0.35 0.37 0.40 1", "link": "0.72 0.74 0.78 1", "tip": "0.13 0.15 0.18 1"}
+_BASE = (
+    '<link name="base"><inertial><mass value="0.1"/>'
+    '<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+"""The fixed base of a finger; its numbers do nothing, but Bullet warns about links without any."""
 
 
 @dataclass(frozen=True)
-class FingerBase:
-    """Where a finger sits on the palm, and where it touches the object.
+class Finger:
+    """A chain of L revolute joints on the palm, with a sphere at its tip.
 
     Attributes:
         name: e.g. ring, middle, fore or thumb.
@@ -44,131 +38,125 @@ class FingerBase:
         rotation: Axes of that frame in the hand frame (3, 3).
         face: Horizontal unit vector from the object's middle towards the finger, in the object's frame (3,): on a cube
             the outward normal of the face it touches.
+        joints: Names of its joints, from the palm to the tip (L).
+        links: Names of the links that they carry (L); the last one is the tip.
+        limits: Of the joints (L, 2) [rad].
+        origins: Frame of each further joint in that of the joint before it, as URDF's <origin> (L - 1).
+        mass: Of the links (L,) [kg].
+        com: Their centres of mass in the frames of their joints (L, 3) [m].
+        inertia: Their principal moments about it, along the frames' axes (L, 3) [kg m^2].
+        shapes: What can be touched of each link, in its frame.
+        chain: Its kinematics.
+        prefix: Put before the names of joints and links in the hand's URDF.
     """
 
     name: str
     position: Array
     rotation: Array
     face: Array
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+    limits: Array
+    origins: tuple[str, ...]
+    mass: Array
+    com: Array
+    inertia: Array
+    shapes: tuple[tuple[CollisionShape, ...], ...]
+    chain: Chain | PlanarChain
+    prefix: str = ""
 
 
 @dataclass(frozen=True)
-class Hand(ABC):
-    """Fingers that are chains of equally many joints, each with a sphere at its tip.
+class Hand:
+    """Fingers that are chains of equally many joints.
 
     Joint vectors (joints,) are ordered finger by finger, from the palm to the tip. Coupled joints follow an actuated
     one of their finger; arrays of all joints are (fingers, links).
 
     Attributes:
+        name: What it is called in descriptions.
         fingers: The fingers in joint order.
-        lower: Hardware limits of the joints (joints,) [rad].
-        upper: Hardware limits of the joints (joints,) [rad].
+        columns: The actuated joint that each joint of a finger moves with (links,).
+        axes: Axis of each link's frame (0, 1, 2 for x, y, z) that its joint turns about (links,).
+        tip_radius: Radius of the fingertips' spheres [m].
         action_lower: Limits of the desired joint angles, which an action of -1 means (joints,) [rad].
         action_upper: Limits of the desired joint angles, which an action of +1 means (joints,) [rad].
         position: Hand frame in the world; the object's nominal centre is the origin (3,) [m].
         rotation: Hand frame in the world (3, 3).
         start_angles: Fingers 1 mm off the nominal object (joints,) [rad].
+        palm: Shapes of what no joint moves, for pictures.
         drive: Constants of an episode that belong to the drives, by their names in `EpisodeConstants`; what is left out
             is as in the DLR-Hand II.
+        file: Name of the URDF's file that it was read from.
+        sha256: Of that file.
     """
 
-    fingers: tuple[FingerBase, ...]
-    lower: Array
-    upper: Array
+    name: str
+    fingers: tuple[Finger, ...]
+    columns: tuple[int, ...]
+    axes: tuple[int, ...]
+    tip_radius: float
     action_lower: Array
     action_upper: Array
     position: Array
     rotation: Array
     start_angles: Array
-    drive: Mapping[str, float | Array] = field(default_factory=dict, kw_only=True)
+    palm: tuple[CollisionShape, ...]
+    drive: Mapping[str, float | Array] = field(default_factory=dict)
+    file: str = ""
+    sha256: str = ""
 
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """What it is called in descriptions."""
-
-    @property
-    @abstractmethod
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the actuated joints, in the order of joint vectors."""
+        """Names of the actuated joints, in the order of joint vectors, e.g. `ring_q1`."""
+        return tuple(self.chain_joints(k)[link] for k in range(len(self.fingers)) for link in self._own)
+
+    @cached_property
+    def lower(self) -> Array:
+        """Hardware limits of the joints (joints,) [rad]."""
+        return np.concatenate([finger.limits[self._own, 0] for finger in self.fingers])
+
+    @cached_property
+    def upper(self) -> Array:
+        """Hardware limits of the joints (joints,) [rad]."""
+        return np.concatenate([finger.limits[self._own, 1] for finger in self.fingers])
 
     @property
-    @abstractmethod
     def joints_per_finger(self) -> int:
         """Actuated joints of a finger."""
+        return len(self._own)
 
     @property
-    @abstractmethod
     def links_per_finger(self) -> int:
-        """Links of a finger that move, each with a joint of its own, coupled ones included; the last one is the tip."""
-
-    @property
-    @abstractmethod
-    def tip_radius(self) -> float:
-        """Radius of the fingertip's sphere [m]."""
-
-    @abstractmethod
-    def coupled(self) -> tuple[tuple[int, int], ...]:
-        """Links of a finger that follow another one of it: (link, leader); both angles are equal."""
-
-    @abstractmethod
-    def link_names(self, finger: int) -> tuple[str, ...]:
-        """Names of a finger's links, from the palm to the tip."""
-
-    @abstractmethod
-    def shapes(self, finger: int) -> tuple[tuple[CollisionShape, ...], ...]:
-        """What can be touched of each link of a finger, in the link's frame."""
-
-    @abstractmethod
-    def link_limits(self, finger: int) -> Array:
-        """Hardware limits of all joints of a finger (links, 2) [rad]."""
-
-    @abstractmethod
-    def spin_axes(self) -> tuple[int, ...]:
-        """Principal axis of each link (0, 1, 2 for x, y, z) that lies along its joint's axis."""
-
-    @abstractmethod
-    def finger_urdf(self, finger: int) -> str:
-        """A finger as a robot of its own, rooted in its base; its links are `link_names`, parents first."""
-
-    @abstractmethod
-    def urdf(self) -> str:
-        """The whole hand; its root link is `palm`, its joints are `joint_names` and the coupled ones."""
-
-    @property
-    def urdf_name(self) -> str:
-        """Name of its URDF's file."""
-        return f"{self.name}.urdf"
-
-    @property
-    def urdf_sha256(self) -> str:
-        """SHA-256 of that file, or of the text of `urdf` where there is none."""
-        return hashlib.sha256(self.urdf().encode()).hexdigest()
-
-    @abstractmethod
-    def followed(self, joint: str) -> str:
-        """The actuated joint that a joint of `urdf` moves with: itself, or the one that it follows."""
-
-    @abstractmethod
-    def finger_tips(self, finger: int, q: Array) -> Array:
-        """Centres of a fingertip's sphere in the world (n, 3) [m] for its joint angles (n, joints_per_finger) [rad]."""
-
-    @abstractmethod
-    def finger_angles(self, finger: int, targets: Array) -> Array:
-        """Angles (n, joints_per_finger) [rad] that bring a fingertip to world points (n, 3) [m], or near them."""
-
-    @abstractmethod
-    def angles_at(self, tips: Array) -> Array:
-        """Joint angles (n, joints) [rad] that bring all fingertips to points (n, fingers, 3) [m], or near them."""
+        """Links of a finger that move, each with a joint of its own, coupled ones included."""
+        return len(self.columns)
 
     @property
     def joints(self) -> int:
         """Number of actuated joints."""
-        return len(self.fingers) * self.joints_per_finger
+        return len(self.fingers) * len(self._own)
 
-    @abstractmethod
+    @cached_property
+    def _own(self) -> list[int]:
+        """The links whose joints are actuated."""
+        return [self.columns.index(column) for column in range(max(self.columns) + 1)]
+
+    def coupled(self) -> tuple[tuple[int, int], ...]:
+        """Links of a finger that follow another one of it: (link, leader); both angles are equal."""
+        leaders = enumerate(self._own[column] for column in self.columns)
+        return tuple((link, leader) for link, leader in leaders if leader != link)
+
     def chain_joints(self, finger: int) -> tuple[str, ...]:
         """Names of all joints of a finger, coupled ones included, as in `urdf`."""
+        return tuple(self.fingers[finger].prefix + name for name in self.fingers[finger].joints)
+
+    def followed(self, joint: str) -> str:
+        """The actuated joint that a joint of `urdf` moves with: itself, or the one that it follows."""
+        for k in range(len(self.fingers)):
+            names = self.chain_joints(k)
+            if joint in names:
+                return names[self._own[self.columns[names.index(joint)]]]
+        return joint
 
     def of_finger(self, finger: int) -> slice:
         """Where a finger's joints stand in joint vectors."""
@@ -177,16 +165,11 @@ class Hand(ABC):
     def all_angles(self, actuated: Array | float) -> Array:
         """Values of all joints (fingers, links) from those of the actuated ones (joints,)."""
         values = np.broadcast_to(np.asarray(actuated, dtype=np.float64), (self.joints,))
-        leaders = {link: leader for link, leader in self.coupled()}
-        own = [link for link in range(self.links_per_finger) if link not in leaders]
-        column = [own.index(leaders.get(link, link)) for link in range(self.links_per_finger)]
-        return values.reshape(len(self.fingers), -1)[:, column]
+        return values.reshape(len(self.fingers), -1)[:, self.columns]
 
     def actuated(self, values: Array) -> Array:
         """Values of the actuated joints (joints,) from those of all (fingers, links)."""
-        followers = {link for link, _ in self.coupled()}
-        own = [link for link in range(self.links_per_finger) if link not in followers]
-        return np.asarray(values[:, own].ravel())
+        return np.asarray(values[:, self._own].ravel())
 
     def action_of(self, angles: Array) -> Array:
         """Action in [-1, 1] that asks for joint angles `(..., joints)` [rad]; angles out of range are clipped."""
@@ -198,3 +181,67 @@ class Hand(ABC):
         """Position (3,) [m] and rotation (3, 3) of the first joint's frame in the world."""
         base = self.fingers[finger]
         return self.position + self.rotation @ base.position, self.rotation @ base.rotation
+
+    def finger_tips(self, finger: int, q: Array) -> Array:
+        """Centres of a fingertip's sphere in the world (n, 3) [m] for its joint angles (n, joints_per_finger) [rad]."""
+        return self.fingers[finger].chain.tips(*self.base_in_world(finger), q)
+
+    def finger_angles(self, finger: int, targets: Array) -> Array:
+        """Angles (n, joints_per_finger) [rad] that bring a fingertip to world points (n, 3) [m], or near them.
+
+        The closed form of the DLR-Hand II takes no account of limits, the search of other hands stays within those of
+        actions.
+        """
+        points, own = np.asarray(targets, dtype=np.float64).reshape(-1, 3), self.of_finger(finger)
+        limits = self.action_lower[own], self.action_upper[own]
+        return self.fingers[finger].chain.angles(*self.base_in_world(finger), points, *limits)
+
+    def angles_at(self, tips: Array) -> Array:
+        """Joint angles (n, joints) [rad] that bring all fingertips to points (n, fingers, 3) [m], or near them."""
+        if isinstance(self.fingers[0].chain, PlanarChain):  # one by one: products of a batch round differently
+            rows = [[self.finger_angles(k, tip)[0] for k, tip in enumerate(row)] for row in tips]
+            return np.array(rows).reshape(len(tips), -1)
+        return np.concatenate([self.finger_angles(k, tips[:, k]) for k in range(len(self.fingers))], axis=1)
+
+    def urdf(self) -> str:
+        """The whole hand; its root link is `palm`, its joints are `joint_names` and the coupled ones."""
+        colour = f'<material name="palm"><color rgba="{_COLOURS["palm"]}"/></material>'
+        parts = [f'<link name="palm">{"".join(visual_elements(shape, colour) for shape in self.palm)}</link>']
+        for finger in self.fingers:
+            base = origin_element(finger.position, finger.rotation)
+            parts += self._finger_parts(finger, finger.prefix, "palm", base)
+        return robot_element(self.name, parts)
+
+    def finger_urdf(self, finger: int) -> str:
+        """A finger as a robot of its own, rooted in the frame of its first joint; names are without its prefix."""
+        return robot_element("finger", [_BASE, *self._finger_parts(self.fingers[finger], "", "base", "")])
+
+    @property
+    def urdf_name(self) -> str:
+        """Name of its URDF's file."""
+        return self.file or f"{self.name}.urdf"
+
+    @property
+    def urdf_sha256(self) -> str:
+        """SHA-256 of that file, or of the text of `urdf` where there is none."""
+        return self.sha256 or hashlib.sha256(self.urdf().encode()).hexdigest()
+
+    def _finger_parts(self, finger: Finger, prefix: str, parent: str, base: str) -> list[str]:
+        """Links and joints of a finger whose first joint sits at `base` (an origin element) in the link `parent`."""
+        links, joints = [], []
+        for k, (link, joint) in enumerate(zip(finger.links, finger.joints, strict=True)):
+            name = prefix + link
+            colour = _COLOURS["tip" if link == finger.links[-1] else "link"]
+            material = f'<material name="{name}"><color rgba="{colour}"/></material>'
+            drawn = "".join(collision_element(shape) + visual_elements(shape, material) for shape in finger.shapes[k])
+            weight = inertial_element(finger.mass[k], finger.com[k], np.diag(finger.inertia[k]))
+            links.append(f'<link name="{name}">{weight}{drawn}</link>')
+            leader = self._own[self.columns[k]]
+            mimic = "" if leader == k else f'<mimic joint="{prefix}{finger.joints[leader]}" multiplier="1" offset="0"/>'
+            axis = ("1 0 0", "0 1 0", "0 0 1")[self.axes[k]]
+            place = f'<parent link="{parent}"/><child link="{name}"/>{(base, *finger.origins)[k]}<axis xyz="{axis}"/>'
+            lower, upper = finger.limits[k]
+            limit = f'<limit lower="{lower:.10g}" upper="{upper:.10g}" effort="10" velocity="50"/>'
+            joints.append(f'<joint name="{prefix}{joint}" type="revolute">{place}{limit}{mimic}</joint>')
+            parent = name
+        return links + joints

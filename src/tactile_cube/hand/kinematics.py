@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand.hand import Array, Hand
+from tactile_cube.hand.hand import Hand
 from tactile_cube.hand.object_shape import ObjectShape, tip_centres
+from tactile_cube.hand.urdf import Array
 
 _ROOM = 2e-3
 """A point of a face counts as reachable only with this gap [m], so that a grasp and its approach take the same one."""

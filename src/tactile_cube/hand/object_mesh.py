@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -122,16 +122,23 @@ def read_mesh(file: str | Path, scale: float = 1.0, hull: bool = False) -> tuple
     solid = _loaded(Path(file), where)
     _refuse_odd_size(solid.extents * scale, scale, where)
     convex = solid.convex_hull
-    if not hull:
-        _refuse_hollow(solid, convex, where)
+    remedy = "object.hull=true takes its convex hull"
+    if not (hull or solid.is_volume):
+        raise InputError(f"{where}: its surface is not closed, or not all faces look outwards; mend it, or {remedy}")
+    share = float(solid.volume / convex.volume)
+    if not hull and share < CONVEX:
+        raise InputError(
+            f"{where}: fills {100 * share:.0f} % of its convex hull; the engines need convex ones: {remedy}"
+        )
     massive = solid if solid.is_volume else convex
     low, high = convex.bounds
     middle, size = 0.5 * (low + high), high - low
     corners, faces = _outline((convex.vertices - middle) / size)
-    covariance = _second_moments(massive.moment_inertia / massive.volume) / np.outer(size, size)
+    inertia = np.asarray(massive.moment_inertia / massive.volume, dtype=np.float64)
+    moments = (0.5 * np.trace(inertia) * np.eye(3) - inertia) / np.outer(size, size)
     com = np.round((massive.center_mass - middle) / size, 9)  # 0 where it is meant to be
     volume = float(massive.volume / np.prod(size))
-    return ObjectMesh(corners, faces, volume, com, covariance, str(file)), np.asarray(scale * size)
+    return ObjectMesh(corners, faces, volume, com, moments, str(file)), np.asarray(scale * size)
 
 
 def _loaded(path: Path, where: str) -> Trimesh:
@@ -165,17 +172,6 @@ def _refuse_odd_size(size: Array, scale: float, where: str) -> None:
     )
 
 
-def _refuse_hollow(solid: Trimesh, convex: Trimesh, where: str) -> None:
-    remedy = "object.hull=true takes its convex hull"
-    if not solid.is_volume:
-        raise InputError(f"{where}: its surface is not closed, or not all faces look outwards; mend it, or {remedy}")
-    share = float(solid.volume / convex.volume)
-    if share < CONVEX:
-        raise InputError(
-            f"{where}: fills {100 * share:.0f} % of its convex hull; the engines need convex ones: {remedy}"
-        )
-
-
 def _outline(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
     """Corners and triangles of a hull; of more than `CORNERS` those that lie outermost in so many directions."""
     chosen = vertices[ConvexHull(vertices).vertices]
@@ -197,9 +193,3 @@ def _directions(count: int) -> Array:
     height, turn = 1.0 - 2.0 * rank / count, np.pi * (1.0 + 5.0**0.5) * rank
     across = np.sqrt(1.0 - height**2)
     return np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
-
-
-def _second_moments(inertia: Sequence[Sequence[float]] | Array) -> Array:
-    """Second moments (3, 3) that an inertia (3, 3) stands for."""
-    tensor = np.asarray(inertia, dtype=np.float64)
-    return np.asarray(0.5 * np.trace(tensor) * np.eye(3) - tensor)

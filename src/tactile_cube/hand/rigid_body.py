@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, Array, Integers, mass_matrix_and_bias
-from tactile_cube.hand.urdf_elements import Joint, Mimic
+from tactile_cube.hand.urdf_elements import Mimic, Placement
 from tactile_cube.hand.urdf_tree import read_movable_joints
 
 __all__ = ["Mimic", "RigidBodyTree"]
@@ -24,6 +24,8 @@ class RigidBodyTree:
     Attributes:
         joint_names: (n) actuated joints in the order of every actuated quantity.
         dof_names: (N) all movable joints.
+        link_names: (N) the links that they carry.
+        homes: the dof that each link of the URDF moves with, -1 for none, and where its frame is in that dof's link.
         follow: (N,) index of the actuated joint that a dof follows.
         ratio: (N,).
         offset: (N,) [rad or m].
@@ -41,6 +43,8 @@ class RigidBodyTree:
 
     joint_names: tuple[str, ...]
     dof_names: tuple[str, ...]
+    link_names: tuple[str, ...]
+    homes: Mapping[str, tuple[int, Placement]]
     follow: Integers
     ratio: Array
     offset: Array
@@ -70,7 +74,28 @@ class RigidBodyTree:
         Raises:
             InputError: no tree, an unknown joint, a coupling to a joint that is not actuated, impossible masses.
         """
-        return _assemble(*read_movable_joints(text, joints, coupled))
+        dofs, homes, actuated = read_movable_joints(text, joints, coupled)
+        leaders = [actuated.index(d.coupling.joint if d.coupling else d.name) for d in dofs]
+        index = {d.link: k for k, d in enumerate(dofs)}
+        return cls(
+            joint_names=actuated,
+            dof_names=tuple(d.name for d in dofs),
+            link_names=tuple(d.link for d in dofs),
+            homes={link: (index.get(carrier, -1), place) for link, (carrier, place) in homes.items()},
+            follow=np.array(leaders, dtype=np.int64),
+            ratio=np.array([d.coupling.ratio if d.coupling else 1.0 for d in dofs]),
+            offset=np.array([d.coupling.offset if d.coupling else 0.0 for d in dofs]),
+            parent=np.array([index.get(d.parent, -1) for d in dofs], dtype=np.int64),
+            prismatic=np.array([d.prismatic for d in dofs], dtype=np.int64),
+            placement_rotation=np.stack([d.placement.rotation for d in dofs]),
+            placement_translation=np.stack([d.placement.translation for d in dofs]),
+            axis=np.stack([d.axis for d in dofs]),
+            mass=np.array([d.body.mass for d in dofs]),
+            com=np.stack([d.body.com for d in dofs]),
+            inertia=np.stack([d.body.inertia for d in dofs]),
+            lower=np.array([d.lower for d in dofs]),
+            upper=np.array([d.upper for d in dofs]),
+        )
 
     @property
     def dofs(self) -> int:
@@ -103,25 +128,3 @@ class RigidBodyTree:
         M, _ = self.equations(self.expand(q), np.zeros(self.dofs), np.zeros(3))
         J = self.coupling
         return np.asarray(J.T @ M @ J)
-
-
-def _assemble(dofs: list[Joint], actuated: tuple[str, ...]) -> RigidBodyTree:
-    leaders = [actuated.index(d.coupling.joint if d.coupling else d.name) for d in dofs]
-    index = {d.link: k for k, d in enumerate(dofs)}
-    return RigidBodyTree(
-        joint_names=actuated,
-        dof_names=tuple(d.name for d in dofs),
-        follow=np.array(leaders, dtype=np.int64),
-        ratio=np.array([d.coupling.ratio if d.coupling else 1.0 for d in dofs]),
-        offset=np.array([d.coupling.offset if d.coupling else 0.0 for d in dofs]),
-        parent=np.array([index.get(d.parent, -1) for d in dofs], dtype=np.int64),
-        prismatic=np.array([d.prismatic for d in dofs], dtype=np.int64),
-        placement_rotation=np.stack([d.placement.rotation for d in dofs]),
-        placement_translation=np.stack([d.placement.translation for d in dofs]),
-        axis=np.stack([d.axis for d in dofs]),
-        mass=np.array([d.body.mass for d in dofs]),
-        com=np.stack([d.body.com for d in dofs]),
-        inertia=np.stack([d.body.inertia for d in dofs]),
-        lower=np.array([d.lower for d in dofs]),
-        upper=np.array([d.upper for d in dofs]),
-    )

@@ -1,8 +1,10 @@
-"""Writing URDF text: elements that every mechanism has, and other masses for the links of one."""
+"""Writing URDF text: elements that every mechanism has, shapes, and other masses for the links of one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,6 +15,26 @@ from tactile_cube.errors import InputError
 Array = NDArray[np.float64]
 
 _UPRIGHT = 1e-9
+
+
+@dataclass(frozen=True)
+class CollisionShape:
+    """A convex shape in a link's frame, in plain numbers that every engine can build.
+
+    Attributes:
+        kind: what it is.
+        size: of a box its edges (3,), of a cylinder or capsule radius and length of the straight part (2,), of a sphere
+            its radius (1,), of a mesh its scale (3,).
+        position: of its middle (3,) [m].
+        rotation: of its axes (3, 3); cylinders and capsules lie along z.
+        file: of a mesh.
+    """
+
+    kind: Literal["box", "cylinder", "capsule", "sphere", "mesh"]
+    size: tuple[float, ...]
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    file: str = ""
 
 
 def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, inertia: Array) -> str:
@@ -27,32 +49,26 @@ def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, iner
     """
     robot = ElementTree.fromstring(urdf)
     for k, name in enumerate(links):
-        inertial = robot.find(f"link[@name='{name}']/inertial")
-        if inertial is None:
+        link = robot.find(f"link[@name='{name}']")
+        old = link.find("inertial") if link is not None else None
+        if link is None or old is None:
             raise InputError(f"URDF: no link '{name}' with an inertial element")
-        upper = zip(["xx", "xy", "xz", "yy", "yz", "zz"], inertia[k][np.triu_indices(3)], strict=True)
-        numbers = {
-            "origin": {"xyz": number_list(com[k])},
-            "mass": {"value": f"{mass[k]:.12g}"},
-            "inertia": {f"i{axes}": f"{value:.12g}" for axes, value in upper},
-        }
-        for child in list(inertial):
-            inertial.remove(child)
-        for tag, attributes in numbers.items():
-            ElementTree.SubElement(inertial, tag, attributes)
+        link.remove(old)
+        link.append(ElementTree.fromstring(inertial_element(mass[k], com[k], inertia[k], digits=12)))
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-ROBOT_ROOT = (
-    '<link name="{name}"><inertial><mass value="0.1"/>'
-    '<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-)
-"""The fixed base; its numbers do nothing, but Bullet warns about links without any."""
-
-
-def robot_element(name: str, parts: list[str]) -> str:
+def robot_element(name: str, parts: Iterable[str]) -> str:
     """A whole description from its links and joints."""
     return "\n".join(['<?xml version="1.0"?>', f'<robot name="{name}">', *parts, "</robot>", ""])
+
+
+def inertial_element(mass: float, com: Array, inertia: Array, digits: int = 10) -> str:
+    """Mass [kg], centre of mass (3,) [m] and inertia (3, 3) about it [kg m^2] as URDF's <inertial>."""
+    upper = zip(["xx", "xy", "xz", "yy", "yz", "zz"], inertia[np.triu_indices(3)], strict=True)
+    moments = " ".join(f'i{axes}="{value:.{digits}g}"' for axes, value in upper)
+    place = f'<origin xyz="{number_list(com)}"/>'
+    return f'<inertial>{place}<mass value="{mass:.{digits}g}"/><inertia {moments}/></inertial>'
 
 
 def origin_element(position: Array, rotation: Array | None = None) -> str:
@@ -74,3 +90,33 @@ def roll_pitch_yaw(rotation: Array) -> Array:
 def number_list(values: Array) -> str:
     """Numbers with spaces between them."""
     return " ".join(f"{value:.12g}" for value in values)
+
+
+def collision_element(shape: CollisionShape) -> str:
+    """A shape as URDF's <collision>."""
+    return f"<collision>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}</collision>"
+
+
+def visual_elements(shape: CollisionShape, material: str) -> str:
+    """A shape as <visual> elements that every reader can draw: a capsule as a cylinder and two spheres."""
+    if shape.kind != "capsule":
+        return f"<visual>{origin_element(shape.position, shape.rotation)}{_geometry(shape)}{material}</visual>"
+    radius, length = shape.size
+    along = 0.5 * length * shape.rotation[:, 2]
+    parts = [
+        CollisionShape("cylinder", (radius, length), shape.position, shape.rotation),
+        *(CollisionShape("sphere", (radius,), shape.position + end) for end in (along, -along)),
+    ]
+    return "".join(visual_elements(part, material) for part in parts)
+
+
+def _geometry(shape: CollisionShape) -> str:
+    size = [f"{value:.10g}" for value in shape.size]
+    inside = {
+        "box": f'<box size="{" ".join(size)}"/>',
+        "sphere": f'<sphere radius="{size[0]}"/>',
+        "cylinder": f'<cylinder radius="{size[0]}" length="{size[-1]}"/>',
+        "capsule": f'<capsule radius="{size[0]}" length="{size[-1]}"/>',
+        "mesh": f'<mesh filename="{shape.file}" scale="{" ".join(size)}"/>',
+    }
+    return f"<geometry>{inside[shape.kind]}</geometry>"

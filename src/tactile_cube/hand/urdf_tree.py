@@ -16,22 +16,42 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_elements import Body, Joint, Mimic, Placement, attribute, body_of, joint_of
 from tactile_cube.untrusted_file import below, regular
 
+Homes = dict[str, tuple[str, Placement]]
+"""The link that each link moves with, itself or the root's included, and where its frame is in that link's."""
+
 
 def read_movable_joints(
     text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Mimic] | None = None
-) -> tuple[list[Joint], tuple[str, ...]]:
-    """The joints that move, parents before children, and the names of the actuated ones in order.
+) -> tuple[list[Joint], Homes, tuple[str, ...]]:
+    """The joints that move, parents before children; where all links are; the actuated joints' names in order.
 
     See `RigidBodyTree.from_urdf` for the arguments.
     """
     every, bodies = read_joints(text)
+    movable = [j.name for j in every if j.kind != "fixed"]
+    for name in (*(coupled or ()), *(joints or ())):
+        if name not in movable:
+            raise InputError(f"URDF: it has no movable joint '{name}'; movable: {', '.join(movable) or 'none'}")
     if coupled:
-        _refuse_unknown(coupled, every)
         every = [replace(j, coupling=coupled[j.name]) if j.name in coupled else j for j in every]
-    actuated = _actuated(every, joints)
-    _check_couplings(every)
-    every = [j if _moves(j, actuated) else replace(j, kind="fixed") for j in every]
-    return _merge_fixed(_parents_first(every, bodies)), actuated
+    leaders = [j.name for j in every if j.kind != "fixed" and j.coupling is None]
+    actuated = tuple(leaders if joints is None else joints)
+    if not actuated:
+        raise InputError("URDF: no joint of it can move; a mechanism needs at least one")
+    if len(set(actuated)) < len(actuated):
+        raise InputError(f"joints: {', '.join(actuated)} names a joint twice; name each once")
+    for k, joint in enumerate(every):
+        leader = joint.coupling.joint if joint.coupling else joint.name
+        if joint.coupling and joint.name in actuated:
+            raise InputError(f"joint '{joint.name}' is actuated and follows '{leader}'; choose one")
+        if joint.coupling and leader not in leaders:
+            known = ", ".join(sorted(leaders)) or "none"
+            raise InputError(
+                f"joint '{joint.name}' follows '{leader}', which does not move on its own; name one of {known}"
+            )
+        if leader not in actuated:  # locked; a follower of a locked joint too
+            every[k] = replace(joint, kind="fixed")
+    return *_merge_fixed(*_parents_first(every, bodies)), actuated
 
 
 def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
@@ -68,48 +88,8 @@ def robot_of(text: str) -> ElementTree.Element:
     return robot
 
 
-def _refuse_unknown(names: Mapping[str, Mimic] | Sequence[str], every: list[Joint]) -> None:
-    movable = [j.name for j in every if j.kind != "fixed"]
-    for name in names:
-        if name not in movable:
-            raise InputError(f"URDF: it has no movable joint '{name}'; movable: {', '.join(movable) or 'none'}")
-
-
-def _actuated(every: list[Joint], joints: Sequence[str] | None) -> tuple[str, ...]:
-    if joints is None:
-        names = tuple(j.name for j in every if j.kind != "fixed" and j.coupling is None)
-    else:
-        names = tuple(joints)
-        _refuse_unknown(names, every)
-    if not names:
-        raise InputError("URDF: no joint of it can move; a mechanism needs at least one")
-    if len(set(names)) < len(names):
-        raise InputError(f"joints: {', '.join(names)} names a joint twice; name each once")
-    for joint in every:
-        if joint.name in names and joint.coupling is not None:
-            raise InputError(f"joint '{joint.name}' is actuated and follows '{joint.coupling.joint}'; choose one")
-    return names
-
-
-def _check_couplings(every: list[Joint]) -> None:
-    leaders = {j.name for j in every if j.kind != "fixed" and j.coupling is None}
-    for joint in every:
-        if joint.coupling is not None and joint.coupling.joint not in leaders:
-            raise InputError(
-                f"joint '{joint.name}' follows '{joint.coupling.joint}', which does not move on its own; name one of "
-                f"{', '.join(sorted(leaders)) or 'none'}"
-            )
-
-
-def _moves(joint: Joint, actuated: tuple[str, ...]) -> bool:
-    """Whether a joint is actuated or follows one that is; a follower of a locked joint is locked with it."""
-    if joint.kind == "fixed":
-        return False
-    return joint.name in actuated or (joint.coupling is not None and joint.coupling.joint in actuated)
-
-
-def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> list[Joint]:
-    """Branch after branch to its end, which is PyBullet's order too."""
+def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> tuple[str, list[Joint]]:
+    """The root link, and the joints branch after branch to its end, which is PyBullet's order too."""
     children = [j.link for j in every]
     for name in children:
         if children.count(name) > 1:
@@ -127,24 +107,25 @@ def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> list[Joint
     if len(ordered) < len(every):
         lost = next(j.name for j in every if j not in ordered)
         raise InputError(f"URDF: joint '{lost}' does not hang on the root link '{reached[0]}'; connect it")
-    return ordered
+    return reached[0], ordered
 
 
-def _merge_fixed(ordered: list[Joint]) -> list[Joint]:
+def _merge_fixed(root: str, ordered: list[Joint]) -> tuple[list[Joint], Homes]:
     """Moves what hangs on a fixed joint into the link before it, and its children with it."""
-    home: dict[str, tuple[str, Placement]] = {}
+    homes: Homes = {root: (root, Placement())}
     moving: dict[str, Joint] = {}
     for joint in ordered:
-        carrier, place = home.get(joint.parent, (joint.parent, Placement()))
+        carrier, place = homes[joint.parent]
         placed = place.then(joint.placement)
         if joint.kind != "fixed":
+            homes[joint.link] = joint.link, Placement()
             moving[joint.link] = replace(joint, parent=carrier, placement=placed)
             continue
-        home[joint.link] = carrier, placed
+        homes[joint.link] = carrier, placed
         if carrier in moving:
             merged = moving[carrier].body.joined(joint.body.seen_from(placed))
             moving[carrier] = replace(moving[carrier], body=merged)
-    return list(moving.values())
+    return list(moving.values()), homes
 
 
 SHAPES = ("visual", "collision")

@@ -1,90 +1,180 @@
-"""Hand and cube in PyBullet."""
+"""Hand, cube and table in PyBullet, placed so that nothing of the past remains.
+
+One multibody per finger: the solver couples the rows of everything that hangs on one multibody, and four small ones are
+several times faster than one hand.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal, Protocol
+import tempfile
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from tactile_cube.drivetrain import Plant
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.simulation.bullet_bodies import BulletBodies, com_arm
+from tactile_cube.hand.object_mesh import ObjectMesh
+from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half, unit_inertia
+from tactile_cube.simulation.bullet_loop import make_loop, object_state
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import Contact
+from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import OBJECT_STATE
-from tactile_cube.simulation.native_library import find_compiler, load_native, native_library
-from tactile_cube.simulation.options import Loop, SimulationOptions
+from tactile_cube.simulation.options import SimulationOptions
 
 Array = NDArray[np.float64]
 
+_TABLE_SIZE = np.array([0.5, 0.5, 0.04])
+TILTED = 0.05
+"""Products of inertia that Bullet may neglect, as a share of the smallest moment: moments are then right to 1 %."""
+_ALL_GROUPS = 0xFFFF
+_FIRST_FINGER_GROUP = 0x10
+"""Collision group of the first finger, one bit for each; Bullet gives bits below to bodies of its own accord."""
+_URDF_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+_NO_DAMPING = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
+
+
+def connect(options: SimulationOptions) -> int:
+    """A physics server of its own in this process; gives the id of its client.
+
+    Its broadphase compares every two boxes at every step. Bullet's usual one, a tree, pays only with more bodies: for a
+    hand it takes 8 % longer, with the same contacts.
+    """
+    client = int(pybullet.connect(pybullet.DIRECT))
+    pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, physicsClientId=client)
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=options.dt,
+        numSolverIterations=options.solver_iterations,
+        numSubSteps=0,
+        deterministicOverlappingPairs=1,
+        enableFileCaching=0,
+        physicsClientId=client,
+    )
+    return client
+
+
+def load_chain(client: int, urdf: str, position: Array, rotation: Array) -> int:
+    """Loads a robot with a fixed base and free joints: no motors, no damping. Gives its body id."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "chain.urdf"
+        file.write_text(urdf, encoding="utf-8")
+        quaternion = Rotation.from_matrix(rotation).as_quat().tolist()
+        body = pybullet.loadURDF(
+            str(file), list(position), quaternion, useFixedBase=True, flags=_URDF_FLAGS, physicsClientId=client
+        )
+    for joint in range(-1, pybullet.getNumJoints(body, physicsClientId=client)):
+        pybullet.changeDynamics(body, joint, **_NO_DAMPING, physicsClientId=client)
+        if joint >= 0:
+            pybullet.setJointMotorControl2(body, joint, pybullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
+    return int(body)
+
+
+def com_arm(constants: EpisodeConstants, quaternion: Array) -> Array:
+    """From the cube's centre to its centre of mass, in the world (3,) [m]."""
+    com = np.asarray(constants.cube_com)
+    return Rotation.from_quat(quaternion).as_matrix() @ com if com.any() else np.zeros(3)
+
 
 class BulletEngine:
-    """See `Engine`. Sequential impulses; rotors and tendons are worked into the torques, see `spin_inertia`."""
+    """See `Engine`. Sequential impulses; rotors and tendons are worked into the torques, see `spin_inertia`.
+
+    Attributes:
+        client: PyBullet's client id.
+        fingers: Body ids of the fingers.
+        cube: Body id of the cube.
+        table: Body id of the table, -1 without one.
+    """
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Builds the bodies and binds the drive's memory to the loop."""
-        self._drive = drive
-        self._bodies = BulletBodies(hand, options, drive.finger_urdfs())
-        self._joints = np.zeros((2, len(hand.fingers), hand.links_per_finger))
-        self._loop = make_loop(options.loop, self._bodies.client, drive.plant)
-        q, v = self._joints.reshape(2, -1)
-        self._loop.bind(self._bodies.fingers, q, v, drive.memory)
-
-    @property
-    def loop(self) -> Literal["c", "python"]:
-        """See `Engine`."""
-        return self._loop.kind
-
-    @property
-    def q(self) -> Array:
-        """See `Engine.q`."""
-        return np.asarray(self._joints[0])
-
-    @property
-    def v(self) -> Array:
-        """See `Engine.v`."""
-        return np.asarray(self._joints[1])
+        """Builds the fingers; cube and table come with each episode."""
+        self._hand, self._drive = hand, drive
+        self.client = connect(options)
+        half = (0.5 * _TABLE_SIZE).tolist()
+        self._table_shape = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
+        )
+        self._cube_shape = -1
+        self._cube_size = self._cube_com = np.zeros(3)
+        self._cube_kind: ObjectShape = "box"
+        self._links = range(hand.links_per_finger)
+        self._bare = [[link for link in self._links if not finger.shapes[link]] for finger in hand.fingers]
+        self.table, self.cube = self._new_table(0.0), self._new_table(0.0)  # hold the places before the fingers'
+        bases = [hand.base_in_world(k) for k in range(len(hand.fingers))]
+        self.fingers = [
+            load_chain(self.client, urdf, *base) for urdf, base in zip(drive.finger_urdfs(), bases, strict=True)
+        ]
+        self._inertias = [
+            [pybullet.getDynamicsInfo(body, link, physicsClientId=self.client)[2] for link in self._links]
+            for body in self.fingers
+        ]
+        for body, bare in zip(self.fingers, self._bare, strict=True):  # Bullet boxes links without a shape too
+            for link in (-1, *bare):
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
+        self.q, self.v = np.zeros((2, len(hand.fingers), hand.links_per_finger))
+        self._loop = make_loop(self.client, drive.plant)
+        self._loop.bind(self.fingers, self.q.reshape(-1), self.v.reshape(-1), drive.memory)
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
         """See `Engine.place`."""
         self._constants = constants
-        self._joints[0], self._joints[1] = q, v
-        self._bodies.place(constants, start, q, v)
-        self._bodies.set_spin_inertia(self._drive.view("spin_inertia"))
+        self.q[:], self.v[:] = q, v
+        # the table goes last: a new body gets the place in the broadphase that was left last, and the solver goes
+        # through contacts in the order of these places, which must be the same in every episode
+        for body in (self.cube, self.table):
+            if body >= 0:
+                pybullet.removeBody(body, physicsClientId=self.client)
+        self.table = -1
+        if constants.table_height is not None:  # even a distant body takes 6 % of the time
+            self.table = self._new_table(constants.table_height)
+            friction = {"lateralFriction": constants.table_friction}
+            pybullet.changeDynamics(self.table, -1, **friction, physicsClientId=self.client)
+        self._set_cube(constants, start)
+        for body, position, velocity in zip(self.fingers, q, v, strict=True):
+            for k in self._links:
+                pybullet.resetJointState(body, k, position[k], velocity[k], physicsClientId=self.client)
+        self._set_friction(constants)
+        self._forget_contacts()
+        self._set_spin_inertia()
 
     def set_gravity(self, acceleration: Array) -> None:
         """See `Engine.set_gravity`."""
-        self._bodies.set_gravity(acceleration)
+        pybullet.setGravity(*acceleration, physicsClientId=self.client)
 
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
         """See `Engine.run`."""
         states = np.empty((steps + 1, OBJECT_STATE)) if record else None
-        self._loop.run(steps, self._bodies.cube, wrench, states)
+        self._loop.run(steps, self.cube, wrench, states)
         return None if states is None else np.stack([self._of_centre(state) for state in states])
 
     def cube_state(self) -> Array:
         """See `Engine.cube_state`."""
-        client, cube = self._bodies.client, self._bodies.cube
-        position, quaternion = pybullet.getBasePositionAndOrientation(cube, physicsClientId=client)
-        linear, angular = pybullet.getBaseVelocity(cube, physicsClientId=client)
-        return self._of_centre(np.array([*position, *quaternion, *linear, *angular]))
+        return self._of_centre(object_state(self.client, self.cube))
 
     def gaps(self) -> list[float]:
         """See `Engine.gaps`."""
-        return [row[8] for row in pybullet.getContactPoints(physicsClientId=self._bodies.client)]
+        return [row[8] for row in pybullet.getContactPoints(physicsClientId=self.client)]
 
     def contacts(self) -> list[Contact]:
         """See `Engine.contacts`."""
-        return self._bodies.contacts()
+        names = {(body, -1): (name, "") for body, name in ((self.cube, "cube"), (self.table, "table"))}
+        for body, finger in zip(self.fingers, self._hand.fingers, strict=True):
+            names |= {(body, k): (finger.name, link) for k, link in enumerate(finger.links)}
+        found = []
+        for row in pybullet.getContactPoints(physicsClientId=self.client):
+            first, second = names[row[1], row[3]], names[row[2], row[4]]
+            middle = 0.5 * (np.array(row[5]) + np.array(row[6]))
+            friction_on_first = row[10] * np.array(row[11]) + row[12] * np.array(row[13])
+            found.append(named_contact(first, second, middle, -np.array(row[7]), row[8], row[9], -friction_on_first))
+        return found
 
     def close(self) -> None:
         """Ends the physics server."""
-        self._bodies.close()
+        if pybullet.isConnected(self.client):
+            pybullet.disconnect(self.client)
 
     def _of_centre(self, state: Array) -> Array:
         """Bullet speaks of the centre of mass; the same state (13,) of the cube's centre."""
@@ -94,126 +184,132 @@ class BulletEngine:
             state[7:10] -= np.cross(state[10:13], arm)
         return state
 
-
-class PhysicsLoop(Protocol):
-    """Runs physics steps of bound arrays; both implementations give the same bits."""
-
-    kind: Literal["c", "python"]
-
-    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
-        """Says what the steps work on, in place.
-
-        Args:
-            chains: Body ids of the chains.
-            q: Positions of all joints of all chains, current before and after each run [rad].
-            v: Velocities, likewise [rad/s].
-            memory: The drivetrain's memory.
-        """
-        ...
-
-    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
-        """Runs physics steps.
-
-        Args:
-            steps: How many.
-            cube: Body id of the object; needed where `wrench` or `states` is given.
-            wrench: Force and torque on the object's centre (6,) [N, N m], or None.
-            states: (steps + 1, 13), filled with the object's state before each step and after the last, or None.
-        """
-        ...
-
-
-def make_loop(kind: Loop, client: int, plant: Plant) -> PhysicsLoop:
-    """The loop of that kind; `auto` takes the compiled one where it can be built."""
-    if kind == "python" or (kind == "auto" and find_compiler() is None):
-        return PythonLoop(client, plant)
-    try:
-        return NativeLoop(client, plant)
-    except (InputError, OSError):
-        if kind == "c":
-            raise
-        return PythonLoop(client, plant)
-
-
-class NativeLoop:
-    """All steps in one C call inside PyBullet's process."""
-
-    kind: Literal["c", "python"] = "c"
-
-    def __init__(self, client: int, plant: Plant) -> None:
-        """Attaches the compiled loop to a client as a PyBullet plugin; once for each client."""
-        self._library = load_native()
-        if pybullet.loadPlugin(str(native_library()), "_steps", physicsClientId=client) < 0:
-            raise InputError("PyBullet refused the compiled loop; choose simulation.loop=python")
-        self._handle = self._library.physics_client()
-        self._control = plant.kernel.control_address
-
-    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
-        """See `PhysicsLoop.bind`."""
-        self._chains = np.array(chains, dtype=np.int32)
-        self._bound = (q, v, np.zeros_like(q), memory)  # kept alive: C sees their addresses
-        self._who = (self._handle, self._chains.ctypes.data, len(chains), q.size // len(chains))
-        self._what = (self._control, *(array.ctypes.data for array in self._bound))
-
-    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
-        """See `PhysicsLoop.run`."""
-        if wrench is not None and states is None:
-            states = np.empty((steps + 1, OBJECT_STATE))
-        push, record = (None if array is None else array.ctypes.data for array in (wrench, states))
-        self._library.run_physics_steps(*self._who, steps, *self._what, cube, push, record)
-
-
-class PythonLoop:
-    """The same steps through PyBullet's Python functions."""
-
-    kind: Literal["c", "python"] = "python"
-
-    def __init__(self, client: int, plant: Plant) -> None:
-        """Takes the control step from the plant."""
-        self._client = client
-        self._control = plant.kernel.control_step
-
-    def bind(self, chains: Sequence[int], q: Array, v: Array, memory: Array) -> None:
-        """See `PhysicsLoop.bind`."""
-        self._chains = list(chains)
-        self._q, self._v, self._memory = q, v, memory
-
-    def run(self, steps: int, cube: int, wrench: Array | None, states: Array | None) -> None:
-        """See `PhysicsLoop.run`."""
-        torque = np.zeros_like(self._q)
-        for i in range(steps):
-            self._control(i, self._q, self._v, torque, self._memory)
-            self._apply(torque)
-            if states is not None:
-                states[i] = self._object_state(cube)
-            if wrench is not None:
-                self._push(cube, wrench)
-            pybullet.stepSimulation(physicsClientId=self._client)
-            self._read(self._q, self._v)
-        if states is not None:
-            states[steps] = self._object_state(cube)
-
-    def _apply(self, torque: Array) -> None:
-        joints = range(torque.size // len(self._chains))
-        for body, forces in zip(self._chains, torque.reshape(len(self._chains), -1).tolist(), strict=True):
-            pybullet.setJointMotorControlArray(
-                body, joints, pybullet.TORQUE_CONTROL, forces=forces, physicsClientId=self._client
+    def _new_table(self, height: float) -> int:
+        centre = [0.0, 0.0, height - 0.5 * float(_TABLE_SIZE[2])]
+        return int(
+            pybullet.createMultiBody(
+                0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, physicsClientId=self.client
             )
+        )
 
-    def _read(self, q: Array, v: Array) -> None:
-        joints = range(q.size // len(self._chains))
-        for c, body in enumerate(self._chains):
-            states = pybullet.getJointStates(body, joints, physicsClientId=self._client)
-            here = slice(c * len(joints), (c + 1) * len(joints))
-            q[here], v[here] = [state[0] for state in states], [state[1] for state in states]
+    def _set_cube(self, constants: EpisodeConstants, start: Start) -> None:
+        """A new body each time: Bullet keeps the inertia in the world of a used one for a step after it is moved.
 
-    def _object_state(self, cube: int) -> Array:
-        position, quaternion = pybullet.getBasePositionAndOrientation(cube, physicsClientId=self._client)
-        linear, angular = pybullet.getBaseVelocity(cube, physicsClientId=self._client)
-        return np.array([*position, *quaternion, *linear, *angular])
+        It is a plain rigid body; as a multibody without links it would make the solver 8 % slower. Its origin is its
+        centre of mass. The skin of the fingertips is written on the cube, since Bullet cannot take it away again.
+        """
+        arm = com_arm(constants, np.asarray(start.cube_quaternion))
+        self.cube = int(
+            pybullet.createMultiBody(
+                constants.cube_mass,
+                self._shape_of(constants),
+                basePosition=list(np.asarray(start.cube_position) + arm),
+                baseOrientation=list(np.asarray(start.cube_quaternion)),
+                useMaximalCoordinates=True,
+                physicsClientId=self.client,
+            )
+        )
+        pybullet.changeDynamics(
+            self.cube,
+            -1,
+            lateralFriction=constants.cube_friction,
+            spinningFriction=0.0,
+            rollingFriction=0.0,
+            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            **_NO_DAMPING,
+            physicsClientId=self.client,
+        )
+        if constants.object_shape not in ("box", "cylinder"):  # Bullet takes that of a box for the others
+            # without its mass it would lose the inertia; without a margin a mesh ends where its corners are
+            inertia = constants.cube_mass * unit_inertia(constants.object_shape, np.asarray(constants.cube_size))
+            heavy = {"mass": constants.cube_mass, "localInertiaDiagonal": np.diag(inertia).tolist()}
+            heavy |= {"collisionMargin": 0.0} if isinstance(constants.object_shape, ObjectMesh) else {}
+            pybullet.changeDynamics(self.cube, -1, **heavy, physicsClientId=self.client)
+        if constants.tip_compliance > 0.0:
+            skin = {
+                "contactStiffness": 1.0 / constants.tip_compliance,
+                "contactDamping": SKIN_RELAXATION / constants.tip_compliance,
+            }
+            pybullet.changeDynamics(self.cube, -1, **skin, physicsClientId=self.client)
+        turning = np.asarray(start.cube_angular_velocity)
+        linear = np.asarray(start.cube_linear_velocity) + np.cross(turning, arm)
+        pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), physicsClientId=self.client)
 
-    def _push(self, cube: int, wrench: Array) -> None:
-        centre, _ = pybullet.getBasePositionAndOrientation(cube, physicsClientId=self._client)
-        frame = pybullet.WORLD_FRAME
-        pybullet.applyExternalForce(cube, -1, wrench[:3].tolist(), centre, frame, physicsClientId=self._client)
-        pybullet.applyExternalTorque(cube, -1, wrench[3:].tolist(), frame, physicsClientId=self._client)
+    def _shape_of(self, constants: EpisodeConstants) -> int:
+        """The shape of the last object if it had this kind, size and centre of mass, else a new one.
+
+        Only one off its centre of mass pays for a compound shape around it.
+        """
+        kind, size, com = constants.object_shape, np.asarray(constants.cube_size), np.asarray(constants.cube_com)
+        same = kind == self._cube_kind and np.array_equal(size, self._cube_size)
+        if not (same and np.array_equal(com, self._cube_com)):
+            if isinstance(kind, ObjectMesh):
+                _refuse_tilted_inertia(kind, size)
+                geometry = {"shapeType": pybullet.GEOM_MESH, "vertices": (kind.vertices * size - com).tolist()}
+            else:
+                place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
+                geometry = _geometry(kind, size) | place
+            shape = pybullet.createCollisionShape(**geometry, physicsClientId=self.client)
+            self._cube_shape, self._cube_kind = int(shape), kind
+            self._cube_size, self._cube_com = size.copy(), com.copy()
+        return self._cube_shape
+
+    def _set_spin_inertia(self) -> None:
+        """Adds inertia about the joint axis to each link, for numerical stability."""
+        for body, inertias, spins in zip(self.fingers, self._inertias, self._drive.view("spin_inertia"), strict=True):
+            for link, (diagonal, spin) in enumerate(zip(inertias, spins, strict=True)):
+                spinning = list(diagonal)
+                spinning[self._hand.axes[link]] += spin
+                pybullet.changeDynamics(body, link, localInertiaDiagonal=spinning, physicsClientId=self.client)
+
+    def _set_friction(self, constants: EpisodeConstants) -> None:
+        """Friction of the links; Bullet multiplies the factors of the two bodies that touch."""
+        for body in self.fingers:
+            for link in self._links:
+                tip = link == self._links[-1]
+                pybullet.changeDynamics(
+                    body,
+                    link,
+                    lateralFriction=constants.tip_friction if tip else constants.link_friction,
+                    spinningFriction=constants.tip_spinning_friction if tip else 0.0,
+                    physicsClientId=self.client,
+                )
+
+    def _forget_contacts(self) -> None:
+        """Registers every finger anew with the broadphase; cube and table are new themselves.
+
+        That drops cached contacts and their impulses, so an episode depends on nothing that happened before it.
+        A finger meets everything but itself.
+        """
+        for k, body in enumerate(self.fingers):
+            group = _FIRST_FINGER_GROUP << k
+            for link in self._links:
+                if link not in self._bare[k]:
+                    pybullet.setCollisionFilterGroupMask(
+                        body, link, group, _ALL_GROUPS & ~group, physicsClientId=self.client
+                    )
+
+
+def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
+    """Bullet knows an object's moments of inertia about its own axes alone."""
+    inertia = mesh.inertia(size)
+    tilted = float(np.abs(inertia - np.diag(np.diag(inertia))).max() / np.diag(inertia).min())
+    if tilted > TILTED:
+        raise InputError(
+            f"object.file={mesh.file}: its products of inertia are {tilted:.2f} of its smallest moment, engine=bullet "
+            f"takes up to {TILTED}; turn the mesh along its principal axes, or choose engine=mujoco"
+        )
+
+
+def _geometry(kind: NamedShape, size: Array) -> dict[str, Any]:
+    """Bullet's words for an object of a kind with a bounding box (3,) [m]."""
+    half = 0.5 * size
+    if kind == "box":
+        return {"shapeType": pybullet.GEOM_BOX, "halfExtents": half.tolist()}
+    radius = float(half[0])
+    if kind == "cylinder":
+        return {"shapeType": pybullet.GEOM_CYLINDER, "radius": radius, "height": float(size[2])}
+    length = 2.0 * straight_half(half)
+    if length == 0.0:
+        return {"shapeType": pybullet.GEOM_SPHERE, "radius": radius}
+    return {"shapeType": pybullet.GEOM_CAPSULE, "radius": radius, "height": length}

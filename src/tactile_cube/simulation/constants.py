@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,12 @@ from tactile_cube.hand.object_mesh import ObjectMesh, read_mesh
 from tactile_cube.hand.object_shape import SHAPES, ObjectShape
 
 Array = NDArray[np.float64]
-_JOINTS = "joints"
+_OF_SPACE = ("gravity_direction", "cube_size", "cube_com")
+_OF_JOINTS = ("kp", "kd", "stiffness", "static_friction", "friction_creep", "reflected_inertia", "joint_offset")
+_POSITIVE = {"gravity", "filter_time", "rate_limit", "torque_limit", "kp", "stiffness", "cube_size", "cube_mass"}
+_POSITIVE |= {"force_interval"}
+_ANY_SIGN = {"gravity_direction", "elasticity_sign", "joint_offset", "cube_com", "table_height", "effects"}
+_ANY_SIGN |= {"object_shape"}
 
 
 @dataclass(frozen=True)
@@ -101,50 +106,19 @@ class EpisodeConstants:
     joints: int = 12
     object_shape: ObjectShape = "box"
 
-    _LENGTHS: ClassVar[dict[str, int | str]] = {
-        "gravity_direction": 3,
-        "cube_size": 3,
-        "cube_com": 3,
-        "kp": _JOINTS,
-        "kd": _JOINTS,
-        "stiffness": _JOINTS,
-        "static_friction": _JOINTS,
-        "friction_creep": _JOINTS,
-        "reflected_inertia": _JOINTS,
-        "joint_offset": _JOINTS,
-    }
-    _POSITIVE: ClassVar[tuple[str, ...]] = (
-        "gravity",
-        "filter_time",
-        "rate_limit",
-        "torque_limit",
-        "kp",
-        "stiffness",
-        "cube_size",
-        "cube_mass",
-        "force_interval",
-    )
-    _ANY_SIGN: ClassVar[tuple[str, ...]] = (
-        "gravity_direction",
-        "elasticity_sign",
-        "joint_offset",
-        "cube_com",
-        "table_height",
-        "effects",
-        "object_shape",
-    )
-
     def __post_init__(self) -> None:
         """Give every vector its length and refuse values without a physical meaning."""
-        for name, length in self._LENGTHS.items():
-            count = self.joints if isinstance(length, str) else length
+        for name in (*_OF_SPACE, *_OF_JOINTS):
+            count = 3 if name in _OF_SPACE else self.joints
             object.__setattr__(self, name, _vector(name, getattr(self, name), count))
         self._refuse_impossible_object()
         if self.elasticity_sign not in (1, -1):
             raise InputError(f"elasticity_sign is {self.elasticity_sign}; choose 1 (physical) or -1 (as printed)")
-        for field in fields(self):
-            if field.name not in self._ANY_SIGN:
-                _refuse_below_zero(field.name, getattr(self, field.name), field.name in self._POSITIVE)
+        for name in [field.name for field in fields(self) if field.name not in _ANY_SIGN]:
+            numbers = np.asarray(getattr(self, name), dtype=np.float64)
+            if not np.all(numbers > 0.0 if name in _POSITIVE else numbers >= 0.0):
+                wanted = "a value above 0" if name in _POSITIVE else "0 or more"
+                raise InputError(f"{name} is {numbers.tolist()}; choose {wanted}")
 
     def _refuse_impossible_object(self) -> None:
         if isinstance(self.object_shape, ObjectMesh):
@@ -192,23 +166,13 @@ class Start:
     cube_linear_velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
     cube_angular_velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
 
-    _LENGTHS: ClassVar[dict[str, int | str]] = {
-        "angles": _JOINTS,
-        "cube_position": 3,
-        "cube_quaternion": 4,
-        "velocities": _JOINTS,
-        "cube_linear_velocity": 3,
-        "cube_angular_velocity": 3,
-    }
-
     def __post_init__(self) -> None:
         """Give every vector its length; normalise the quaternion."""
-        joints = np.size(self.angles)
-        for name, length in self._LENGTHS.items():
-            count = joints if isinstance(length, str) else length
-            object.__setattr__(self, name, _vector(f"start.{name}", getattr(self, name), count))
-        if self.target is not None:
-            object.__setattr__(self, "target", _vector("start.target", self.target, joints))
+        lengths = dict.fromkeys(("angles", "velocities"), np.size(self.angles))
+        lengths |= dict.fromkeys(("cube_position", "cube_linear_velocity", "cube_angular_velocity"), 3)
+        lengths |= {"cube_quaternion": 4} | ({} if self.target is None else {"target": np.size(self.angles)})
+        for name, length in lengths.items():
+            object.__setattr__(self, name, _vector(f"start.{name}", getattr(self, name), length))
         norm = float(np.linalg.norm(self.cube_quaternion))
         if norm < 1e-9:
             raise InputError("start.cube_quaternion is zero; give a unit quaternion xyzw")
@@ -268,10 +232,3 @@ def _vector(name: str, value: object, length: int) -> Array:
     array = np.broadcast_to(array, (length,)).copy()
     array.flags.writeable = False
     return array
-
-
-def _refuse_below_zero(name: str, value: object, zero_too: bool) -> None:
-    """Raise for negative values, and for zero where it has no meaning."""
-    numbers = np.asarray(value, dtype=np.float64)
-    if np.any(np.isnan(numbers)) or np.any(numbers < 0.0) or (zero_too and np.any(numbers == 0.0)):
-        raise InputError(f"{name} is {numbers.tolist()}; choose {'a value above 0' if zero_too else '0 or more'}")

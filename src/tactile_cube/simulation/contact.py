@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,29 +37,9 @@ class Contact:
     friction: Array
 
 
-def read_contact(row: Sequence[Any], names: Mapping[int, str], links: Mapping[int, Sequence[str]]) -> Contact:
-    """A contact from one row of PyBullet's answer.
-
-    Args:
-        row: One row of `getContactPoints`.
-        names: Name of each body: of a finger, `cube` or `table`.
-        links: Names of the links of each finger.
-    """
-    friction_on_first = row[10] * np.array(row[11]) + row[12] * np.array(row[13])
-    return named_contact(
-        bodies=(names[row[1]], names[row[2]]),
-        links=(_link(row[3], links.get(row[1], ())), _link(row[4], links.get(row[2], ()))),
-        middle=0.5 * (np.array(row[5]) + np.array(row[6])),
-        normal=-np.array(row[7]),
-        distance=row[8],
-        force=row[9],
-        friction=-friction_on_first,
-    )
-
-
 def named_contact(
-    bodies: tuple[str, str],
-    links: tuple[str, str],
+    first: tuple[str, str],
+    second: tuple[str, str],
     middle: Array,
     normal: Array,
     distance: float,
@@ -71,23 +49,17 @@ def named_contact(
     """A contact told from the side of the finger; of the table where no finger takes part.
 
     Args:
-        bodies: Names of the first and the second body: of a finger, `cube` or `table`.
-        links: Names of their links, "" where there is none.
+        first: Name of the first body (of a finger, `cube` or `table`) and of its link, "" where there is none.
+        second: Likewise.
         middle: Point between the two surfaces, in the world (3,) [m].
         normal: Unit vector from the first into the second (3,).
         distance: Gap [m].
         force: Normal force [N].
         friction: Friction force on the second (3,) [N].
     """
-    (first, second), (link, other_link) = bodies, links
-    if first == "cube" or (first == "table" and second != "cube"):
-        first, second, link, normal, friction = second, first, other_link, -normal, -friction
-    link = "" if first == "table" else link
-    return Contact(first, link, second, middle + 0.5 * distance * normal, normal, distance, force, friction)
-
-
-def _link(index: int, names: Sequence[str]) -> str:
-    return names[index] if 0 <= index < len(names) else ""
+    if first[0] == "cube" or (first[0] == "table" and second[0] != "cube"):
+        first, second, normal, friction = second, first, -normal, -friction
+    return Contact(*first, second[0], middle + 0.5 * distance * normal, normal, distance, force, friction)
 
 
 SKIN_RELAXATION = 5e-3

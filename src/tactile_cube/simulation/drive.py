@@ -50,7 +50,7 @@ class HandDrive:
         texts = []
         for k, (text, tree) in enumerate(zip(self._urdfs, self._trees, strict=True)):
             same = np.array_equal(mass[k], tree.mass) and np.array_equal(com[k], tree.com)
-            changed = (self._hand.link_names(k), mass[k], com[k], inertia[k])
+            changed = (self._hand.fingers[k].links, mass[k], com[k], inertia[k])
             texts.append(text if same else with_inertias(text, *changed))
         return texts
 
@@ -75,20 +75,16 @@ class HandDrive:
         self.memory[:] = self.plant.memory(constants, gravity=gravity, effects=[*self._effects, *c.effects])
         self.view("friction_creep")[:] = c.friction_creep
         self.view("time_constant")[:] = c.filter_time
-        self._set_rotors(np.asarray(c.reflected_inertia))
+        if self._engine == "mujoco":  # its own rotors and tendons
+            rotors = self.view("reflected_inertia").reshape(-1, self._hand.joints_per_finger)
+            self.view("armature")[:, list(self.plant.topology.leader)] = rotors
+        else:  # numerical aids that the torques know of
+            self.view("spin_inertia")[:] = spin_inertia(self._hand, self._shares, np.asarray(c.reflected_inertia))
+            self.view("tendon_stiffness")[:] = TENDON_STIFFNESS
+            self.view("tendon_damping")[:] = TENDON_DAMPING
         self.plant.reset(self.memory, start.angles, v=start.velocities)
         for key in ("filtered", "limited", "goal"):
             self.view(key)[:] = start.angles if start.target is None else start.target - c.joint_offset
-
-    def _set_rotors(self, inertia: Array) -> None:
-        """Rotors and tendons as the engine has them: its own, or numerical aids that the torques know of."""
-        if self._engine == "mujoco":
-            rotors = self.view("reflected_inertia").reshape(-1, self._hand.joints_per_finger)
-            self.view("armature")[:, list(self.plant.topology.leader)] = rotors
-            return
-        self.view("spin_inertia")[:] = spin_inertia(self._hand, self._shares, inertia)
-        self.view("tendon_stiffness")[:] = TENDON_STIFFNESS
-        self.view("tendon_damping")[:] = TENDON_DAMPING
 
     def view(self, key: str) -> Array:
         """Writable numbers of the memory."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,22 +17,15 @@ OBJECT_STATE = 13
 
 
 class Engine(Protocol):
-    """One hand, one object and perhaps a table. Joint arrays are (fingers, links), from the palm to the tip."""
+    """One hand, one object and perhaps a table. Joint arrays are (fingers, links), from the palm to the tip.
 
-    @property
-    def loop(self) -> Literal["c", "python"]:
-        """Which loop runs the physics steps; both give the same bits."""
-        ...
+    Attributes:
+        q: Positions of all joints [rad].
+        v: Their velocities [rad/s].
+    """
 
-    @property
-    def q(self) -> Array:
-        """Positions of all joints (fingers, links) [rad]."""
-        ...
-
-    @property
-    def v(self) -> Array:
-        """Velocities of all joints (fingers, links) [rad/s]."""
-        ...
+    q: Array
+    v: Array
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
         """Puts everything at the start of an episode; nothing of the past remains, to the bit.

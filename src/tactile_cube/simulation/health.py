@@ -25,11 +25,7 @@ BOUNDS = (
 )
 
 
-TENDON = np.array([[3, 2]])
-"""The coupling of the DLR-Hand II: q4 follows q3."""
-
-
-def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float], coupled: NDArray[np.int64] = TENDON) -> str:
+def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float], coupled: NDArray[np.int64]) -> str:
     """What is wrong with a state, in a few words; "" if nothing.
 
     Args:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from itertools import combinations
-from types import ModuleType
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.hand.hand import CollisionShape
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import NamedShape, straight_half, unit_inertia
+from tactile_cube.hand.urdf import CollisionShape
 from tactile_cube.simulation.constants import EpisodeConstants
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Surface, surfaces
 from tactile_cube.simulation.drive import HandDrive
@@ -31,37 +30,36 @@ RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]
 """Impedance of tendons and joint stops, as hard as MuJoCo has it."""
 
 
-def load_mujoco() -> ModuleType:
-    """The package.
-
-    Raises:
-        InputError: it is not installed.
-    """
-    try:
-        import mujoco
-    except ImportError as error:
-        raise InputError("engine=mujoco needs the package mujoco: pip install mujoco") from error
-    module: ModuleType = mujoco
-    return module
-
-
 class HandSpec:
     """Description of one world, from which a model is compiled for each episode.
 
     The joints come first in the state, finger by finger, q1..q4 each; the cube's free joint is last.
     """
 
-    def __init__(self, mujoco: ModuleType, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
+    def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         """Describes the fingers; their masses are the drive's."""
-        self._mujoco, self._hand, self._drive = mujoco, hand, drive
+        self._hand, self._drive = hand, drive
         self.spec = mujoco.MjSpec()
         self.spec.compiler.degree = False
-        self._set_options(options)
+        option = self.spec.option
+        option.timestep = options.dt
+        option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
+        option.solver, option.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVER_TOLERANCE
+        option.iterations = options.solver_iterations
+        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self._shapes: dict[str, str] = {}
         self._links = [self._add_finger(k) for k in range(len(hand.fingers))]
-        self._cube = self._add_cube()
-        self._table = self._add_box("table", self.spec.worldbody, TABLE_HALF_SIZE)
-        self._pairs = self._add_pairs()
+        body = self.spec.worldbody.add_body(name="cube", explicitinertial=True)
+        body.add_freejoint()
+        box = {"type": mujoco.mjtGeom.mjGEOM_BOX, "contype": 0, "conaffinity": 0}
+        self._cube = body, body.add_geom(name="cube", size=(0.04, 0.04, 0.04), **box)
+        self._table = self.spec.worldbody.add_geom(name="table", size=TABLE_HALF_SIZE, **box)
+        self._shapes |= {"cube": "cube", "table": "table"}
+        # everything meets everything but its own finger; the order is fixed
+        self._pairs = [(a, b) for a, b in combinations(self._shapes, 2) if a.split()[0] != b.split()[0]]
+        for a, b in self._pairs:
+            self.spec.add_pair(name=f"{a} {b}", geomname1=a, geomname2=b, condim=CONDIM)
         self._mesh: Any = None
 
     def compile(self, constants: EpisodeConstants) -> Any:
@@ -71,20 +69,11 @@ class HandSpec:
         known = surfaces(constants)
         touching = [known[self._shapes[a]].on(known[self._shapes[b]]) for a, b in self._pairs]
         for pair, surface in zip(self.spec.pairs, touching, strict=True):
-            pair.friction = friction(surface)
+            pair.friction = [surface.lateral, surface.lateral, surface.spinning, 0.0, 0.0]  # the last two: rolling
         model = self.spec.compile()
         for (a, b), surface in zip(self._pairs, touching, strict=True):
             set_contact(model, model.pair(f"{a} {b}").id, surface)
         return model
-
-    def _set_options(self, options: SimulationOptions) -> None:
-        mujoco, option = self._mujoco, self.spec.option
-        option.timestep = options.dt
-        option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
-        option.solver, option.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVER_TOLERANCE
-        option.iterations = options.solver_iterations
-        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
     def _add_finger(self, k: int) -> list[tuple[Any, Any]]:
         """Links and joints of a finger, as bodies below its base."""
@@ -93,8 +82,7 @@ class HandSpec:
         parent = self.spec.worldbody.add_body(name=f"{finger.name} base", pos=position, quat=_wxyz(rotation))
         rigid = [2.0 * self.spec.option.timestep, 1.0]
         parts = []
-        names, shapes, limits = self._hand.link_names(k), self._hand.shapes(k), self._hand.link_limits(k)
-        for i, link in enumerate(names):
+        for i, link in enumerate(finger.links):
             place = {
                 "pos": view("placement_translation")[k, i],
                 "quat": _wxyz(view("placement_rotation")[k, i]),
@@ -102,26 +90,34 @@ class HandSpec:
             body = parent.add_body(name=f"{finger.name} {link}", explicitinertial=True, **place)
             joint = body.add_joint(
                 name=f"{finger.name}_q{i + 1}",
-                type=self._mujoco.mjtJoint.mjJNT_HINGE,
+                type=mujoco.mjtJoint.mjJNT_HINGE,
                 axis=view("axis")[k, i],
-                limited=self._mujoco.mjtLimited.mjLIMITED_TRUE,
-                range=limits[i].tolist(),
+                limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                range=finger.limits[i].tolist(),
                 solref_limit=rigid,
                 solimp_limit=RIGID,
             )
-            for number, shape in enumerate(shapes[i]):
+            for number, shape in enumerate(finger.shapes[i]):
                 name = f"{finger.name} {link}" + (f"#{number}" if number else "")
                 self._add_shape(body, name, shape)
-                self._shapes[name] = "tip" if link == names[-1] else "link"
+                self._shapes[name] = "tip" if link == finger.links[-1] else "link"
             parts.append((body, joint))
             parent = body
         for follower, leader in self._hand.coupled():
-            self._add_tendon(finger.name, follower, leader, rigid)
+            tendon = self.spec.add_equality(
+                type=mujoco.mjtEq.mjEQ_JOINT,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                name1=f"{finger.name}_q{follower + 1}",
+                name2=f"{finger.name}_q{leader + 1}",
+                solref=rigid,
+                solimp=RIGID,
+            )
+            tendon.data[:5] = [0.0, 1.0, 0.0, 0.0, 0.0]
         return parts
 
     def _add_shape(self, body: Any, name: str, shape: CollisionShape) -> None:
         """A link's collision shape; capsules and cylinders have half their length in MuJoCo."""
-        kinds, size = self._mujoco.mjtGeom, shape.size
+        kinds, size = mujoco.mjtGeom, shape.size
         kind, numbers = {
             "capsule": (kinds.mjGEOM_CAPSULE, [size[0], 0.5 * size[-1], 0.0]),
             "cylinder": (kinds.mjGEOM_CYLINDER, [size[0], 0.5 * size[-1], 0.0]),
@@ -134,35 +130,6 @@ class HandSpec:
             self.spec.add_mesh(name=name, file=shape.file, scale=list(size))
             more["meshname"] = name
         body.add_geom(name=name, type=kind, size=numbers, pos=shape.position, contype=0, conaffinity=0, **more)
-
-    def _add_tendon(self, finger: str, follower: int, leader: int, rigid: list[float]) -> None:
-        """Holds a coupled joint at the one it follows."""
-        tendon = self.spec.add_equality(
-            type=self._mujoco.mjtEq.mjEQ_JOINT,
-            objtype=self._mujoco.mjtObj.mjOBJ_JOINT,
-            name1=f"{finger}_q{follower + 1}",
-            name2=f"{finger}_q{leader + 1}",
-            solref=rigid,
-            solimp=RIGID,
-        )
-        tendon.data[:5] = [0.0, 1.0, 0.0, 0.0, 0.0]
-
-    def _add_cube(self) -> tuple[Any, Any]:
-        body = self.spec.worldbody.add_body(name="cube", explicitinertial=True)
-        body.add_freejoint()
-        return body, self._add_box("cube", body, (0.04, 0.04, 0.04))
-
-    def _add_box(self, name: str, body: Any, half: tuple[float, ...]) -> Any:
-        self._shapes[name] = name
-        box = self._mujoco.mjtGeom.mjGEOM_BOX
-        return body.add_geom(name=name, type=box, size=half, contype=0, conaffinity=0)
-
-    def _add_pairs(self) -> list[tuple[str, str]]:
-        """Everything meets everything but its own finger; the order is fixed."""
-        pairs = [(a, b) for a, b in combinations(self._shapes, 2) if a.split()[0] != b.split()[0]]
-        for a, b in pairs:
-            self.spec.add_pair(name=f"{a} {b}", geomname1=a, geomname2=b, condim=CONDIM)
-        return pairs
 
     def _set_links(self) -> None:
         """Masses and rotors of the links; effects may have changed them for this episode."""
@@ -182,7 +149,7 @@ class HandSpec:
             self._set_mesh(kind, size)
         else:
             shape.meshname, body.fullinertia = "", UNSAID  # of a mesh before
-            shape.type, shape.size = self._object_geometry(kind, 0.5 * size)
+            shape.type, shape.size = _geometry(kind, 0.5 * size)
         body.mass, body.ipos = mass, np.asarray(constants.cube_com)
         if kind == "box":
             body.inertia = mass / 12.0 * (np.sum(size**2) - size**2)
@@ -200,18 +167,19 @@ class HandSpec:
         self._mesh.uservert = (mesh.vertices * size).ravel().tolist()
         self._mesh.userface = mesh.faces.ravel().tolist()
         _, shape = self._cube
-        shape.type, shape.meshname = self._mujoco.mjtGeom.mjGEOM_MESH, "object"
+        shape.type, shape.meshname = mujoco.mjtGeom.mjGEOM_MESH, "object"
 
-    def _object_geometry(self, kind: NamedShape, half: Array) -> tuple[Any, Array]:
-        """MuJoCo's type and size of an object with half edges (3,) [m]."""
-        kinds = self._mujoco.mjtGeom
-        if kind == "box":
-            return kinds.mjGEOM_BOX, half
-        if kind == "cylinder":
-            return kinds.mjGEOM_CYLINDER, np.array([half[0], half[2], 0.0])
-        straight = straight_half(half)
-        known = kinds.mjGEOM_CAPSULE if straight > 0.0 else kinds.mjGEOM_SPHERE
-        return known, np.array([half[0], straight, 0.0])
+
+def _geometry(kind: NamedShape, half: Array) -> tuple[Any, Array]:
+    """MuJoCo's type and size of an object with half edges (3,) [m]."""
+    kinds = mujoco.mjtGeom
+    if kind == "box":
+        return kinds.mjGEOM_BOX, half
+    if kind == "cylinder":
+        return kinds.mjGEOM_CYLINDER, np.array([half[0], half[2], 0.0])
+    straight = straight_half(half)
+    known = kinds.mjGEOM_CAPSULE if straight > 0.0 else kinds.mjGEOM_SPHERE
+    return known, np.array([half[0], straight, 0.0])
 
 
 def _wxyz(rotation: Array) -> Array:
@@ -236,24 +204,14 @@ CONDIM = 4
 LEAST_IMPEDANCE, MOST_IMPEDANCE = 1e-4, 0.9999
 
 
-def friction(pair: Surface) -> list[float]:
-    """MuJoCo's five numbers of a pair: lateral twice, spinning [m], rolling twice (not used)."""
-    return [pair.lateral, pair.lateral, pair.spinning, 0.0, 0.0]
-
-
-def spring_and_damper(compliance: float, dt: float) -> tuple[float, float, float]:
-    """R [1/kg], k [1/s^2] and b [1/s] of a contact with this compliance [m/N]."""
-    stiffness = 1.0 / max(compliance, HARD)
-    damping = stiffness * (SKIN_RELAXATION if compliance > HARD else HARD_RELAXATION)
-    regularisation = 1.0 / (stiffness * dt**2 + damping * dt)
-    return regularisation, stiffness * regularisation, (damping + stiffness * dt) * regularisation
-
-
 def set_contact(model: Any, pair: int, surface: Surface) -> None:
     """Writes spring and damper of a pair into a compiled model."""
     bodies = model.geom_bodyid[[model.pair_geom1[pair], model.pair_geom2[pair]]]
     weight = float(model.body_invweight0[bodies, 0].sum())
-    regularisation, k, b = spring_and_damper(surface.compliance, float(model.opt.timestep))
+    dt, stiffness = float(model.opt.timestep), 1.0 / max(surface.compliance, HARD)
+    damping = stiffness * (SKIN_RELAXATION if surface.compliance > HARD else HARD_RELAXATION)
+    regularisation = 1.0 / (stiffness * dt**2 + damping * dt)  # R [1/kg]
+    k, b = stiffness * regularisation, (damping + stiffness * dt) * regularisation  # [1/s^2], [1/s]
     impedance = float(np.clip(weight / (weight + regularisation), LEAST_IMPEDANCE, MOST_IMPEDANCE))
     model.pair_solimp[pair] = [impedance, impedance, 1e-3, 0.5, 2.0]
     # MuJoCo divides the one by d^2 and takes d times the gap; it divides the other by d

@@ -1,4 +1,4 @@
-"""How the world is computed: time step, solver accuracy, loop. Nothing here is a property of the hand or the cube."""
+"""How the world is computed: time step, solver accuracy. Nothing here is a property of the hand or the cube."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import Literal
 
 from tactile_cube.errors import InputError
 
-Loop = Literal["auto", "c", "python"]
-LOOPS = ("auto", "c", "python")
 EngineName = Literal["bullet", "mujoco", "mixed"]
 MOST = 100_000
 """Physics steps of a policy step, and iterations of a physics step."""
@@ -27,8 +25,6 @@ class SimulationOptions:
         substeps: Physics steps per policy step; 50 x 2 ms = the paper's 10 Hz.
         solver_iterations: Iterations of the contact solver per physics step: of PyBullet always so many, of MuJoCo at
             most (its Newton solver ends after two to five).
-        loop: Who runs the physics steps of a policy step: `c` (one compiled loop), `python` (the same steps from
-            Python, bit for bit), or `auto`: `c` where a C compiler is found.
         trace: Keep the signals of every physics step of the last policy step (`World.trace`).
     """
 
@@ -36,7 +32,6 @@ class SimulationOptions:
     dt: float = 2e-3
     substeps: int = 50
     solver_iterations: int = 30
-    loop: Loop = "auto"
     trace: bool = False
 
     def __post_init__(self) -> None:
@@ -48,8 +43,6 @@ class SimulationOptions:
         for name in ("substeps", "solver_iterations"):
             if not 1 <= getattr(self, name) <= MOST:
                 raise InputError(f"simulation.{name} is {getattr(self, name)}; choose 1 to {MOST}")
-        if self.loop not in LOOPS:
-            raise InputError(f"simulation.loop is {self.loop!r}; choose one of {', '.join(LOOPS)}")
 
     @property
     def single_engine(self) -> Literal["bullet", "mujoco"]:
@@ -72,11 +65,6 @@ class SimulationOptions:
     def policy_dt(self) -> float:
         """Duration of a policy step [s]."""
         return self.dt * self.substeps
-
-    @classmethod
-    def fast(cls, engine: EngineName = "bullet") -> SimulationOptions:
-        """For training: 2 ms, 30 iterations."""
-        return cls(engine)
 
     @classmethod
     def faithful(cls, engine: EngineName = "bullet") -> SimulationOptions:

@@ -13,13 +13,11 @@ import pybullet
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import MOTOR_POSITION, TORQUE, Effect
+from tactile_cube.drivetrain import Plant
 from tactile_cube.errors import InputError
-from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import roll_pitch_yaw
-from tactile_cube.simulation.bullet_bodies import connect, load_chain
-from tactile_cube.simulation.bullet_engine import make_loop
+from tactile_cube.simulation.bullet_engine import connect, load_chain
+from tactile_cube.simulation.bullet_loop import make_loop
 from tactile_cube.simulation.drive import LEAST_INERTIA, TENDON_DAMPING, TENDON_STIFFNESS
 from tactile_cube.simulation.options import SimulationOptions
 
@@ -31,14 +29,13 @@ _OFF = np.inf
 
 
 class RigWorld:
-    """A plant of one chain, moved by PyBullet; its rollouts take and give what those of `plant.kernel` do."""
+    """A plant of one chain, moved by PyBullet."""
 
-    def __init__(self, plant: Plant, options: SimulationOptions | None = None) -> None:
+    def __init__(self, plant: Plant) -> None:
         """Prepares an empty world.
 
         Args:
             plant: One chain; its step is the physics step.
-            options: Loop to use; the rest is the plant's.
 
         Raises:
             InputError: The plant has several chains.
@@ -47,90 +44,28 @@ class RigWorld:
             raise InputError(f"a rig world moves one chain, this plant has {plant.topology.chains}; give each its own")
         self.plant = plant
         self._client = connect(SimulationOptions(dt=plant.dt))
-        self._loop = make_loop((options or SimulationOptions()).loop, self._client, plant)
+        self._loop = make_loop(self._client, plant)
         self._body = -1
         self._loaded = b""
 
-    @classmethod
-    def from_urdf(
-        cls,
-        urdf: str,
-        dt: float,
-        effects: tuple[type[Effect], ...] = (),
-        joints: tuple[str, ...] | None = None,
-    ) -> RigWorld:
-        """A world for a URDF's text; `joints` names the actuated ones, by default all that mimic no other."""
-        return cls(Plant([RigidBodyTree.from_urdf(urdf, joints)], dt, effects))
-
-    def replay(
-        self,
-        commands: Array,
-        angles: Array,
-        constants: DrivetrainConstants,
-        gravity: Array,
-        effects: tuple[Effect, ...] = (),
-        substeps: int = 1,
-    ) -> tuple[Array, Array]:
-        """Plays commands from rest.
+    def rollout(self, commands: Array, memory: Array, rows: Integers, out: Array) -> None:
+        """Plays commands from the state in memory, which stays as it is.
 
         Args:
-            commands: Desired positions (n, joints) [rad].
-            angles: Joint angles at the start (joints,) [rad].
-            constants: Of the drivetrain.
-            gravity: In the base frame (3,) [m/s^2].
-            effects: Effects that act; their classes must be the plant's.
-            substeps: Physics steps per row of commands.
-
-        Returns:
-            Positions q_m [rad] and torques [N m], (n, joints) each, at the end of each row.
-        """
-        memory = self.plant.memory(constants, gravity=gravity, effects=effects)
-        self.plant.reset(memory, angles)
-        out = np.empty((len(commands), 2, self.plant.topology.joints))
-        self.rollout(commands, 0, substeps, memory, np.array([MOTOR_POSITION, TORQUE]), out)
-        return out[:, 0], out[:, 1]
-
-    def rollout(self, commands: Array, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
-        """As `plant.kernel.rollout`, from the state in memory, which stays as it is.
-
-        Args:
-            commands: Desired positions (history + T, joints) [rad].
-            history: Rows that only effects on the command remember.
-            substeps: Physics steps per row.
+            commands: Desired positions (T, joints) [rad], one a physics step.
             memory: Constants, effects and state (size,).
             rows: Signals to keep (R,).
             out: Filled with them (T, R, joints).
         """
         memory = self._prepared(memory)
-        if history:
-            self.plant.kernel.rollout(commands[:history], history, substeps, memory, rows, out[:0])
         q, v = self._place(memory)
         self._loop.bind([self._body], q, v, memory)
-        reading = min(int(self.plant.view(memory, "reading")[0]), substeps - 1) + 1
         goal, signals = self.plant.view(memory, "goal"), [self.plant.signal(memory, int(row)) for row in rows]
-        for k, command in enumerate(commands[history : history + len(out)]):
+        for k, command in enumerate(commands):
             goal[:] = command
-            self._loop.run(reading, -1, None, None)
+            self._loop.run(1)
             for r, signal in enumerate(signals):
                 out[k, r] = signal
-            if substeps > reading:
-                self._loop.run(substeps - reading, -1, None, None)
-
-    def rollout_batch(
-        self,
-        commands: Array,
-        which: Integers,
-        lengths: Integers,
-        history: int,
-        substeps: int,
-        memory: Array,
-        rows: Integers,
-        out: Array,
-    ) -> None:
-        """As `plant.kernel.rollout_batch`: block b plays segment `which[b]` with memory[b] into out[b]."""
-        for b, segment in enumerate(which):
-            length = int(lengths[segment])
-            self.rollout(commands[segment], history, substeps, memory[b], rows, out[b, :length])
 
     def close(self) -> None:
         """Ends the physics server."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain import Plant
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, POSITION, TORQUE, VELOCITY
 from tactile_cube.errors import InputError
@@ -21,6 +19,7 @@ from tactile_cube.simulation.health import find_fault
 from tactile_cube.simulation.options import SimulationOptions
 
 Array = NDArray[np.float64]
+_JOINT_SIGNALS = {"q": POSITION, "dq": VELOCITY, "q_m": MOTOR_POSITION, "q_d": COMMAND, "torque": TORQUE}
 
 
 class World:
@@ -34,7 +33,9 @@ class World:
         constants: Constants of the running episode.
         steps: Policy steps since the reset.
         fault: What made the physics unusable, "" while all is well.
-        trace: Signals of every physics step of the last policy step, see `read_trace`; empty unless `options.trace`.
+        trace: Signals of every physics step of the last policy step, empty unless `options.trace`: `time` [s];
+            `q`, `q_m`, `q_f`, `q_d` [rad], `dq` [rad/s] and `torque` [N m], each (substeps, joints); `cube_position`
+            (substeps, 3) [m] and `cube_quaternion` (substeps, 4).
     """
 
     constants: EpisodeConstants
@@ -53,7 +54,7 @@ class World:
             effects: Further physical effects of the drivetrain, each at a joint.
 
         Raises:
-            InputError: The engine is not installed, or the options name no single one.
+            InputError: The options name no single engine.
         """
         self.hand = hand
         self.options = options or SimulationOptions()
@@ -61,7 +62,7 @@ class World:
         self.fault = ""
         self.trace: dict[str, Array] = {}
         self._drive = HandDrive(hand, self.options, effects)
-        self._engine = make_engine(hand, self.options, self._drive)
+        self._engine = _make_engine(hand, self.options, self._drive)
         self._cube = np.zeros(OBJECT_STATE)
         self._push = np.zeros(6)
         self._coupled = np.array(hand.coupled(), dtype=np.int64).reshape(-1, 2)
@@ -78,7 +79,11 @@ class World:
         Raises:
             InputError: The torque loop would be unstable with these constants and this time step.
         """
-        self._require_its_joints(constants, start)
+        if not constants.joints == start.angles.size == self.hand.joints:
+            raise InputError(
+                f"hand '{self.hand.name}' has {self.hand.joints} joints; the constants are of {constants.joints} and "
+                f"the start of {start.angles.size}: take them from `constants_of(hand)` and the hand's start poses"
+            )
         self.constants = constants
         self.steps, self.fault, self.trace = 0, "", {}
         self._push[:] = 0.0
@@ -193,21 +198,9 @@ class World:
         """Time since the reset [s]."""
         return self.steps * self.options.policy_dt
 
-    @property
-    def loop(self) -> Literal["c", "python"]:
-        """Which loop runs the physics steps."""
-        return self._engine.loop
-
     def contacts(self) -> list[Contact]:
         """Contacts of the last physics step."""
         return self._engine.contacts()
-
-    def _require_its_joints(self, constants: EpisodeConstants, start: Start) -> None:
-        if not constants.joints == start.angles.size == self.hand.joints:
-            raise InputError(
-                f"hand '{self.hand.name}' has {self.hand.joints} joints; the constants are of {constants.joints} and "
-                f"the start of {start.angles.size}: take them from `constants_of(hand)` and the hand's start poses"
-            )
 
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
@@ -216,8 +209,28 @@ class World:
         filtered = self._drive.view("filtered").copy()
         states = self._engine.run(self.options.substeps, self._wrench(), self.options.trace)
         if states is not None:
-            offset = np.asarray(self.constants.joint_offset)
-            self.trace = read_trace(self._drive.plant, self._drive.memory, filtered, offset, states, self.time)
+            self.trace = self._read_trace(filtered, states)
+
+    def _read_trace(self, filtered: Array, states: Array) -> dict[str, Array]:
+        """The trace of the policy step that has just been run.
+
+        Args:
+            filtered: q_f before the step (joints,) [rad].
+            states: State of the cube before each physics step, and after the last (substeps + 1, 13).
+        """
+        rows, dt, offset = self._drive.view("trace"), self.options.dt, np.asarray(self.constants.joint_offset)
+        trace: dict[str, Array] = {
+            name: rows[:, :, row, :].reshape(len(rows), -1).copy() for name, row in _JOINT_SIGNALS.items()
+        }
+        # the low-pass in closed form: its goal is constant in a policy step
+        left = np.exp(-np.arange(1, len(rows) + 1)[:, None] * dt / float(self._drive.view("time_constant")[0]))
+        goal = self._drive.view("goal")
+        trace["q_f"] = goal + left * (filtered - goal)
+        for name in ("q_m", "q_d", "q_f"):  # in what the sensors read
+            trace[name] = trace[name] + offset
+        trace["time"] = np.asarray(self.time + dt * np.arange(len(rows), dtype=np.float64))
+        trace["cube_position"], trace["cube_quaternion"] = states[:-1, :3], states[:-1, 3:7]
+        return trace
 
     def _wrench(self) -> Array | None:
         """Everything that pushes the cube in this policy step, or None."""
@@ -236,12 +249,7 @@ class World:
         return np.stack(columns, axis=1)
 
 
-def make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
-    """The engine that the options name.
-
-    Raises:
-        InputError: it is not installed.
-    """
+def _make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
     if options.single_engine == "mujoco":
         from tactile_cube.simulation.mujoco_engine import MujocoEngine
 
@@ -269,44 +277,3 @@ def _direction(rng: np.random.Generator) -> Array:
     """A unit vector, uniform on the sphere (3,)."""
     vector = rng.normal(size=3)
     return np.asarray(vector / np.linalg.norm(vector))
-
-
-_JOINT_SIGNALS = {"q": POSITION, "dq": VELOCITY, "q_m": MOTOR_POSITION, "q_d": COMMAND, "torque": TORQUE}
-_IN_SENSOR_TERMS = ("q_m", "q_d", "q_f")
-
-
-def read_trace(
-    plant: Plant, memory: Array, filtered: Array, offset: Array, states: Array, start: float
-) -> dict[str, Array]:
-    """Signals (substeps, ...) of the policy step that has just been run.
-
-    Args:
-        plant: The drivetrain.
-        memory: Its memory after the step.
-        filtered: q_f before the step (12,) [rad].
-        offset: Joint offset (12,) [rad].
-        states: State of the cube before each physics step, and after the last (substeps + 1, 13).
-        start: Time of the first physics step [s].
-
-    Returns:
-        `time` [s]; `q`, `q_m`, `q_f`, `q_d` [rad], `dq` [rad/s] and `torque` [N m], each (substeps, 12);
-        `cube_position` (substeps, 3) [m] and `cube_quaternion` (substeps, 4).
-    """
-    rows = plant.view(memory, "trace")
-    trace: dict[str, Array] = {
-        name: rows[:, :, row, :].reshape(len(rows), -1).copy() for name, row in _JOINT_SIGNALS.items()
-    }
-    trace["q_f"] = _filtered_targets(plant, memory, filtered, len(rows))
-    for name in _IN_SENSOR_TERMS:
-        trace[name] = trace[name] + offset
-    trace["time"] = np.asarray(start + plant.dt * np.arange(len(rows), dtype=np.float64))
-    trace["cube_position"], trace["cube_quaternion"] = states[:-1, :3], states[:-1, 3:7]
-    return trace
-
-
-def _filtered_targets(plant: Plant, memory: Array, filtered: Array, rows: int) -> Array:
-    """q_f at each physics step (rows, 12): the low-pass in closed form, as its goal is constant in a policy step."""
-    goal, time_constant = plant.view(memory, "goal"), float(plant.view(memory, "time_constant")[0])
-    steps = np.arange(1, rows + 1)[:, None]
-    remaining = np.exp(-steps * plant.dt / time_constant) if time_constant > 0.0 else np.zeros((rows, 1))
-    return np.asarray(goal + remaining * (filtered - goal))

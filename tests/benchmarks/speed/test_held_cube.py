@@ -20,7 +20,7 @@ def in_mujoco() -> Holding:
 
 
 def ours() -> Holding:
-    return our_world(SimulationOptions.fast())
+    return our_world(SimulationOptions())
 
 
 @pytest.mark.parametrize("make", [ours, naive, in_mujoco])

@@ -18,7 +18,7 @@ from tactile_cube.simulation import SimulationOptions
 
 SMALL = {
     "environment": partial(environment, 1, peers=False, calls=1),
-    "accuracy": partial(accuracy, {"fast": SimulationOptions.fast()}, SimulationOptions(solver_iterations=60)),
+    "accuracy": partial(accuracy, {"fast": SimulationOptions()}, SimulationOptions(solver_iterations=60)),
     "update": partial(update, 1, peers=False, calls=1, hidden=16),
     "collector": partial(collector, 1, worlds=(1, 2), processes=(1,), steps=2),
     "end_to_end": partial(end_to_end, 1, peers=False, worlds=2, steps=3, updates=1, hidden=16),

@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from tactile_cube.hand import DLR_HAND2, finger_urdf
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
 from tactile_cube.measurement.sources.source import described
@@ -26,7 +26,7 @@ CENTRE, REACH = np.array([0.0, 0.5, 0.6]), np.array([0.25, 0.4, 0.5])  # [rad]
 def finger() -> mujoco.MjModel:
     """The links of the URDF; q4 follows q3, rotors are armatures, dry friction is as stiff as the step allows."""
     header = '<mujoco><compiler fusestatic="false" balanceinertia="false"/></mujoco>'
-    urdf = finger_urdf(DLR_HAND2)
+    urdf = DLR_HAND2.finger_urdf(0)
     end = urdf.index(">", urdf.index("<robot")) + 1
     spec = mujoco.MjSpec.from_string(urdf[:end] + header + urdf[end:])
     coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT)
@@ -93,7 +93,7 @@ def main() -> None:
         nominal={"stiffness": STIFFNESS, "static_friction": FRICTION, "reflected_inertia": INERTIA},
         sensors={"position_resolution": 1e-6},
     )  # fmt: skip
-    write_recording(FOLDER, RecordingTables(description, finger_urdf(DLR_HAND2), tables))
+    write_recording(FOLDER, RecordingTables(description, DLR_HAND2.finger_urdf(0), tables))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""What a plant's kernel can be asked for, see `drivetrain.kernel.Kernel`.
+"""The compiled steps of a plant of C chains with N dofs and n joints each, D = C N.
 
 Numba keeps machine code beside the file that a function stands in, and plants differ in their code: this file is copied
 into each kernel's folder, the other steps are loaded from where they are.
 """
 
+import functools
 from ctypes import CFUNCTYPE, POINTER, c_double, c_int64, c_void_p, cast
 from typing import Any
 
@@ -25,36 +26,20 @@ Pointer = Any  # to float64
 
 @compiled_once
 def control_step(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
-    """Torques for an engine's joints."""
+    """Torques (D,) for an engine's joints at q, v (D,); row i of the trace."""
     control(i, borrowed(q), borrowed(v), borrowed(torque), borrowed(memory))
 
 
 @compiled_once
 def step(command: Array, memory: Array) -> None:
-    """One step without contacts."""
+    """One step of the mechanism without contacts, for a command (C n,)."""
     free_step(command, borrowed(memory))
 
 
 @compiled_once
 def rollout(commands: Array, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
-    """Signals of each command row after the history."""
+    """Signals `rows` (R,) of each row of commands (H + T, C n) after the history into `out` (T, R, C n)."""
     roll(commands, len(out), history, substeps, borrowed(memory), rows, out)
-
-
-@compiled_once
-def rollout_batch(
-    commands: Array,
-    which: Integers,
-    lengths: Integers,
-    history: int,
-    substeps: int,
-    memory: Array,
-    rows: Integers,
-    out: Array,
-) -> None:
-    """`rollout` of commands[which[b]] with memory[b]."""
-    for b in range(len(memory)):
-        roll(commands[which[b]], lengths[which[b]], history, substeps, borrowed(memory[b]), rows, out[b])
 
 
 @compiled_once
@@ -75,7 +60,11 @@ def segments_batch(
     last: int,
     out: Array,
 ) -> None:
-    """Blocks first..last of a batch, started anew from `position`, `speed` (S, K, C n) every `segment` rows."""
+    """Multiple shooting: blocks first..last of memory (B, size) into `out` (B, T, R, C n).
+
+    Block b plays commands[which[b]], (H + T, C n) each, and starts anew every `segment` rows from the measured
+    `position` and `speed` (S, K, C n).
+    """
     for b in range(first, last):
         s = which[b]
         roll_segments(
@@ -115,8 +104,9 @@ def callback(i: int, q: Pointer, v: Pointer, torque: Pointer, memory: Pointer) -
     control(i, from_c(q, C * N), from_c(v, C * N), from_c(torque, C * N), from_c(memory, size))
 
 
+@functools.cache
 def control_callback() -> tuple[object, int]:
-    """A C function void(int64 i, double *q, double *v, double *torque, double *memory), to be kept; its address."""
+    """A C function void(int64 i, double *q, double *v, double *torque, double *memory), kept alive; its address."""
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         interpreted = CFUNCTYPE(None, c_int64, *[POINTER(c_double)] * 4)(callback)
         return interpreted, cast(interpreted, c_void_p).value or 0

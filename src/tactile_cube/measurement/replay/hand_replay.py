@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, HandModel
-from tactile_cube.hand.model import JOINTS_PER_FINGER
+from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Load, Trial
@@ -71,7 +70,7 @@ class HandReplay:
         model: Model,
         step: float = 0.002,
         iterations: int = 30,
-        hand: HandModel = DLR_HAND2,
+        hand: Hand = DLR_HAND2,
         engine: EngineName = "bullet",
     ) -> None:
         """Builds the world.
@@ -91,7 +90,7 @@ class HandReplay:
         self.recording, self.hand = recording, hand
         self._order = [recording.joints.index(name) for name in hand.joint_names]
         self._back = np.argsort(self._order)
-        self.finger_of = self._back // JOINTS_PER_FINGER
+        self.finger_of = self._back // hand.joints_per_finger
         self._model = model
         substeps = max(1, int(np.ceil(recording.step / step - 1e-6)))
         options = SimulationOptions(engine, recording.step / substeps, substeps, iterations)
@@ -156,7 +155,7 @@ class HandReplay:
         return Start(angles, place, quaternion, target=trial.command[0, self._order])
 
 
-def _require_hand(recording: Recording, hand: HandModel) -> None:
+def _require_hand(recording: Recording, hand: Hand) -> None:
     file = recording.folder / DESCRIPTION
     if sorted(recording.joints) != sorted(hand.joint_names):
         raise InputError(
@@ -168,13 +167,13 @@ def _require_hand(recording: Recording, hand: HandModel) -> None:
         raise InputError(f"{file}: key 'controller.mode': received torque; trials with an object need mode position")
 
 
-def to_world(hand: HandModel, position: Array, quaternion: Array) -> tuple[Array, Array]:
+def to_world(hand: Hand, position: Array, quaternion: Array) -> tuple[Array, Array]:
     """Position (3,) [m] and quaternion xyzw (4,) in the world of a pose given in the hand's frame."""
     turned = Rotation.from_matrix(hand.rotation) * Rotation.from_quat(np.array(quaternion))
     return hand.position + hand.rotation @ position, np.asarray(turned.as_quat())
 
 
-def to_hand(hand: HandModel, position: Array, quaternion: Array) -> tuple[Array, Array]:
+def to_hand(hand: Hand, position: Array, quaternion: Array) -> tuple[Array, Array]:
     """Position (3,) [m] and quaternion xyzw (4,) in the hand's frame of a pose given in the world."""
     turned = Rotation.from_matrix(hand.rotation.T) * Rotation.from_quat(np.array(quaternion))
     return hand.rotation.T @ (position - hand.position), np.asarray(turned.as_quat())

@@ -247,11 +247,11 @@ class Simulator:
         self, world: RigWorld, windows: Windows, memory: Array, rows: NDArray[np.int64], signals: Array
     ) -> None:
         """Windows of one segment, which an engine cannot start anew, from the start that the closed form finds."""
-        count, history = len(windows), windows.history * windows.substeps
+        history = windows.history * windows.substeps
         starts = windows.position[:, 0], windows.speed[:, 0], windows.initial_state
         self.plant.kernel.starts_batch(windows.commands, history, *starts, memory)
-        lengths = np.full(count, signals.shape[1])
-        world.rollout_batch(windows.commands[:, history:], np.arange(count), lengths, 0, 1, memory, rows, signals)
+        for commands, block, out in zip(windows.commands[:, history:], memory, signals, strict=True):
+            world.rollout(commands[: len(out)], block, rows, out)
 
     def _memories(self, model: Model, windows: Windows) -> Array:
         """One block (S, size) for each window, at rest at its start."""

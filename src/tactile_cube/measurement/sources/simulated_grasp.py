@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, grasp_angles, hand_urdf
+from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.measurement.excitation import KINDS as EXCITATIONS
 from tactile_cube.measurement.recordings.description import Coupling, Description, Grasp, TrialEntry
 from tactile_cube.measurement.recordings.rig import parse_rig
@@ -64,7 +64,7 @@ class SimulatedGrasp(SimulatedSession):
             known = ", ".join([*HOLDING, *EXCITATIONS])
             raise InputError(f"source.kinds: unknown {sorted(unknown)}; choose from {known}")
         rng = np.random.default_rng(seed)
-        description, urdf = self._description(), hand_urdf(DLR_HAND2)
+        description, urdf = self._description(), DLR_HAND2.urdf()
         session = self._session(description, urdf, rng)
         rig, joints = session.free.recording.rig, DLR_HAND2.joint_names
         free = [kind for kind in self.kinds if kind in EXCITATIONS]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import parse_effect
-from tactile_cube.hand import DLR_HAND2, finger_urdf, hand_urdf
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
 from tactile_cube.measurement.bench import BENCH_KINDS, bench_trials
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry
@@ -19,7 +19,7 @@ from tactile_cube.measurement.replay.simulator import Engine, Simulator
 from tactile_cube.measurement.sources.session import SimulatedSession, unmeasured
 
 Array = NDArray[np.float64]
-BUILT_IN = {"finger": lambda: finger_urdf(DLR_HAND2), "hand": lambda: hand_urdf(DLR_HAND2)}
+BUILT_IN = {"finger": lambda: DLR_HAND2.finger_urdf(0), "hand": DLR_HAND2.urdf}
 
 
 @dataclass(frozen=True)
