@@ -4,10 +4,10 @@ import pytest
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
-from tactile_cube.cli import usage_error
 from tactile_cube.composition import composed, refuse_unknown_keys
 from tactile_cube.errors import InputError
 from tactile_cube.training.settings import TrainingSettings
+from tactile_cube.usage_error import usage_error
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,14 @@
 """What a command shows on the console, kept in its folder."""
 
 import contextlib
-import os
 import re
 import shlex
-import signal
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
-NOBODY_READS = 128 + signal.SIGPIPE
-"""Exit status of a program whose reader has left, as a shell gives it."""
 _ENDS = re.compile(r"[\r\n]+")
 _STYLE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
@@ -36,34 +32,18 @@ class KeptStream:
         """Show and keep."""
         *lines, self._begun = _ENDS.split(self._begun + text)
         self._keep(lines)
-        with _quiet_if_nobody_reads(self._stream):
-            return self._stream.write(text)
-
-    def flush(self) -> None:
-        """Show what waits."""
-        with _quiet_if_nobody_reads(self._stream):
-            self._stream.flush()
+        return self._stream.write(text)
 
     def end(self) -> None:
         """Keep a last line that did not end, and show what waits."""
         self._keep([self._begun])
-        self.flush()
+        self._stream.flush()
 
     def _keep(self, lines: list[str]) -> None:
         plain = [_STYLE.sub("", line).rstrip() for line in lines]
         with contextlib.suppress(OSError):  # a full disk stops what the command writes, not what it says
             self._file.writelines(f"{line}\n" for line in plain if line)
             self._file.flush()
-
-
-@contextlib.contextmanager
-def _quiet_if_nobody_reads(stream: TextIO) -> Iterator[None]:
-    """End as any program does whose reader has left, as `| head` does: at once and without a word."""
-    try:
-        yield
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # else the interpreter complains as it ends
-        sys.exit(NOBODY_READS)
 
 
 @contextlib.contextmanager

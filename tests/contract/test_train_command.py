@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.agent.policy_file import load_policy
-from tactile_cube.cli import with_recipe
+from tactile_cube.composition import with_recipe
 from tactile_cube.evaluation.policy_path import SHIPPED
 from tactile_cube.training.checkpoint import load_checkpoint
 
@@ -57,7 +57,6 @@ def test_cfg_job_shows_the_configuration_without_importing_torch(tmp_path: Path)
         (["--cfg", "job", "+task.x=1"], ["--cfg", "job", "+experiment=curriculum", "+task.x=1"]),
         (["-m", "+experiment=table1"], ["-m", "+experiment=table1"]),
         (["seed=1", "+experiment=paper"], ["seed=1", "+experiment=paper"]),
-        (["-sc", "query=bash"], ["-sc", "query=bash"]),
     ],
 )
 def test_train_takes_the_recipe_unless_an_experiment_is_named(words: list[str], taken: list[str]) -> None:

@@ -18,13 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ComparisonResult:
-    """How far a model and a measurement are apart, and where.
-
-    Attributes:
-        comparison: errors by joint, trial and regime [rad], noise floor, residuals, simulated signals.
-        job: the call.
-        seconds: how long it took [s].
-    """
+    """How far a model and a measurement are apart, and where; `comparison` has errors by joint, trial and regime."""
 
     comparison: Comparison
     job: Job
@@ -92,17 +86,20 @@ def compare(
         >>> result = tactile_cube.compare("my_recording", model="model.yaml")
         >>> print(f"{1e3 * result.error:.2f} mrad, noise floor {1e3 * result.noise_floor:.2f} mrad")
     """
-    job = called_job("compare", settings, recording=recording_name(recording), model=model_name(model))
-    return run_comparison(job, opened(recording), modelled(model), say or job.say)
+    job = called_job("compare", settings, recording=recording, model=model)
+    return run_comparison(job, recording, model, say)
 
 
-def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say: Say) -> ComparisonResult:
+def run_comparison(
+    job: Job, recording: Recording | PathLike, model: ModelFile | PathLike | None, say: Say | None = None
+) -> ComparisonResult:
     """Compare as a job says: free motion, or grasps where there is nothing else."""
     from tactile_cube.identification.contact.diagnosis import compare_contact
     from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
     from tactile_cube.measurement.comparing import comparison
 
-    config = job.config
+    config, say = job.config, say or job.say
+    model, recording = modelled(model), opened(recording)
     held = len(with_object(recording).trials)
     if held and not has_free_motion(recording):
         compared = compare_contact(recording, model, config.step or comparison.USUAL_STEP, say)
@@ -128,20 +125,8 @@ def opened(recording: Recording | PathLike) -> Recording:
     return read
 
 
-def recording_name(recording: Recording | PathLike) -> str:
-    """The folder of a recording."""
-    return str(recording if isinstance(recording, str | Path) else recording.folder)
-
-
 def modelled(model: ModelFile | PathLike | None) -> ModelFile | None:
     """The model, read if it is a file's name."""
     from tactile_cube.drivetrain.model_file import as_model
 
     return None if model is None else as_model(model)
-
-
-def model_name(model: ModelFile | PathLike | None) -> str | None:
-    """The file of a model; a model that is no file goes by its rig."""
-    if model is None or isinstance(model, str | Path):
-        return None if model is None else str(model)
-    return f"model of {model.rig}"

@@ -52,8 +52,7 @@ def export(policy: PathLike | None, output: PathLike, *settings: str) -> Path:
     Raises:
         InputError: unknown ending, or ONNX is not installed.
     """
-    named = {"policy": None if policy is None else str(policy), "output": str(output)}
-    return run_export(called_job("export", settings, **named))[1]
+    return run_export(called_job("export", settings, policy=policy, output=output))[1]
 
 
 def run_export(job: Job) -> tuple[Path, Path]:
@@ -152,7 +151,7 @@ def deploy(policy: PathLike | None = None, *settings: str, say: Say = print) -> 
     Raises:
         InputError: a policy without a filter time, a hand that is not there.
     """
-    return run_deployment(called_job("deploy", settings, policy=None if policy is None else str(policy)), say)
+    return run_deployment(called_job("deploy", settings, policy=policy), say)
 
 
 def run_deployment(job: Job, say: Say) -> DeploymentResult:

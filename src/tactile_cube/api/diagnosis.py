@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
+from tactile_cube.api.comparison import modelled, opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
@@ -126,21 +126,18 @@ def diagnose(
         >>> print(found.text, found.verdict, found.effects)
         >>> found.write("outputs/my_diagnosis")
     """
-    job = called_job(
-        "diagnose",
-        settings,
-        recording=recording_name(recording),
-        model=model_name(model),
-        effects=list(effects) or None,
-    )
-    return run_diagnosis(job, opened(recording), modelled(model), say or job.say)
+    job = called_job("diagnose", settings, recording=recording, model=model, effects=list(effects) or None)
+    return run_diagnosis(job, recording, model, say)
 
 
-def run_diagnosis(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
+def run_diagnosis(
+    job: Job, recording: Recording | PathLike, known: ModelFile | PathLike | None, say: Say | None = None
+) -> DiagnosisResult:
     """Diagnose free motion, grasps, or both, as the recording has them."""
     from tactile_cube.measurement.bench import has_free_motion, with_object
     from tactile_cube.measurement.replay.nominal import require_same_joints
 
+    say, known, recording = say or job.say, modelled(known), opened(recording)
     if known is not None:
         require_same_joints(recording, known)
     if with_object(recording).trials and not has_free_motion(recording):

@@ -84,9 +84,7 @@ def evaluate(
         >>> result = tactile_cube.evaluate("table", "protocol=smoke")
         >>> print(result.text, result.summary.mean_angle)
     """
-    names = {"policy": policy, "model": model}
-    job = called_job("evaluate", settings, **{key: None if name is None else str(name) for key, name in names.items()})
-    return run_evaluation(job, say)
+    return run_evaluation(called_job("evaluate", settings, policy=policy, model=model), say)
 
 
 def run_evaluation(job: Job, say: Say) -> EvaluationResult:

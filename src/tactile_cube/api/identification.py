@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_cube.api.comparison import opened, recording_name
+from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 
 if TYPE_CHECKING:
@@ -109,15 +109,17 @@ def identify(
         >>> print(fitted.text, fitted.model.effects)
         >>> fitted.write("outputs/my_model")
     """
-    job = called_job("identify", settings, recording=recording_name(recording), effects=list(effects))
-    return run_identification(job, opened(recording), say or job.say)
+    return run_identification(
+        called_job("identify", settings, recording=recording, effects=list(effects)), recording, say
+    )
 
 
-def run_identification(job: Job, recording: Recording, say: Say) -> IdentificationResult:
+def run_identification(job: Job, recording: Recording | PathLike, say: Say | None = None) -> IdentificationResult:
     """Fit what a job names: effects of the drivetrain, of fingertips and object, or both."""
     from tactile_cube.identification.contact.identification import contact_effects
     from tactile_cube.measurement.bench import has_free_motion
 
+    say, recording = say or job.say, opened(recording)
     contact = contact_effects(job.config.effects, recording)
     names = [effect.name for effect in contact]
     drive = [name for name in job.config.effects if name not in names]

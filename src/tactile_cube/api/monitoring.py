@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
+from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.errors import InputError
 
@@ -117,13 +117,12 @@ def monitor(
         >>> seen = tactile_cube.monitor("log_of_today", "last_week/model.yaml")
         >>> print(seen.alarm, seen.text)
     """
-    job = called_job("monitor", settings, recording=recording_name(recording), model=model_name(model))
-    reference = modelled(model)
-    assert reference is not None  # there is one
-    return run_monitor(job, opened(recording), reference, say or job.say)
+    return run_monitor(called_job("monitor", settings, recording=recording, model=model), recording, model, say)
 
 
-def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> MonitorResult:
+def run_monitor(
+    job: Job, recording: Recording | PathLike, model: ModelFile | PathLike, say: Say | None = None
+) -> MonitorResult:
     """Refit the reference's effects on the newest recording, and hold the numbers and the errors side by side.
 
     Numbers that trade places with each other differ from recording to recording by more than their intervals say; a
@@ -132,13 +131,15 @@ def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> 
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.identification import identify
     from tactile_cube.drivetrain.effects import resolve
+    from tactile_cube.drivetrain.model_file import as_model
     from tactile_cube.identification.drift import changed, drifts
     from tactile_cube.identification.identification import judge_known
     from tactile_cube.identification.search.evidence import worse
     from tactile_cube.measurement.bench import without_touches
     from tactile_cube.measurement.replay.nominal import require_same_joints
 
-    config = job.config
+    config, say = job.config, say or job.say
+    before, recording = as_model(model), opened(recording)
     then = error_over_noise(before)
     require_same_joints(recording, before)
     effects = [one.effect for one in before.drive_effects]

@@ -29,7 +29,7 @@ def record(out: PathLike, *settings: str) -> dict[str, Recording]:
     Example:
         >>> measured = tactile_cube.record("made", "source=finger", "source.hidden=[backlash@q2]")[""]
     """
-    return run_recording(called_job("record", settings, out=str(out)))
+    return run_recording(called_job("record", settings, out=out))
 
 
 def run_recording(job: Job) -> dict[str, Recording]:

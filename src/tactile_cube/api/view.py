@@ -57,7 +57,7 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
         >>> seen = tactile_cube.view("table", "episodes=4", "viewer=none")
         >>> print(seen.files[0], seen.episodes["best"].final_angle)
     """
-    return run_view(called_job("view", settings, folder, run=str(run)), say)
+    return run_view(called_job("view", settings, folder, run=run), say)
 
 
 def run_view(job: Job, say: Say) -> ViewResult:
