@@ -6,14 +6,15 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.drivetrain.model_file import ModelFile
-    from tactile_cube.measurement.comparing.comparison import Comparison
-    from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.drivetrain.model_file import ModelFile, as_model
+from tactile_cube.identification.contact.diagnosis import compare_contact
+from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
+from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,6 @@ class ComparisonResult:
     @property
     def data(self) -> dict[str, Any]:
         """The content of comparison.json: plain numbers, errors in rad."""
-        from tactile_cube.measurement.comparing.comparison import comparison_json
-
         config = self.job.config
         origin = {"model": config.model, "engine": config.engine, "command": self.job.command}
         return comparison_json(self.comparison) | origin | {"seconds": self.seconds}
@@ -94,29 +93,22 @@ def run_comparison(
     job: Job, recording: Recording | PathLike, model: ModelFile | PathLike | None, say: Say | None = None
 ) -> ComparisonResult:
     """Compare as a job says: free motion, or grasps where there is nothing else."""
-    from tactile_cube.identification.contact.diagnosis import compare_contact
-    from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
-    from tactile_cube.measurement.comparing import comparison
-
     config, say = job.config, say or job.say
     model, recording = modelled(model), opened(recording)
     held = len(with_object(recording).trials)
     if held and not has_free_motion(recording):
-        compared = compare_contact(recording, model, config.step or comparison.USUAL_STEP, say)
+        compared = compare_contact(recording, model, config.step or USUAL_STEP, say)
         return ComparisonResult(compared, job, job.seconds)
     if held:
         say(f"{held} trials with an object are left out here; diagnose and identify use them")
     spread = {str(key): float(value) for key, value in config.band.spread.items()}
     band = (config.band.simulations, spread, config.seed)
-    compared = comparison.compare_recording(without_touches(recording), model, config.engine, config.step, *band)
+    compared = compare_recording(without_touches(recording), model, config.engine, config.step, *band)
     return ComparisonResult(compared, job, job.seconds)
 
 
 def opened(recording: Recording | PathLike) -> Recording:
     """The recording, read if it is a folder's name; what is odd about it goes to stderr."""
-    from tactile_cube.measurement.recordings.reading import read_recording
-    from tactile_cube.measurement.recordings.recording import Recording
-
     if isinstance(recording, Recording):
         return recording
     read = read_recording(str(recording))  # on the command line 2026 is a number
@@ -127,6 +119,4 @@ def opened(recording: Recording | PathLike) -> Recording:
 
 def modelled(model: ModelFile | PathLike | None) -> ModelFile | None:
     """The model, read if it is a file's name."""
-    from tactile_cube.drivetrain.model_file import as_model
-
     return None if model is None else as_model(model)

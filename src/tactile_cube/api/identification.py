@@ -6,16 +6,24 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.drivetrain.model_file import ModelFile
-    from tactile_cube.identification.contact.identification import ContactIdentification
-    from tactile_cube.identification.identification import Identification
-    from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.drivetrain.model_file import ModelFile, write_model
+from tactile_cube.identification.contact.identification import (
+    ContactIdentification,
+    contact_effects,
+    identify_contact,
+    stated_model,
+)
+from tactile_cube.identification.identification import Identification, identify_effects
+from tactile_cube.identification.in_words import errors_by_stage
+from tactile_cube.identification.recommended import model_file
+from tactile_cube.measurement.bench import has_free_motion, without_touches
+from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
+from tactile_cube.measurement.comparing.comparison import compare_recording
+from tactile_cube.measurement.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -46,8 +54,6 @@ class IdentificationResult:
     @property
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
-        from tactile_cube.identification.in_words import errors_by_stage
-
         lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
         for parameter in self.contact.as_json()["silent"] if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
@@ -55,37 +61,32 @@ class IdentificationResult:
 
     def write(self, folder: PathLike) -> None:
         """Write model.yaml, identification.json, report.html and, of free motion, identification.rrd."""
-        from tactile_cube.drivetrain.model_file import write_model
+        from tactile_cube.visualization.contact_report import contact_report
         from tactile_cube.visualization.report import write_report
 
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        write_model(self.model, folder / "model.yaml")
+        path = folder / "model.yaml"
+        write_model(self.model, path)
         (folder / "identification.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
         if self.free is not None:
-            write_report(self._free_report(folder, self.free), folder / "report.html")
+            write_report(self._free_page(folder, self.free), folder / "report.html")
         elif self.contact is not None:
-            from tactile_cube.visualization.contact_report import contact_report
+            page = contact_report(self.contact, self.model.rig, self.job.command, str(path))
+            write_report(page, folder / "report.html")
 
-            path = str(folder / "model.yaml")
-            write_report(contact_report(self.contact, self.model.rig, self.job.command, path), folder / "report.html")
-
-    def _free_report(self, folder: Path, found: Identification) -> Any:
-        from tactile_cube.measurement.bench import without_touches
-        from tactile_cube.measurement.comparing.comparison import compare_recording
+    def _free_page(self, folder: Path, found: Identification) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
         from tactile_cube.visualization.comparison_summary import markdown
         from tactile_cube.visualization.contact_report import contact_sections
         from tactile_cube.visualization.diagnosis_report import identification_report
 
-        config, command = self.job.config, self.job.command
-        after = compare_recording(
-            without_touches(self.recording), self.model, config.engine, config.step, floor=found.floor
-        )
+        config, recording = self.job.config, without_touches(self.recording)
+        after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd", markdown(after))
         held = contact_sections(self.contact, alone=False) if self.contact else []
-        path = str(folder / "model.yaml")
-        return identification_report(after, self.data["error"], self.data["joints"], command, path, held)
+        stages, path = self.data["error"], str(folder / "model.yaml")
+        return identification_report(after, stages, self.data["joints"], self.job.command, path, held)
 
 
 @as_input_errors
@@ -109,16 +110,12 @@ def identify(
         >>> print(fitted.text, fitted.model.effects)
         >>> fitted.write("outputs/my_model")
     """
-    return run_identification(
-        called_job("identify", settings, recording=recording, effects=list(effects)), recording, say
-    )
+    job = called_job("identify", settings, recording=recording, effects=list(effects))
+    return run_identification(job, recording, say)
 
 
 def run_identification(job: Job, recording: Recording | PathLike, say: Say | None = None) -> IdentificationResult:
     """Fit what a job names: effects of the drivetrain, of fingertips and object, or both."""
-    from tactile_cube.identification.contact.identification import contact_effects
-    from tactile_cube.measurement.bench import has_free_motion
-
     say, recording = say or job.say, opened(recording)
     contact = contact_effects(job.config.effects, recording)
     names = [effect.name for effect in contact]
@@ -129,8 +126,6 @@ def run_identification(job: Job, recording: Recording | PathLike, say: Say | Non
 
 
 def _of_grasps(job: Job, recording: Recording, effects: list[Any], say: Say) -> IdentificationResult:
-    from tactile_cube.identification.contact.identification import identify_contact, stated_model
-
     config = job.config
     found = identify_contact(recording, effects, None, config.step, config.seed, say)
     model = found.into(stated_model(recording, job.command, config.seed), alone=True)
@@ -143,12 +138,6 @@ def _of_grasps(job: Job, recording: Recording, effects: list[Any], say: Say) -> 
 def _of_free_motion(
     job: Job, recording: Recording, drive: list[str], effects: list[Any], say: Say
 ) -> IdentificationResult:
-    from tactile_cube.identification.contact.identification import identify_contact
-    from tactile_cube.identification.identification import identify_effects
-    from tactile_cube.identification.recommended import model_file
-    from tactile_cube.measurement.bench import without_touches
-    from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
-
     config = job.config
     offsets = bench_estimates(recording).offsets
     moving = without_touches(recording)
