@@ -122,7 +122,7 @@ class DeploymentResult:
 
     def write(self, folder: PathLike) -> Path | None:
         """Write the log of every run in which the policy decided as one recording; None if there is none."""
-        logs = [run.log for run in self.runs if run.log.time]
+        logs = [run.log for run in self.runs if run.log.readings]
         resolution = float(self.job.config.robot.get("resolution", 0.0))
         return write_runs(logs, Path(folder), self.limits, self.rate, resolution, self.hand) if logs else None
 
@@ -157,7 +157,7 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
         # partial: hydra would make a dictionary of a hand that it is given
         robot: Robot = instantiate(config.robot, _partial_=True, **seed)(**own)
         runs.append(run_loop(loop, robot, say))
-        if isinstance(robot, SimulatedHand) and robot.has_cube:
+        if isinstance(robot, SimulatedHand) and robot.cube:
             turned.append(robot.turned(runs[-1].ended))
         if runs[-1].interrupted:
             break

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from enum import StrEnum
 from math import inf, isfinite
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.command_guard import CommandGuard
-from tactile_cube.deployment.controller import POLICY_RATE, PolicyController, TargetFilter
+from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController, TargetFilter
 from tactile_cube.deployment.homing import Homing, Move
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.robot import Reading
@@ -40,23 +39,13 @@ class Mode(StrEnum):
     STOPPED = "stopped"
 
 
-class Decides(Protocol):
-    """Gives the desired joint angles of the next 0.1 s."""
-
-    def reset(self) -> None:
-        """Begin a run."""
-
-    def step(self, q_m: Array, q_f: Array) -> Array:
-        """Return q_n `(joints,)` [rad] for measured angles and filtered targets `(joints,)` [rad]."""
-
-
 class ControlLoop:
     """One call of `tick` is one period of the fast loop, at 1 kHz on the robot; it never waits.
 
     What it sends passes `CommandGuard` last.
 
     Args:
-        decides: gives q_n at 10 Hz, the policy's `PolicyController` or anything else.
+        decides: gives q_n at 10 Hz.
         time_constant: T_s of the target filter [s].
         limits: of every command.
         rules: when to stop.
@@ -80,7 +69,7 @@ class ControlLoop:
 
     def __init__(
         self,
-        decides: Decides,
+        decides: PolicyController | PlayedTargets,
         time_constant: float,
         limits: JointLimits,
         rules: StopRules,
@@ -134,15 +123,19 @@ class ControlLoop:
             reading: what has been measured since the tick before; None: nothing.
         """
         dt = self._clock(now)
-        doubt = self._listen(now, reading)
+        doubt = "" if reading is None else self._guard.accept(now, reading)
+        if doubt:
+            self.doubted, self.doubt = self.doubted + 1, doubt
         last = self.accepted
         if last is None or (self._guard.command is None and (self.mode is Mode.STOPPED or not self._guard.ready)):
             return None
         if self.mode is Mode.WAITING:
-            self._move_to(self._home if self._opened is None else self._opened, last.q_m)
-            self.mode = Mode.HOMING
-        elif self.mode is not Mode.STOPPED:
-            self._judge(dt, now - last.time)
+            goal = self._home if self._opened is None else self._opened
+            self._move, self.mode = Move(self._homing, now, last.q_m, goal), Mode.HOMING
+        elif self.mode is not Mode.STOPPED and (
+            why := self._watchdog.judge(dt, now - last.time, self._guard.saturated)
+        ):
+            self.stop(why)
         if not doubt:
             self._go_on(now, dt, last.q_m.copy())
         return self._guard.checked(now, self.q_f)
@@ -150,8 +143,7 @@ class ControlLoop:
     def confirm_object(self) -> None:
         """Close the fingers around the object, which somebody has put between them."""
         if self.mode is Mode.WAIT_FOR_OBJECT:
-            self._move_to(self._home, self.q_f)
-            self.mode = Mode.CLOSING
+            self._move, self.mode = Move(self._homing, self.time, self.q_f, self._home), Mode.CLOSING
 
     def stop(self, reason: str) -> None:
         """Hold position from now on, at the last accepted angles."""
@@ -169,35 +161,16 @@ class ControlLoop:
         dt, self.time = now - self.time, now
         return dt
 
-    def _listen(self, now: float, reading: Reading | None) -> str:
-        if reading is None:
-            return ""
-        doubt = self._guard.accept(now, reading)
-        if doubt:
-            self.doubted, self.doubt = self.doubted + 1, doubt
-        return doubt
-
-    def _judge(self, dt: float, silent: float) -> None:
-        reason = self._watchdog.judge(dt, silent, self._guard.saturated)
-        if reason:
-            self.stop(reason)
-
     def _go_on(self, now: float, dt: float, q_m: Array) -> None:
         if self.mode in (Mode.HOMING, Mode.CLOSING):
-            self._move_on(now, q_m)
+            self.q_f = self._move.target(now)
+            failure = self._move.failure(now, q_m)
+            if self._move.arrived(now, q_m):
+                self._arrive(now, q_m)
+            elif failure:
+                self.stop(f"{self.mode}: {failure}")
         if self.mode is Mode.RUNNING:
             self._run_on(now, dt, q_m)
-
-    def _move_to(self, goal: Array, start: Array) -> None:
-        self._move = Move(self._homing, self.time, start, goal)
-
-    def _move_on(self, now: float, q_m: Array) -> None:
-        self.q_f = self._move.target(now)
-        failure = self._move.failure(now, q_m)
-        if self._move.arrived(now, q_m):
-            self._arrive(now, q_m)
-        elif failure:
-            self.stop(f"{self.mode}: {failure}")
 
     def _arrive(self, now: float, q_m: Array) -> None:
         if self.mode is Mode.HOMING and self._opened is not None:

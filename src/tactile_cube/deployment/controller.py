@@ -17,6 +17,10 @@ from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.excitation import excitation
 
 Weights = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+POLICY_RATE = 10.0
+"""Rate at which the policy is asked [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +28,7 @@ class Network:
     """Linear layers with ReLU between them; the first half of the last layer's outputs, through tanh, is the action.
 
     Attributes:
-        weights: one matrix `(out, in)` a layer.
-        biases: one vector `(out,)` a layer.
+        weights: one matrix `(out, in)` a layer, float32, as the biases `(out,)`.
         info: the policy file's metadata.
         label: how the policy is called in a message.
     """
@@ -42,7 +45,7 @@ class Network:
 
     @property
     def action_size(self) -> int:
-        """Number of joints commanded; the other half of the outputs is the exploration's scale."""
+        """Number of joints; the other half of the outputs is the exploration's scale."""
         return int(self.weights[-1].shape[0]) // 2
 
     def deterministic_layers(self) -> list[tuple[Weights, Weights]]:
@@ -53,11 +56,11 @@ class Network:
 
     def __call__(self, observation: Weights) -> Weights:
         """Return the action `(..., 12)` in [-1, 1] for observations `(..., 120)`."""
+        *hidden, (last, offset) = self.deterministic_layers()
         signal = observation
-        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+        for weight, bias in hidden:
             signal = np.maximum(signal @ weight.T + bias, 0.0)
-        mean = signal @ self.weights[-1][: self.action_size].T + self.biases[-1][: self.action_size]
-        return np.asarray(np.tanh(mean), dtype=np.float32)
+        return np.asarray(np.tanh(signal @ last.T + offset), dtype=np.float32)
 
 
 def read_network(path: Path) -> Network:
@@ -67,22 +70,13 @@ def read_network(path: Path) -> Network:
     return Network(weights, biases, info.model_dump(), f"policy={path}")
 
 
-Array = NDArray[np.float64]
-
-POLICY_RATE = 10.0
-"""Rate at which the policy is asked [Hz]."""
-
-
 def reading_size(hand: Hand) -> int:
     """Numbers in one reading: q_m and e_q of every joint."""
     return 2 * hand.joints
 
 
 class PolicyController:
-    """Asks the network at 10 Hz.
-
-    Once a policy step: read q_m from the hand and q_f from the filter that runs in the fast loop, call `step`, and give
-    its q_n to the filter.
+    """Asks the network at 10 Hz: `step` takes q_m of the hand and q_f of the fast loop's filter, which takes its q_n.
 
     Args:
         network: the policy.
@@ -113,12 +107,7 @@ class PolicyController:
         self._stack = None
 
     def step(self, q_m: Array, q_f: Array) -> Array:
-        """Return the desired joint angles q_n `(joints,)` [rad] for the next 0.1 s.
-
-        Args:
-            q_m: measured joint angles `(joints,)` [rad], in the hand's order.
-            q_f: filtered targets at the same instant `(joints,)` [rad].
-        """
+        """Return q_n for the next 0.1 s, for q_m and q_f of the same instant, all `(joints,)` [rad]."""
         reading = np.concatenate([q_m, np.asarray(q_f) - q_m]).astype(np.float32)
         if self._stack is None:
             self._stack = np.tile(reading, self._readings)
@@ -170,17 +159,10 @@ class PlayedTargets:
 
 
 def excited_targets(kind: str, reach: float, seconds: float, seed: int, hand: Hand = DLR_HAND2) -> PlayedTargets:
-    """Return an excitation about the start angles, within the action range.
-
-    Args:
-        kind: `ramps`, `holds`, `multisine` or another kind of excitation.
-        reach: half width [rad].
-        seconds: length [s].
-        seed: of its corners and phases.
-        hand: that moves.
+    """Return an excitation of `reach` [rad] about the start angles, within the action range.
 
     Raises:
-        InputError: an unknown kind.
+        InputError: an unknown kind; see `excitation`.
     """
     home = np.asarray(hand.start_angles)
     low, high = np.maximum(home - reach, hand.action_lower), np.minimum(home + reach, hand.action_upper)

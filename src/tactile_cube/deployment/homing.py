@@ -46,14 +46,7 @@ def open_angles(setting: TrainingSetting, clearance: float) -> Array:
 
 
 class Move:
-    """A straight line from one pose to another, judged by what is measured.
-
-    Args:
-        homing: speed, tolerance and times.
-        now: when it begins [s].
-        start: `(joints,)` [rad].
-        goal: `(joints,)` [rad].
-    """
+    """A straight line from `start` to `goal`, both `(joints,)` [rad], judged by what is measured."""
 
     def __init__(self, homing: Homing, now: float, start: Array, goal: Array) -> None:
         self._homing, self._began, self._start, self._goal = homing, now, start, goal

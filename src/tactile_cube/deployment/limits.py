@@ -17,14 +17,7 @@ RATE = 6.28
 
 
 def require_positive(numbers: Mapping[str, float]) -> None:
-    """Refuse a setting that is no finite number above 0.
-
-    Args:
-        numbers: key of the configuration -> its value.
-
-    Raises:
-        InputError: one of them bounds nothing, or everything.
-    """
+    """Raise an `InputError` for a key of the configuration whose value is no finite number above 0."""
     for key, value in numbers.items():
         if not (isinstance(value, (int, float)) and 0 < value < inf):
             raise InputError(f"{key} is {value}; give a finite number above 0")
@@ -92,12 +85,7 @@ class StopRules:
 
 
 class Watchdog:
-    """Judges every tick by the stop rules.
-
-    Args:
-        rules: the bounds.
-        names: of the joints.
-    """
+    """Judges every tick by the stop rules."""
 
     def __init__(self, rules: StopRules, names: tuple[str, ...]) -> None:
         self._rules, self._names = rules, names

@@ -32,25 +32,23 @@ Array = NDArray[np.float64]
 class RunLog:
     """One run of the loop, a row a measurement that was believed: time, measured, sent then."""
 
-    time: list[float] = field(default_factory=list)
-    command: list[Array] = field(default_factory=list)
-    position: list[Array] = field(default_factory=list)
-    torque: list[Array] = field(default_factory=list)
+    readings: list[Reading] = field(default_factory=list)
+    commands: list[Array] = field(default_factory=list)
 
-    def add(self, reading: Reading, q_d: Array) -> None:
-        """Take over one tick; one without a measurement leaves a gap in the recording."""
-        self.time.append(reading.time)
-        self.command.append(np.array(q_d))
-        self.position.append(np.array(reading.q_m))
-        self.torque.append(np.full(len(reading.q_m), np.nan) if reading.torque is None else np.array(reading.torque))
+    @property
+    def time(self) -> Array:
+        """When it was measured [s]."""
+        return np.array([one.time for one in self.readings])
 
     def table(self, number: int) -> TrialTable:
         """The run as a trial of kind `policy`, its time from 0 [s]."""
         entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
-        torque = np.array(self.torque)
+        position = np.array([one.q_m for one in self.readings])
+        torque = np.array(
+            [np.full(len(one.q_m), np.nan) if one.torque is None else one.torque for one in self.readings]
+        )
         measured = None if np.isnan(torque).any() else torque
-        time = np.array(self.time) - self.time[0]
-        return TrialTable(entry, time, np.array(self.command), np.array(self.position), measured)
+        return TrialTable(entry, self.time - self.time[0], np.array(self.commands), position, measured)
 
 
 def write_runs(
@@ -95,6 +93,7 @@ def write_runs(
 
 NO_HAND = 5.0  # [s] without believable measurements at the beginning
 HOLD_TICKS = 200  # of the hold at the end: the command comes to rest, and a lost message does no harm
+TICK_TIMES = {"median": 0.5, "p99.9": 0.999, "largest": 1.0}
 Say = Callable[[str], None]
 
 
@@ -119,12 +118,7 @@ class LoopRun:
     @property
     def tick_times(self) -> dict[str, float]:
         """Median, 99.9th percentile and largest computing time of a tick [s]."""
-        times = np.array(self.ticks)
-        return {
-            "median": float(np.median(times)),
-            "p99.9": float(np.quantile(times, 0.999)),
-            "largest": float(times.max()),
-        }
+        return {name: float(np.quantile(self.ticks, q)) for name, q in TICK_TIMES.items()}
 
 
 def run_loop(loop: ControlLoop, robot: Robot, say: Say = print) -> LoopRun:
@@ -178,7 +172,8 @@ def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun) -> None:
     run.ticks.append(time.perf_counter() - began)
     if q_d is not None:
         if running and loop.accepted is not None and loop.accepted is not before:
-            run.log.add(loop.accepted, q_d)
+            run.log.readings.append(loop.accepted)
+            run.log.commands.append(q_d.copy())
         robot.send(q_d)
 
 

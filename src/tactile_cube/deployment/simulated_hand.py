@@ -38,7 +38,7 @@ class SimulatedHand:
 
     Args:
         rate: of the fast loop [Hz].
-        cube: whether there is one to turn.
+        cube: whether there is one to turn; kept as an attribute.
         noise: standard deviation of the measured angles [rad].
         resolution: of the measured angles [rad].
         opened: how far the fingers are from the start angles at first [rad].
@@ -63,7 +63,7 @@ class SimulatedHand:
         hand = self._setting.hand
         self._world = World(hand, options=SimulationOptions(dt=1.0 / rate, substeps=1))
         self._rate, self._noise, self._resolution = rate, noise, resolution
-        self._cube, self._link = cube, link or Disturbed()
+        self.cube, self._link = cube, link or Disturbed()
         self._rng = np.random.default_rng(seed)
         self._given = self._setting.constants
         self._ticks, self._late = 0, 0
@@ -73,16 +73,6 @@ class SimulatedHand:
         self._world.reset(empty, Start(np.maximum(away, hand.lower), AWAY))
         self._q_d = np.array(self._world.q_m)
         self._frame, self._theta = frame_along(self._setting.task.axis_vector()), [0.0]
-
-    @property
-    def world(self) -> World:
-        """What simulates."""
-        return self._world
-
-    @property
-    def has_cube(self) -> bool:
-        """Whether there is a cube to turn."""
-        return self._cube
 
     def turned(self, at: float) -> float:
         """Return how far the object had been turned the wanted way at a time [s] of the clock, unwrapped [rad]."""
@@ -116,7 +106,7 @@ class SimulatedHand:
 
     def release(self) -> None:
         """Put the object between the fingers; without a table under it, it has no weight for the first 0.4 s."""
-        if self._cube:
+        if self.cube:
             world, held = self._world, self._given.gravity_onset
             start = Start(np.array(world.q), target=np.array(self._q_d), velocities=np.array(world.dq))
             onset = round(0.1 * held * self._rate)
