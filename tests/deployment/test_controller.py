@@ -20,8 +20,8 @@ from tactile_cube.transforms import EnvConfig, make_env
 
 def make_network(folder: Path) -> tuple[Actor, Network]:
     torch.manual_seed(0)
-    actor = Actor(Sizes(120, 0, 12), (64, 64))
-    save_policy(folder / "policy.safetensors", actor, PolicyInfo.describe(actor))
+    actor = Actor(Sizes(120, 0, 12), (512, 512))
+    save_policy(folder / "policy.safetensors", actor, PolicyInfo.describe(actor, time_constant=0.5))
     return actor, read_network(folder / "policy.safetensors")
 
 
@@ -75,23 +75,10 @@ def test_the_robots_computer_needs_no_torch() -> None:
     assert run.stdout.strip() == "False"
 
 
-@pytest.fixture
-def policy(tmp_path: Path) -> tuple[Path, Actor]:
-    torch.manual_seed(0)
-    actor = Actor(Sizes(120, 0, 12), (512, 512))
-    save_policy(tmp_path / "policy.safetensors", actor, PolicyInfo.describe(actor, time_constant=0.5))
-    return tmp_path / "policy.safetensors", actor
-
-
-def test_numpy_and_torch_give_the_same_action(policy: tuple[Path, Actor]) -> None:
-    path, actor = policy
+def test_numpy_and_torch_give_the_same_action(tmp_path: Path) -> None:
+    actor, network = make_network(tmp_path)
     observation = np.random.default_rng(1).normal(0.0, 0.5, (50, 120)).astype(np.float32)
     with torch.no_grad():
         expected = actor.deterministic(torch.from_numpy(observation)).numpy()
-    np.testing.assert_allclose(read_network(path)(observation), expected, atol=2e-6)
-
-
-def test_metadata_comes_along(policy: tuple[Path, Actor]) -> None:
-    network = read_network(policy[0])
-    assert (network.observation_size, network.action_size) == (120, 12)
+    np.testing.assert_allclose(network(observation), expected, atol=2e-6)
     assert network.info["time_constant"] == 0.5

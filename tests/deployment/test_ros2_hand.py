@@ -118,7 +118,7 @@ def run(robot: Loopback, opened: bool = False) -> LoopRun:
 
 def test_the_loop_runs_to_its_end_on_the_node(node: Node) -> None:
     ended = run(Loopback(node))
-    assert (ended.reason, len(ended.log.time)) == ("time is over", 500)
+    assert (ended.reason, len(ended.log)) == ("time is over", 500)
     assert node.destroyed
     assert not node.open
 

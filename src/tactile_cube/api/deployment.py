@@ -122,7 +122,7 @@ class DeploymentResult:
 
     def write(self, folder: PathLike) -> Path | None:
         """Write the log of every run in which the policy decided as one recording; None if there is none."""
-        logs = [run.log for run in self.runs if run.log.readings]
+        logs = [run.log for run in self.runs if run.log]
         resolution = float(self.job.config.robot.get("resolution", 0.0))
         return write_runs(logs, Path(folder), self.limits, self.rate, resolution, self.hand) if logs else None
 

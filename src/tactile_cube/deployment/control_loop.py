@@ -21,22 +21,14 @@ ROUNDING = 1e-9  # [s] of clocks that add up ticks
 
 
 class Mode(StrEnum):
-    """What the loop is doing.
+    """What the loop is doing."""
 
-    - `waiting`: too few measurements agree yet; nothing is sent.
-    - `homing`: the fingers open for the object, or go to the start angles where none is awaited.
-    - `wait for object`: the open fingers hold position until somebody confirms that the object is there.
-    - `closing`: the fingers go to the start angles around the object.
-    - `running`: the policy decides.
-    - `stopped`: the fingers hold position; only a new loop starts again.
-    """
-
-    WAITING = "waiting"
-    HOMING = "homing"
-    WAIT_FOR_OBJECT = "wait for object"
-    CLOSING = "closing"
-    RUNNING = "running"
-    STOPPED = "stopped"
+    WAITING = "waiting"  # too few measurements agree yet; nothing is sent
+    HOMING = "homing"  # the fingers open for the object, or go to the start angles where none is awaited
+    WAIT_FOR_OBJECT = "wait for object"  # until somebody confirms that it is there
+    CLOSING = "closing"  # the fingers go to the start angles around the object
+    RUNNING = "running"  # the policy decides
+    STOPPED = "stopped"  # the fingers hold position; only a new loop starts again
 
 
 class ControlLoop:

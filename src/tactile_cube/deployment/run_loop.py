@@ -28,31 +28,12 @@ from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTa
 Array = NDArray[np.float64]
 
 
-@dataclass
-class RunLog:
-    """One run of the loop, a row a measurement that was believed: time, measured, sent then."""
-
-    readings: list[Reading] = field(default_factory=list)
-    commands: list[Array] = field(default_factory=list)
-
-    @property
-    def time(self) -> Array:
-        """When it was measured [s]."""
-        return np.array([one.time for one in self.readings])
-
-    def table(self, number: int) -> TrialTable:
-        """The run as a trial of kind `policy`, its time from 0 [s]."""
-        entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
-        position = np.array([one.q_m for one in self.readings])
-        torque = np.array(
-            [np.full(len(one.q_m), np.nan) if one.torque is None else one.torque for one in self.readings]
-        )
-        measured = None if np.isnan(torque).any() else torque
-        return TrialTable(entry, self.time - self.time[0], np.array(self.commands), position, measured)
+Log = list[tuple[Reading, Array]]
+"""One run of the loop: each measurement that was believed, and the command `(joints,)` [rad] that was sent then."""
 
 
 def write_runs(
-    runs: Sequence[RunLog], folder: Path, limits: JointLimits, rate: float, resolution: float, hand: Hand = DLR_HAND2
+    runs: Sequence[Log], folder: Path, limits: JointLimits, rate: float, resolution: float, hand: Hand = DLR_HAND2
 ) -> Path:
     """Write runs of the loop as one recording: of the hand alone, for no object is described.
 
@@ -66,29 +47,31 @@ def write_runs(
     """
     nominal = {"stiffness": STIFFNESS, "static_friction": STATIC_FRICTION, "reflected_inertia": REFLECTED_INERTIA}
     told = {key: hand.drive.get(key, value) for key, value in nominal.items()}
-    followers = {
-        hand.chain_joints(k)[link]: hand.chain_joints(k)[leader]
-        for k in range(len(hand.fingers))
-        for link, leader in hand.coupled()
-    }
+    chains = [hand.chain_joints(k) for k in range(len(hand.fingers))]
     description = Description(
         format=1,
-        gravity=[float(value) for value in hand.rotation.T @ (0.0, 0.0, -9.81)],
+        gravity=(hand.rotation.T @ (0.0, 0.0, -9.81)).tolist(),
         rate_hz=rate,
         joints=list(hand.joint_names),
-        coupled={name: Coupling(joint=leader) for name, leader in followers.items()},
-        controller=Controller(
-            kp=[float(value) for value in limits.kp], kd=[float(value) for value in limits.kd],
-            torque_limit=limits.torque,
-        ),
+        coupled={chain[link]: Coupling(joint=chain[leader]) for chain in chains for link, leader in hand.coupled()},
+        controller=Controller(kp=limits.kp.tolist(), kd=limits.kd.tolist(), torque_limit=limits.torque),
         nominal={key: np.asarray(value).tolist() for key, value in told.items()},
         sensors=Sensors(read="before", position_resolution=resolution),
         trials=[TrialEntry(file="none")],
         source="log of the control loop",
-    )  # fmt: skip
-    tables = [run.table(number) for number, run in enumerate(runs)]
+    )
+    tables = [_table(number, run) for number, run in enumerate(runs)]
     write_recording(folder, RecordingTables(description, hand.urdf(), tables))
     return folder
+
+
+def _table(number: int, run: Log) -> TrialTable:
+    """A run as a trial of kind `policy`, its time from 0 [s]."""
+    entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
+    time, position, command = (np.array(rows) for rows in zip(*((r.time, r.q_m, q_d) for r, q_d in run), strict=True))
+    torques = [reading.torque for reading, _ in run if reading.torque is not None]
+    measured = len(torques) == len(run) and not np.isnan(torques).any()
+    return TrialTable(entry, time - time[0], command, position, np.array(torques) if measured else None)
 
 
 NO_HAND = 5.0  # [s] without believable measurements at the beginning
@@ -112,7 +95,7 @@ class LoopRun:
     reason: str = ""
     interrupted: bool = False
     ended: float = 0.0
-    log: RunLog = field(default_factory=RunLog)
+    log: Log = field(default_factory=list, repr=False)
     ticks: list[float] = field(default_factory=list, repr=False)
 
     @property
@@ -172,8 +155,7 @@ def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun) -> None:
     run.ticks.append(time.perf_counter() - began)
     if q_d is not None:
         if running and loop.accepted is not None and loop.accepted is not before:
-            run.log.readings.append(loop.accepted)
-            run.log.commands.append(q_d.copy())
+            run.log.append((loop.accepted, q_d.copy()))
         robot.send(q_d)
 
 
