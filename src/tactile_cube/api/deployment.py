@@ -13,7 +13,7 @@ from omegaconf import OmegaConf
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.deployment.control_loop import ControlLoop
 from tactile_cube.deployment.controller import Network, PlayedTargets, PolicyController, excited_targets, read_network
-from tactile_cube.deployment.export import FORMATS, export_policy
+from tactile_cube.deployment.export import export_policy
 from tactile_cube.deployment.homing import open_angles
 from tactile_cube.deployment.limits import JointLimits
 from tactile_cube.deployment.robot import Robot
@@ -63,23 +63,15 @@ def export(policy: PathLike | None, output: PathLike, *settings: str) -> Path:
 def run_export(job: Job) -> tuple[Path, Path]:
     """Write the files of a job; gives the network's and the contract's."""
     config, source = job.config, policy_path(job.config.policy)
-    if config.output is None and config.format not in FORMATS:
-        raise InputError(f"format={config.format}: choose {' or '.join(FORMATS)}")
-    output = Path(config.output or f"{source.stem}.{config.format}")
+    output = Path(config.output or f"{source.stem}.npz")
     network = load_policy(source)
     return output, export_policy(network, output, _setting(config, network))
 
 
 def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSetting:
-    """What the policy was trained with, on the hand and with the object that are named where its file cannot.
+    """What the policy was trained with, on the hand and with the object that `config` names where its file cannot.
 
-    Args:
-        config: with `hand` and `object` where they are named.
-        network: the policy.
-        trained: whether the hand has to be the policy's; else it is any, as for an excitation in place of a policy.
-
-    Raises:
-        InputError: a policy on another hand than its own.
+    With `trained`, the hand has to be the policy's; else it is any, as for an excitation in place of a policy.
     """
     hand: Hand | None = instantiate(config.hand, _convert_="all") if config.get("hand") else None
     if hand is not None and not trained:
@@ -179,13 +171,9 @@ def _control_loop(config: Any, network: Network, setting: TrainingSetting, limit
 
 
 def robot_limits(setting: TrainingSetting, rate: float) -> JointLimits:
-    """The limits of the interface contract: the hand's range, the gains and the torque of the training.
+    """The limits of the interface contract, with the largest change [rad/s]; range, gains and torque of the training.
 
     A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.
-
-    Args:
-        setting: of the training.
-        rate: largest change of a desired angle [rad/s].
     """
     hand, constants = setting.hand, setting.constants
     gains = (np.maximum(constants.kp, constants_of(hand).kp), np.asarray(constants.kd))

@@ -31,12 +31,10 @@ class Job:
     """One call of a command.
 
     Attributes:
-        config: its configuration.
-        folder: where its files go.
         command: the words on a command line that ask for the same.
         choices: group -> chosen option.
         words: of the command line, without those that are Hydra's own.
-        began: when it began, by `time.perf_counter` [s].
+        began: by `time.perf_counter` [s].
     """
 
     config: DictConfig

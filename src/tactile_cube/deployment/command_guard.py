@@ -60,9 +60,7 @@ class CommandGuard:
     def checked(self, now: float, wanted: Array) -> Array:
         """Return the command to send `(joints,)` [rad]: the nearest to the wanted one that keeps every limit.
 
-        Args:
-            now: when it is sent [s].
-            wanted: `(joints,)` [rad]; where it is no number, the command stays.
+        Where what is wanted is no number, the command stays.
         """
         if self.state is None:
             raise RuntimeError("no command before an accepted reading")

@@ -47,13 +47,9 @@ class ControlLoop:
         opened: angles at which the fingers wait for the object `(joints,)` [rad]; None: there is none to wait for.
 
     Attributes:
-        mode: what it is doing.
         reason: why it stopped; "" before.
-        time: of the last tick [s].
-        doubted: measurements that were not believed.
-        doubt: why the last of them was not.
-        q_n: desired angles of the policy `(joints,)` [rad].
-        q_f: filtered ones `(joints,)` [rad].
+        doubted: measurements that were not believed; `doubt` says why the last of them was not.
+        q_n: desired angles of the policy `(joints,)` [rad]; q_f are the filtered ones.
 
     Raises:
         InputError: a time or a filter time without a meaning.

@@ -27,12 +27,7 @@ TOLERANCE = 1e-5  # between float32 products in different orders
 
 
 def interface_contract(network: Network, setting: TrainingSetting | None = None) -> dict[str, Any]:
-    """Return the contract of a policy on the hand that it was trained on, ready for JSON.
-
-    Args:
-        network: the policy.
-        setting: that it was trained in; None: as its file says.
-    """
+    """Return the contract of a policy, ready for JSON; `setting` is that of its training, None: as its file says."""
     setting = setting or training_setting(network.info, label=network.label)
     hand, constants = setting.hand, setting.constants
     names = list(hand.joint_names)
@@ -172,17 +167,11 @@ def _alike(values: Any) -> float | list[float]:
     return numbers[0] if len(set(numbers)) == 1 else numbers
 
 
-FORMATS = ("npz", "onnx")
 Contract = dict[str, Any]
 
 
 def export_policy(network: Network, path: Path, setting: TrainingSetting | None = None) -> Path:
     """Write the network, `.npz` or `.onnx`, and `<path>.contract.json` beside it; return the contract's path.
-
-    Args:
-        network: the policy.
-        path: file to write.
-        setting: that it was trained in; None: as its file says.
 
     Raises:
         InputError: unknown ending, or ONNX is not installed.

@@ -16,15 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Homing:
-    """How the fingers open, wait for the object and close to the start angles.
-
-    Attributes:
-        speed: of the joint that has the longest way [rad/s].
-        tolerance: how close every joint must come [rad]: friction and weight leave 0.03 rad at this stiffness.
-        settle: how long they then rest there [s].
-        timeout: after which it has failed [s].
-        clearance: how far off the object's faces the fingertips wait for it [m].
-    """
+    """How the fingers open, wait for the object and close: `homing` of conf/deploy.yaml [rad/s, rad, s, s, m]."""
 
     speed: float = 0.5
     tolerance: float = 0.05
@@ -39,8 +31,7 @@ class Homing:
 
 def open_angles(setting: TrainingSetting, clearance: float) -> Array:
     """Return the angles `(joints,)` [rad] with the fingertips `clearance` [m] off the object's faces."""
-    known = setting.constants
-    upright = np.array([0.0, 0.0, 0.0, 1.0])
+    known, upright = setting.constants, np.array([0.0, 0.0, 0.0, 1.0])
     size = np.asarray(known.cube_size)
     return grasp_angles(setting.hand, size, np.zeros(3), upright, clearance, known.object_shape)
 

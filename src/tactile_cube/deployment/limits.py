@@ -62,16 +62,7 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class StopRules:
-    """What a measurement may be, and bounds beyond which the loop stops and holds position.
-
-    Attributes:
-        silence: longest time without an accepted measurement [s]; also how far a time stamp may be off the clock.
-        lateness: longest time between two ticks [s].
-        margin: how far a measured angle may lie outside the hand's range [rad]: joint offsets are up to 0.06 rad.
-        speed: fastest that a measured angle may move [rad/s]: a simulated finger that slips off an edge reaches 12
-            for some ms.
-        saturation: longest time that a joint may demand all the torque it has [s].
-    """
+    """What a measurement may be, and bounds beyond which the loop stops: `stop` of conf/deploy.yaml [s, rad, rad/s]."""
 
     silence: float = 0.02
     lateness: float = 0.02

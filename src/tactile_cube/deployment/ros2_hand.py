@@ -15,16 +15,7 @@ from tactile_cube.hand import DLR_HAND2, Hand
 
 
 class Ros2Hand:
-    """A node that subscribes to joint states and publishes desired angles; needs rclpy and messages of ROS 2.
-
-    Args:
-        states: topic of the joint states, stamped by a clock that agrees with this computer's.
-        commands: topic of the desired angles, for an impedance controller with the contract's gains.
-        confirm: topic of std_msgs/Empty that confirms that the object is between the fingers.
-        names: joint of this package -> joint of the robot, where they are called otherwise.
-        zeros: angle of the robot's joint where this package's is zero [rad]; by default 0.
-        directions: -1 where the robot counts the other way; by default 1.
-        rate: of the fast loop [Hz].
+    """A node that subscribes to joint states and publishes desired angles; arguments are those of conf/robot/ros2.yaml.
 
     Raises:
         InputError: ROS 2 is not there, a joint that the hand has not, or no angle or direction.

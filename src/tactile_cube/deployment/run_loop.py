@@ -35,15 +35,9 @@ Log = list[tuple[Reading, Array]]
 def write_runs(
     runs: Sequence[Log], folder: Path, limits: JointLimits, rate: float, resolution: float, hand: Hand = DLR_HAND2
 ) -> Path:
-    """Write runs of the loop as one recording: of the hand alone, for no object is described.
+    """Write runs of the loop as one recording, a trial each: of the hand alone, for no object is described.
 
-    Args:
-        runs: one trial each.
-        folder: where.
-        limits: of the loop; its gains are the controller's.
-        rate: of the fast loop [Hz].
-        resolution: of the measured angles [rad].
-        hand: that was run.
+    The gains of `limits` are the controller's; `rate` is the fast loop's [Hz], `resolution` the sensors' [rad].
     """
     nominal = {"stiffness": STIFFNESS, "static_friction": STATIC_FRICTION, "reflected_inertia": REFLECTED_INERTIA}
     told = {key: hand.drive.get(key, value) for key, value in nominal.items()}
@@ -82,14 +76,9 @@ Say = Callable[[str], None]
 
 @dataclass
 class LoopRun:
-    """One run of the loop.
+    """One run of the loop: why it ended and whether by a signal, and the log of the time in which the policy decided.
 
-    Attributes:
-        reason: why it ended.
-        interrupted: whether by a signal, as Ctrl-C is.
-        ended: when, on the robot's clock [s]; the time of the last tick while it runs.
-        log: of the time in which the policy decided.
-        ticks: computing time of every tick [s], without the hand's own.
+    `ended` is on the robot's clock [s]; `ticks` has the computing time of every tick [s], without the hand's own.
     """
 
     reason: str = ""
@@ -105,14 +94,9 @@ class LoopRun:
 
 
 def run_loop(loop: ControlLoop, robot: Robot, say: Say = print) -> LoopRun:
-    """Run the loop until it stops by itself or a signal ends it.
+    """Run a new loop until it stops by itself or a signal ends it; `say` takes a line at each change of mode.
 
     However it ends, by an exception too, the hold is sent and the robot is closed.
-
-    Args:
-        loop: a new one.
-        robot: the hand.
-        say: takes a line at each change of mode.
     """
     run = LoopRun()
     with noted_signals() as signals, closing(robot):
@@ -186,11 +170,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class EnterKey:
-    """Enter on the terminal, from now on: what was typed before does not count.
-
-    Attributes:
-        usable: whether there is a terminal to type at.
-    """
+    """Enter on the terminal, where there is one, from now on: what was typed before does not count."""
 
     def __init__(self) -> None:
         self.usable = sys.stdin is not None and sys.stdin.isatty()

@@ -22,29 +22,17 @@ NO_FILTER = 1e-9  # [s]: the loop filters, the world must not filter again
 
 @dataclass(frozen=True)
 class Disturbed:
-    """What a link between loop and hand gets wrong.
-
-    Attributes:
-        lost: share of the measurements that never arrive.
-        jitter: share of the ticks that come one to five periods late.
-    """
+    """Shares of the measurements that a link loses, and of the ticks that come one to five periods late."""
 
     lost: float = 0.0
     jitter: float = 0.0
 
 
 class SimulatedHand:
-    """A world that moves on while the loop waits, at the rate of the loop.
+    """A world that moves on while the loop waits; arguments are those of conf/robot/simulated.yaml.
 
-    Args:
-        rate: of the fast loop [Hz].
-        cube: whether there is one to turn; kept as an attribute.
-        noise: standard deviation of the measured angles [rad].
-        resolution: of the measured angles [rad].
-        opened: how far the fingers are from the start angles at first [rad].
-        link: what gets lost on the way.
-        seed: of noise and link.
-        setting: hand, object, table and task; None: the DLR-Hand II around the nominal cube.
+    `setting` has hand, object, table and task; None: the DLR-Hand II around the nominal cube. `cube` says whether there
+    is an object to turn.
     """
 
     def __init__(
