@@ -10,7 +10,7 @@ import torch
 
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
-from tactile_cube.deployment.controller import Network, PolicyController, TargetFilter, read_network
+from tactile_cube.deployment.controller import Network, PolicyController, read_network
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policies import ActorPolicy
@@ -51,14 +51,6 @@ def test_reset_forgets_the_past(tmp_path: Path) -> None:
     assert not np.array_equal(controller.step(np.zeros(12), np.zeros(12)), first)
     controller.reset()
     np.testing.assert_array_equal(controller.step(np.full(12, 0.1), np.full(12, 0.2)), first)
-
-
-def test_the_filter_reaches_63_percent_after_its_time_constant() -> None:
-    for rate in (500.0, 1000.0):
-        low_pass = TargetFilter(0.5, rate)
-        for _ in range(round(0.5 * rate)):
-            low_pass.step(np.ones(12))
-        np.testing.assert_allclose(low_pass.filtered, 1.0 - np.exp(-1.0))
 
 
 def test_a_policy_of_another_shape_is_refused() -> None:

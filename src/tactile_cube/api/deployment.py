@@ -87,8 +87,6 @@ class DeploymentResult:
     Attributes:
         runs: how each run ended, its log and its tick times.
         turned: how far the simulated hand turned the object the wanted way in each run [rad]; empty on another hand.
-        limits: of the commands.
-        job: the call.
         hand: the one that the policy was trained on.
     """
 

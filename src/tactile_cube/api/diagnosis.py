@@ -32,13 +32,10 @@ class DiagnosisResult:
     """The answer, what supports it, and the model with the effects that were found.
 
     Attributes:
-        recording: what was measured.
         known: the model that it began with; None: what the recording states.
         free: the diagnosis of trials in free motion; None without such trials.
         contact: the diagnosis of trials in which the hand holds an object; None without such trials.
-        model: values, effects and intervals.
         data: the content of diagnosis.json: plain numbers, errors in rad.
-        job: the call.
     """
 
     recording: Recording

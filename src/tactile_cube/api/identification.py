@@ -31,12 +31,9 @@ class IdentificationResult:
     """A fitted model, and the error after each stage.
 
     Attributes:
-        recording: what was measured.
         free: the fit of trials in free motion; None without such trials.
         contact: the fit of trials in which the hand holds an object; None without effects of fingertips and object.
-        model: values, effects and intervals.
         data: the content of identification.json: plain numbers, errors in rad.
-        job: the call.
     """
 
     recording: Recording

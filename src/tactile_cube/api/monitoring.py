@@ -35,7 +35,6 @@ class MonitorResult:
             the reference on the newest; `now`, of the refitted model there.
         missing: whether the refitted model has become so much worse that something new is missing.
         diagnosis: names it, where that was asked for.
-        job: the call.
     """
 
     before: ModelFile

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.command_guard import CommandGuard
-from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController, TargetFilter
+from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController
 from tactile_cube.deployment.homing import Homing, Move
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.robot import Reading
+from tactile_cube.drivetrain.control_law import low_pass
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 
@@ -71,7 +72,7 @@ class ControlLoop:
             raise InputError(f"filter_time is {time_constant}; give a finite number of 0 s or more")
         self._decides, self._limits, self._homing, self._seconds = decides, limits, homing, seconds
         self._home, self._opened = np.array(hand.start_angles, dtype=np.float64), opened
-        self._filter = TargetFilter(time_constant, rate=1.0, filtered=self._home.copy())
+        self._time_constant, self._filtered = time_constant, self._home.copy()
         self._guard = CommandGuard(limits, rules, hand.joint_names)
         self._watchdog = Watchdog(rules, hand.joint_names)
         self.mode, self.reason, self.time = Mode.WAITING, "", -inf
@@ -100,7 +101,7 @@ class ControlLoop:
         """Compile and load all that a tick needs, so that none comes late for it; nothing is sent."""
         self._decides.reset()
         self._decides.step(self._home.copy(), self._home.copy())
-        self._filter.step(self._home)
+        low_pass(0.0, 0.0, self._time_constant, 1.0)
         self._decides.reset()
 
     def tick(self, now: float, reading: Reading | None = None) -> Array | None:
@@ -166,18 +167,19 @@ class ControlLoop:
             return
         self.mode, self._since, self._asked = Mode.RUNNING, now, now
         self._decides.reset()
-        self._filter.filtered = q_m.copy()
+        self._filtered = q_m.copy()
 
     def _run_on(self, now: float, dt: float, q_m: Array) -> None:
         if now - self._since > self._seconds - ROUNDING:
             self.stop("time is over")
         elif now < self._asked - ROUNDING or self._ask(q_m):
-            self._filter.rate = 1.0 / dt
-            self.q_f = self._filter.step(self.q_n).copy()
+            for joint, goal in enumerate(self.q_n):
+                self._filtered[joint] = low_pass(self._filtered[joint], goal, self._time_constant, dt)
+            self.q_f = self._filtered.copy()
 
     def _ask(self, q_m: Array) -> bool:
         """Ask for the next q_n; False, and stopped, if it is none."""
-        q_n = np.asarray(self._decides.step(q_m, self._filter.filtered.copy()), dtype=np.float64)
+        q_n = np.asarray(self._decides.step(q_m, self._filtered.copy()), dtype=np.float64)
         self._asked += 1.0 / POLICY_RATE
         if q_n.shape != self._home.shape or not np.isfinite(q_n).all():
             self.stop(f"desired angles that are no numbers of {len(self._home)} joints: {q_n}")

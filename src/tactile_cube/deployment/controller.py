@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tactile_cube.agent.policy_file import read_policy
 from tactile_cube.deployment.training_setting import training_setting
-from tactile_cube.drivetrain.control_law import low_pass
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.excitation import excitation
@@ -70,11 +69,6 @@ def read_network(path: Path) -> Network:
     return Network(weights, biases, info.model_dump(), f"policy={path}")
 
 
-def reading_size(hand: Hand) -> int:
-    """Numbers in one reading: q_m and e_q of every joint."""
-    return 2 * hand.joints
-
-
 class PolicyController:
     """Asks the network at 10 Hz: `step` takes q_m of the hand and q_f of the fast loop's filter, which takes its q_n.
 
@@ -90,7 +84,7 @@ class PolicyController:
 
     def __init__(self, network: Network, hand: Hand | None = None) -> None:
         hand = hand or training_setting(network.info).hand
-        self._reading = reading_size(hand)
+        self._reading = 2 * hand.joints  # q_m and e_q of every joint
         if network.observation_size % self._reading or network.action_size != hand.joints:
             raise InputError(
                 f"the policy maps {network.observation_size} numbers to {network.action_size}; this controller "
@@ -116,33 +110,8 @@ class PolicyController:
         return np.asarray(self._middle + self._half_range * self._network(self._stack))
 
 
-@dataclass
-class TargetFilter:
-    """The low-pass between q_n and q_f, run in the fast loop.
-
-    Attributes:
-        time_constant: T_s [s]: 0.5 at the end of the paper's training.
-        rate: of the fast loop [Hz]: 500 in simulation, 1000 on the robot.
-        filtered: q_f `(joints,)` [rad]; set it to the measured angles before the first step.
-    """
-
-    time_constant: float
-    rate: float
-    filtered: Array = field(default_factory=lambda: np.zeros(12))
-
-    def step(self, q_n: Array) -> Array:
-        """Advance by one period of the fast loop and return q_f `(joints,)` [rad]."""
-        for joint, goal in enumerate(q_n):
-            self.filtered[joint] = low_pass(self.filtered[joint], goal, self.time_constant, 1.0 / self.rate)
-        return self.filtered
-
-
 class PlayedTargets:
-    """Gives one row after the other at 10 Hz, and the last one for good.
-
-    Args:
-        targets: q_n `(steps, 12)` [rad].
-    """
+    """Gives one row of `targets` `(steps, 12)` [rad] after the other at 10 Hz, and the last one for good."""
 
     def __init__(self, targets: Array) -> None:
         self._targets, self._row = targets, 0

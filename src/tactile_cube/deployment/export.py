@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tactile_cube.deployment.controller import POLICY_RATE, Network, reading_size
+from tactile_cube.deployment.controller import POLICY_RATE, Network
 from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.limits import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
@@ -48,7 +48,7 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
             "name": "observation",
             "shape": ["batch", network.observation_size],
             "dtype": "float32",
-            "readings": network.observation_size // reading_size(hand),
+            "readings": network.observation_size // (2 * hand.joints),
             "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
             "unit": "rad, not scaled",
             "at_start": "the first reading fills all places",

@@ -25,15 +25,9 @@ def require_positive(numbers: Mapping[str, float]) -> None:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Range, rate and torque of the desired angles.
+    """Range `lower` to `upper` `(joints,)` [rad], rate [rad/s] and torque K_P (q_d - q_m) [N m] of desired angles q_d.
 
-    Attributes:
-        lower: `(joints,)` [rad].
-        upper: `(joints,)` [rad].
-        rate: largest change of a desired angle [rad/s].
-        torque: largest torque K_P (q_d - q_m) that a command may demand [N m].
-        kp: stiffness of the impedance law `(joints,)` [N m/rad].
-        kd: its damping `(joints,)` [N m s/rad]; it only brakes, so no limit depends on it.
+    With the gains of the impedance law `(joints,)`: kp [N m/rad], and kd [N m s/rad], which only brakes.
 
     Raises:
         InputError: a limit that bounds nothing.
