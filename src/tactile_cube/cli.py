@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, NoReturn
 from tactile_cube.api.job import Job, typed_job
 from tactile_cube.command_help import CONFIG, help_text
 from tactile_cube.composition import refuse_unknown_keys, with_recipe
-from tactile_cube.console_log import console_kept_in
-from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in
+from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in, console_kept_in
 from tactile_cube.usage_error import usage_error
 
 if TYPE_CHECKING:

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from tactile_cube.deployment.command_guard import CommandGuard
-from tactile_cube.deployment.control_loop import ControlLoop, Mode
+from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.run_loop import HOLD_TICKS, LoopRun, run_loop

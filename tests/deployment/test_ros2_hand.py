@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactile_cube.deployment.control_loop import ControlLoop
+from tactile_cube.deployment.control_loop import ControlLoop, Homing
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.ros2_hand import Ros2Hand
 from tactile_cube.deployment.run_loop import LoopRun, run_loop

@@ -11,10 +11,9 @@ from hydra.utils import instantiate
 from omegaconf import OmegaConf
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-from tactile_cube.deployment.control_loop import ControlLoop
+from tactile_cube.deployment.control_loop import ControlLoop, open_angles
 from tactile_cube.deployment.controller import Network, PlayedTargets, PolicyController, excited_targets, read_network
 from tactile_cube.deployment.export import export_policy
-from tactile_cube.deployment.homing import open_angles
 from tactile_cube.deployment.limits import JointLimits
 from tactile_cube.deployment.robot import Robot
 from tactile_cube.deployment.run_loop import LoopRun, run_loop, write_runs

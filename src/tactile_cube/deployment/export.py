@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.controller import POLICY_RATE, Network
-from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.limits import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError

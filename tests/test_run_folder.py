@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.cli import PIPE_CLOSED
-from tactile_cube.console_log import console_kept_in
+from tactile_cube.run_folder import console_kept_in
 
 
 def test_lines_errors_and_lines_in_place_are_kept_without_colours(
@@ -38,7 +38,7 @@ def test_the_next_session_appends(tmp_path: Path) -> None:
 
 def test_a_reader_that_leaves_ends_the_command_without_a_word(tmp_path: Path) -> None:
     talks = (
-        "from pathlib import Path; from tactile_cube.console_log import console_kept_in\n"
+        "from pathlib import Path; from tactile_cube.run_folder import console_kept_in\n"
         "from tactile_cube.cli import quiet_when_nobody_reads\n"
         f"with quiet_when_nobody_reads(), console_kept_in(Path({str(tmp_path / 'talk.log')!r})):\n"
         "    for line in range(100_000): print('line', line)\n"
