@@ -5,18 +5,22 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from hydra.errors import HydraException
 from hydra.utils import instantiate
+from omegaconf import OmegaConf
 from torchrl.objectives import SACLoss, TD3Loss
 
 from tactile_cube import cli
 from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import Sac
 from tactile_cube.api.environment import env_config
-from tactile_cube.composition import composed
+from tactile_cube.command_help import help_text
+from tactile_cube.composition import composed, refuse_unknown_keys
 from tactile_cube.curriculum import NoCurriculum
 from tactile_cube.errors import InputError
 from tactile_cube.sweep import sweep_folder
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
+from tactile_cube.usage_error import usage_error
 
 
 @pytest.mark.parametrize(
@@ -44,7 +48,7 @@ from tactile_cube.training.settings import CollectorSettings, RunSettings, Train
 def test_wrong_values_are_told_by_key_value_and_remedy(make: Callable[[], Any], expected: str) -> None:
     with pytest.raises(Exception) as info:  # noqa: PT011 - the kinds differ, what is told is the claim
         make()
-    message = cli.usage_error(info.value)
+    message = usage_error(info.value)
     assert message is not None
     assert message.startswith(expected)
     assert "\n" not in message
@@ -53,25 +57,25 @@ def test_wrong_values_are_told_by_key_value_and_remedy(make: Callable[[], Any], 
 def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:
     wrapped = RuntimeError("Error in call to target")
     wrapped.__cause__ = InputError("row 3: NaN")
-    assert cli.usage_error(wrapped) == "row 3: NaN"
+    assert usage_error(wrapped) == "row 3: NaN"
 
 
 @pytest.mark.parametrize("choice", ["task=1", "task=[1]"])
 def test_a_choice_that_is_no_name_is_told_in_one_line(choice: str) -> None:
     with pytest.raises((TypeError, ValueError)) as info:
         composed("train", [choice])
-    message = cli.usage_error(info.value)
+    message = usage_error(info.value)
     assert message is not None
     assert message.startswith("a choice from a group of conf/ is the name of a file there")
 
 
 def test_errors_of_the_program_are_not_the_users() -> None:
-    assert cli.usage_error(KeyError("x")) is None
-    assert cli.usage_error(FileNotFoundError(errno.ENOENT, "gone", "a.csv")) is None
+    assert usage_error(KeyError("x")) is None
+    assert usage_error(FileNotFoundError(errno.ENOENT, "gone", "a.csv")) is None
 
 
 def test_a_full_disk_is_said_with_the_file_and_a_way_out() -> None:
-    message = cli.usage_error(OSError(errno.ENOSPC, "No space left on device", "report.html"))
+    message = usage_error(OSError(errno.ENOSPC, "No space left on device", "report.html"))
     assert message is not None
     assert message.startswith("report.html: the disk is full")
     assert "hydra.run.dir" in message
@@ -87,8 +91,8 @@ def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str
 def test_a_value_that_another_choice_of_a_group_had_is_named() -> None:
     with pytest.raises(InputError) as info:
         env_config("+experiment=alone", "curriculum=linear")
-    assert str(info.value).startswith("curriculum.low: LinearCurriculum has no low")
-    assert "~curriculum.low" in str(info.value)
+    assert "LinearCurriculum.__init__() got an unexpected keyword argument" in str(info.value)
+    assert "full_key: env.curriculum; if it was set for another choice of the group, ~GROUP.KEY" in str(info.value)
     assert env_config("+experiment=alone", "curriculum=linear", "~curriculum.low", "~curriculum.high").curriculum
 
 
@@ -104,3 +108,39 @@ def test_folders_of_a_sweep_neither_begin_with_a_dash_nor_nest_nor_grow_too_long
     long = [sweep_folder("x" * 300 + end, 0) for end in "ab"]
     assert len(long[0]) < 255
     assert long[0] != long[1]
+
+
+def test_help_marks_the_default_of_each_group() -> None:
+    text = help_text("train")
+    assert "*full" in text
+    assert "*multi_sync" in text
+    assert " seed: 0" in text
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"),
+    [
+        ("agent.gama=1", "agent.gamma"),
+        ("gamma=1", "agent.gamma"),
+        ("trainig.steps=1", "training"),
+        ("taks=table", "task"),
+        ("task=tabel", "task=table"),
+        ("+experiment=curiculum", "experiment=curriculum"),
+        ("xyzzy=1", ""),
+        ("rerun=false", ""),  # another command's
+    ],
+)
+def test_the_nearest_option_or_key_is_offered(word: str, expected: str) -> None:
+    with pytest.raises(HydraException) as info:
+        composed("train", [word])
+    message = usage_error(info.value)
+    assert message is not None
+    assert message.partition("; did you mean ")[2] == (expected and f"{expected}?")
+
+
+def test_a_key_that_settings_or_a_command_do_not_know_gets_one_too() -> None:
+    with pytest.raises(ValueError, match="stepz") as info:
+        TrainingSettings(stepz=3)
+    assert str(usage_error(info.value)) == "training.stepz: no such setting; did you mean training.steps?"
+    with pytest.raises(InputError, match=r"^experimnt: no such setting of train; .*; did you mean experiment\?$"):
+        refuse_unknown_keys("train", OmegaConf.create({"experimnt": "paper"}))

@@ -63,7 +63,7 @@ def loop(name: str, data: Path, out: Path) -> dict[str, Any]:
             write_recording(recording / part, tables)
     started = time.perf_counter()
     fresh = not (diagnosed / "diagnosis.json").is_file()
-    command("diagnose", diagnosed, f"recording={recording}", "engine=fast", "rerun=false")
+    command("diagnose", diagnosed, f"recording={recording}", "engine=fast")
     diagnosis = json.loads((diagnosed / "diagnosis.json").read_text())
     errors = {}
     for label, model in (("stated", "null"), ("found", str(diagnosed / "model.yaml"))):

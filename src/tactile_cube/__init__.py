@@ -32,28 +32,23 @@ if TYPE_CHECKING:
     from tactile_cube.measurement.recordings.reading import read_recording
 
 _PLACES = {
-    "compare": "api.comparison",
-    "deploy": "api.deployment",
-    "diagnose": "api.diagnosis",
-    "diagnose_each": "api.batch",
-    "effects": "api.effects",
-    "env_config": "api.environment",
-    "make_env": "api.environment",
-    "evaluate": "api.evaluation",
-    "export": "api.deployment",
-    "load_policy": "api.deployment",
-    "identify": "api.identification",
-    "search_grasps": "api.environment",
-    "monitor": "api.monitoring",
-    "record": "api.recording",
-    "train": "api.training",
-    "view": "api.view",
-    "read_model": "drivetrain.model_file",
-    "TrialArrays": "measurement.recordings.arrays",
-    "recording_from_arrays": "measurement.recordings.arrays",
-    "read_recording": "measurement.recordings.reading",
+    "api.batch": ["diagnose_each"],
+    "api.comparison": ["compare"],
+    "api.deployment": ["deploy", "export", "load_policy"],
+    "api.diagnosis": ["diagnose"],
+    "api.effects": ["effects"],
+    "api.environment": ["env_config", "make_env", "search_grasps"],
+    "api.evaluation": ["evaluate"],
+    "api.identification": ["identify"],
+    "api.monitoring": ["monitor"],
+    "api.recording": ["record"],
+    "api.training": ["train"],
+    "api.view": ["view"],
+    "drivetrain.model_file": ["read_model"],
+    "measurement.recordings.arrays": ["TrialArrays", "recording_from_arrays"],
+    "measurement.recordings.reading": ["read_recording"],
 }
-
+"""Module -> what the package takes from it, as for type checkers above."""
 __all__ = [
     "InputError",
     "TrialArrays",
@@ -80,11 +75,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)
-    globals()[name] = value
-    return value
+    for module, names in _PLACES.items():
+        if name in names:
+            globals()[name] = getattr(importlib.import_module(f"{__name__}.{module}"), name)
+            return globals()[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 # Gymnasium 1 loads no entry points of other packages

@@ -8,8 +8,7 @@ import sys
 from tactile_cube.cli import fail, quiet_when_nobody_reads
 from tactile_cube.command_help import commands
 from tactile_cube.did_you_mean import suggestion
-
-USAGE_ERROR = 2
+from tactile_cube.run_folder import USAGE_ERROR
 
 
 @quiet_when_nobody_reads()
@@ -18,20 +17,15 @@ def main() -> None:
     known = commands()
     words = sys.argv[1:]
     if not words or words[0] in ("-h", "--help"):
-        print(usage(known))
+        print("tactile-cube COMMAND [group=option] [key=value] ...\n\nCommands:")
+        for name, summary in known.items():
+            print(f"  {name:<{max(map(len, known))}} {summary}")
+        print("\ntactile-cube COMMAND --help lists its groups and keys.")
         sys.exit(0 if words else USAGE_ERROR)
     if words[0] not in known:
         fail(f"{words[0]}: no such command; choose one of {', '.join(known)}{suggestion(words[0], known)}")
     sys.argv = [f"tactile_cube.{words[0]}", *words[1:]]
     runpy.run_module(f"tactile_cube.{words[0]}", run_name="__main__")
-
-
-def usage(known: dict[str, str]) -> str:
-    """The commands, a line each."""
-    lines = ["tactile-cube COMMAND [group=option] [key=value] ...", "", "Commands:"]
-    width = max(map(len, known))
-    lines += [f"  {name:<{width}} {summary}" for name, summary in known.items()]
-    return "\n".join([*lines, "", "tactile-cube COMMAND --help lists its groups and keys."])
 
 
 if __name__ == "__main__":

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import yaml
 
-from tactile_cube.command_help import CONFIG
+from tactile_cube.command_help import CONFIG, RECIPE
 from tactile_cube.did_you_mean import near_key
 from tactile_cube.errors import InputError
 
@@ -57,3 +58,16 @@ def refuse_unknown_keys(name: str, config: DictConfig) -> None:
     for key in map(str, config.keys() - known):
         if not (CONFIG / key).is_dir():
             raise InputError(f"{key}: no such setting of {name}; --help lists them{near_key(key)}")
+
+
+def with_recipe(name: str, words: list[str]) -> list[str]:
+    """The words of a command line, with the command's recipe in front of the first `key=value` unless they choose one.
+
+    Example:
+        >>> with_recipe("train", ["train", "seed=1", "--cfg", "job"])
+        ['train', '+experiment=curriculum', 'seed=1', '--cfg', 'job']
+    """
+    if name not in RECIPE or any(re.match(r"[+~]*experiment\b", word) for word in words):
+        return words
+    first = next((at for at, word in enumerate(words) if re.match(r"[+~]*[\w./@]+=", word)), len(words))
+    return [*words[:first], f"+experiment={RECIPE[name]}", *words[first:]]

@@ -2,7 +2,6 @@
 
 import difflib
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -27,39 +26,23 @@ def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
     return f"; did you mean {prefix}{near[0]}?" if near else ""
 
 
-def near_option(error: BaseException) -> str:
-    """Return the suggestion for an option or a key that Hydra did not find, or nothing.
-
-    Args:
-        error: of Hydra; one of OmegaConf caused it where a key is unknown.
-    """
-    from hydra.errors import MissingConfigException
-    from omegaconf.errors import OmegaConfBaseException
-
-    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
-        group, _, option = error.missing_cfg_file.rpartition("/")
-        return suggestion(option, map(str, error.options or ()), f"{group}=")
-    cause = error.__cause__ or error.__context__
-    return near_key(str(cause.full_key)) if isinstance(cause, OmegaConfBaseException) else ""
-
-
 def near_key(name: str) -> str:
     """Return the suggestion for a key of the configuration that does not exist, e.g. `agent.gama`."""
-    keys = _keys(CONFIG)
+    keys = sorted(_keys())
     if name in keys:  # another command may have that very key
         return ""
     last = name.rpartition(".")[2]
-    same_name = [known for known in sorted(keys) if known.rpartition(".")[2] == last]
-    near = difflib.get_close_matches(name, sorted(keys), 1, 0.75) or difflib.get_close_matches(name, same_name, 1, 0.0)
+    same_name = [known for known in keys if known.rpartition(".")[2] == last]
+    near = difflib.get_close_matches(name, keys, 1, 0.75) or difflib.get_close_matches(name, same_name, 1, 0.0)
     return suggestion(near[0], near) if near else ""
 
 
-def _keys(tree: Path) -> set[str]:
+def _keys() -> set[str]:
     """Dotted keys and groups of the configuration, as far as its files name them."""
-    keys = {str(folder.relative_to(tree)) for folder in tree.iterdir() if folder.is_dir()}
-    for path in tree.rglob("*.yaml"):
+    keys = {folder.name for folder in CONFIG.iterdir() if folder.is_dir()}
+    for path in CONFIG.rglob("*.yaml"):
         text = path.read_text(encoding="utf-8")
-        groups = () if "@package _global_" in text else path.relative_to(tree).parent.parts
+        groups = () if "@package _global_" in text else path.relative_to(CONFIG).parent.parts
         keys.update(_dotted(yaml.safe_load(text), ".".join(groups)))
     return keys
 

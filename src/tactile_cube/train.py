@@ -7,12 +7,9 @@ of them in its own, and bullet/ and mujoco/ with the judgement.
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from tactile_cube.api.job import Job
 from tactile_cube.cli import command
-
-if TYPE_CHECKING:
-    from omegaconf import DictConfig
 
 
 def sweep_summary(folders: list[Path]) -> None:
@@ -27,19 +24,17 @@ def sweep_summary(folders: list[Path]) -> None:
 
 
 @command("train", after_sweep=sweep_summary)
-def main(config: "DictConfig") -> None:
+def main(job: Job) -> None:
     """Train, and end with a status that a script or a sweep understands."""
     import sys
 
     from hydra.core.hydra_config import HydraConfig
     from hydra.types import RunMode
 
-    from tactile_cube.api.job import typed_job
     from tactile_cube.api.training import run_training
     from tactile_cube.training.collection import CollectionError
     from tactile_cube.training.run import INTERRUPTED
 
-    job = typed_job(config)
     try:
         result = run_training(job)
     except CollectionError as error:

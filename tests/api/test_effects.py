@@ -34,7 +34,6 @@ def test_a_description_shows_law_parameters_signature_and_source() -> None:
         stiction.law,
         "In data: spikes after standstill",
         "Source: Armstrong",
-        "(acts on: f",
     ):
         assert part in stiction.text
 

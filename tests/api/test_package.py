@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 import tactile_cube
-
-COMMANDS = ("compare", "deploy", "diagnose", "effects", "evaluate", "export", "identify", "monitor", "record", "train")
-COMMANDS += ("view",)
+from tactile_cube.command_help import commands
 
 
 def test_importing_the_package_imports_nothing_slow() -> None:
@@ -47,7 +45,7 @@ def package(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
 def test_commands_are_words_of_the_package_too(tmp_path: Path) -> None:
     listed = package("--help", folder=tmp_path)
     assert listed.returncode == 0
-    assert all(f"  {name} " in listed.stdout for name in COMMANDS)
+    assert all(f"  {name} " in listed.stdout for name in commands())
     asked = package("compare", "recording=here", "--cfg", "job", folder=tmp_path)
     assert asked.returncode == 0, asked.stderr
     assert "recording: here" in asked.stdout
@@ -59,3 +57,10 @@ def test_a_word_that_is_no_command_ends_with_the_commands_there_are(tmp_path: Pa
     assert run.stderr.startswith("error: evalute: no such command; choose one of average, compare, deploy")
     assert run.stderr.endswith("; did you mean evaluate?\n")
     assert run.stderr.count("\n") == 1
+
+
+def test_every_command_can_be_imported() -> None:
+    # in a process of its own: a command's module takes the place of the package's function of that name
+    imports = "".join(f"from tactile_cube.{name} import main\nassert callable(main)\n" for name in commands())
+    done = subprocess.run([sys.executable, "-c", imports], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -53,13 +53,5 @@ def test_every_experiment_is_pinned_and_nothing_else() -> None:
     assert sorted(yaml.safe_load(PINNED.read_text())) == EXPERIMENTS
 
 
-def test_alone_is_taught_by_nobody_and_pays_for_a_turn_as_published() -> None:
-    alone, published = settings("+experiment=alone"), settings()
-    assert (alone["exploration.demonstrations"], alone["agent.demonstration_weight"]) == (0.0, 0)
-    assert not any("teacher" in key or "gait" in key for key in alone)
-    fingers = 4
-    assert alone["reward.spin"] + fingers * alone["reward.advance"] == published["reward.spin"] == 16
-
-
 if __name__ == "__main__":
     pin()

@@ -16,28 +16,25 @@ def run(name: str, *arguments: str, folder: Path) -> subprocess.CompletedProcess
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240, check=False)
 
 
+def made_rig(folder: Path, *settings: str) -> tuple[str, ...]:
+    """Words of `record` for a rig with two joints, whose URDF is written into the folder."""
+    (folder / "two.urdf").write_text(URDF)
+    return ("out=made", "source=rig", "source.urdf=two.urdf", "source.initialisations=2", *settings)
+
+
 def test_record_then_compare(tmp_path: Path) -> None:
-    (tmp_path / "two.urdf").write_text(URDF)
-    settings = [
-        "source=rig",
-        "source.urdf=two.urdf",
-        "source.duration=2",
-        "source.step=0.002",
-        "source.initialisations=2",
-    ]
-    made = run("record", "out=made", *settings, folder=tmp_path)
+    words = made_rig(tmp_path, "source.duration=2", "source.step=0.002")
+    made = run("record", *words, folder=tmp_path)
     assert made.returncode == 0, made.stderr
     assert "8 trials" in made.stdout
-    again = run("record", "out=made", *settings, folder=tmp_path)
+    again = run("record", *words, folder=tmp_path)
     assert again.returncode == 2
     assert "holds a recording already" in again.stderr
 
     compared = run("compare", "recording=made", "band.simulations=3", "hydra.run.dir=run", folder=tmp_path)
     assert compared.returncode == 0, compared.stderr
-    result = json.loads((tmp_path / "run" / "comparison.json").read_text())
-    assert result["error"]["overall"] > 0
-    for file in ("report.html", "comparison.rrd"):
-        assert (tmp_path / "run" / file).is_file()
+    assert json.loads((tmp_path / "run" / "comparison.json").read_text())["error"]["overall"] > 0
+    assert {"report.html", "comparison.rrd"} <= {path.name for path in (tmp_path / "run").iterdir()}
 
 
 def test_a_csv_import_that_failed_does_not_block_the_corrected_command(tmp_path: Path) -> None:
@@ -64,15 +61,13 @@ def test_a_csv_import_that_failed_does_not_block_the_corrected_command(tmp_path:
 
 
 def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:
-    (tmp_path / "two.urdf").write_text(URDF)
-    settings = ["source.duration=4", "source.initialisations=2", "source.kinds=[ramps,multisine]"]
-    hidden = 'source.hidden=["torque_bias@b: bias=0.05"]'
-    made = run("record", "out=made", "source=rig", "source.urdf=two.urdf", *settings, hidden, folder=tmp_path)
+    settings = ["source.duration=4", "source.kinds=[ramps,multisine]", 'source.hidden=["torque_bias@b: bias=0.05"]']
+    made = run("record", *made_rig(tmp_path, *settings), folder=tmp_path)
     assert made.returncode == 0, made.stderr
     words = ["recording=made", "engine=fast"]
     fitted = run("identify", *words, "effects=[torque_bias@b]", "hydra.run.dir=known", folder=tmp_path)
     assert fitted.returncode == 0, fitted.stderr
-    words += ["rerun=false", "hydra.run.dir=run"]
+    words += ["hydra.run.dir=run"]
     asked = run("diagnose", *words, "model=known/model.yaml", folder=tmp_path)
     assert asked.returncode == 0, asked.stderr
     result = json.loads((tmp_path / "run" / "diagnosis.json").read_text())

@@ -1,9 +1,10 @@
-"""Every choice of train's configuration composes and instantiates."""
+"""Every choice of train's configuration composes and instantiates; sources of recordings are those of their class."""
 
+import inspect
 from pathlib import Path
 
 import pytest
-from hydra.utils import instantiate
+from hydra.utils import get_class, instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from tactile_cube import composition
@@ -68,3 +69,10 @@ def test_an_ablation_changes_the_recipe_and_makes_an_environment(part: str) -> N
     assert ablated == composed("+experiment=ablations", f"without={part}")
     assert (ablated == recipe) == (part == "nothing")
     assert as_environment(instantiate(ablated.env)).sizes.action == 12
+
+
+@pytest.mark.parametrize("source", sorted(path.stem for path in (CONFIG / "source").glob("*.yaml")))
+def test_a_source_has_the_settings_of_its_class(source: str) -> None:
+    settings = OmegaConf.to_container(composition.composed("record", [f"source={source}", "out=somewhere"]).source)
+    cls = get_class(settings.pop("_target_"))
+    assert set(settings) == set(inspect.signature(cls).parameters)

@@ -10,7 +10,7 @@ import torch
 
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
-from tactile_cube.deployment.controller import Network, PolicyController, TargetFilter, read_network
+from tactile_cube.deployment.controller import Network, PolicyController, read_network
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policies import ActorPolicy
@@ -20,8 +20,8 @@ from tactile_cube.transforms import EnvConfig, make_env
 
 def make_network(folder: Path) -> tuple[Actor, Network]:
     torch.manual_seed(0)
-    actor = Actor(Sizes(120, 0, 12), (64, 64))
-    save_policy(folder / "policy.safetensors", actor, PolicyInfo.describe(actor))
+    actor = Actor(Sizes(120, 0, 12), (512, 512))
+    save_policy(folder / "policy.safetensors", actor, PolicyInfo.describe(actor, time_constant=0.5))
     return actor, read_network(folder / "policy.safetensors")
 
 
@@ -53,14 +53,6 @@ def test_reset_forgets_the_past(tmp_path: Path) -> None:
     np.testing.assert_array_equal(controller.step(np.full(12, 0.1), np.full(12, 0.2)), first)
 
 
-def test_the_filter_reaches_63_percent_after_its_time_constant() -> None:
-    for rate in (500.0, 1000.0):
-        low_pass = TargetFilter(0.5, rate)
-        for _ in range(round(0.5 * rate)):
-            low_pass.step(np.ones(12))
-        np.testing.assert_allclose(low_pass.filtered, 1.0 - np.exp(-1.0))
-
-
 def test_a_policy_of_another_shape_is_refused() -> None:
     weight, bias = np.zeros((24, 100), dtype=np.float32), np.zeros(24, dtype=np.float32)
     with pytest.raises(InputError, match="maps 100 numbers to 12"):
@@ -75,23 +67,10 @@ def test_the_robots_computer_needs_no_torch() -> None:
     assert run.stdout.strip() == "False"
 
 
-@pytest.fixture
-def policy(tmp_path: Path) -> tuple[Path, Actor]:
-    torch.manual_seed(0)
-    actor = Actor(Sizes(120, 0, 12), (512, 512))
-    save_policy(tmp_path / "policy.safetensors", actor, PolicyInfo.describe(actor, time_constant=0.5))
-    return tmp_path / "policy.safetensors", actor
-
-
-def test_numpy_and_torch_give_the_same_action(policy: tuple[Path, Actor]) -> None:
-    path, actor = policy
+def test_numpy_and_torch_give_the_same_action(tmp_path: Path) -> None:
+    actor, network = make_network(tmp_path)
     observation = np.random.default_rng(1).normal(0.0, 0.5, (50, 120)).astype(np.float32)
     with torch.no_grad():
         expected = actor.deterministic(torch.from_numpy(observation)).numpy()
-    np.testing.assert_allclose(read_network(path)(observation), expected, atol=2e-6)
-
-
-def test_metadata_comes_along(policy: tuple[Path, Actor]) -> None:
-    network = read_network(policy[0])
-    assert (network.observation_size, network.action_size) == (120, 12)
+    np.testing.assert_allclose(network(observation), expected, atol=2e-6)
     assert network.info["time_constant"] == 0.5

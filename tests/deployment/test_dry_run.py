@@ -10,7 +10,7 @@ from hydra.utils import instantiate
 
 import tactile_cube
 from tactile_cube.composition import composed
-from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.limits import RATE, StopRules
 
 

@@ -13,8 +13,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactile_cube.deployment.control_loop import ControlLoop
-from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.control_loop import ControlLoop, Homing
 from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.run_loop import run_loop
 from tests.deployment.following_robot import (

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactile_cube.deployment.control_loop import ControlLoop
+from tactile_cube.deployment.control_loop import ControlLoop, Homing
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.homing import Homing
 from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.ros2_hand import Ros2Hand
 from tactile_cube.deployment.run_loop import LoopRun, run_loop
@@ -118,7 +117,7 @@ def run(robot: Loopback, opened: bool = False) -> LoopRun:
 
 def test_the_loop_runs_to_its_end_on_the_node(node: Node) -> None:
     ended = run(Loopback(node))
-    assert (ended.reason, len(ended.log.time)) == ("time is over", 500)
+    assert (ended.reason, len(ended.log)) == ("time is over", 500)
     assert node.destroyed
     assert not node.open
 

@@ -8,20 +8,17 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from tactile_cube.api.comparison import opened
+from tactile_cube.api.diagnosis import diagnose
 from tactile_cube.api.job import PathLike
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.whole_file import write_whole
-
-if TYPE_CHECKING:
-    from tactile_cube.measurement.recordings.recording import Recording
 
 T = TypeVar("T")
 R = TypeVar("R")
-LOCAL = "local"
-"""The address of a Ray cluster of one's own."""
 START = 120.0
 """Longest wait [s] for a cluster of one's own: a node has 30 s, which a busy machine may not keep."""
 
@@ -48,7 +45,7 @@ def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1, address: str 
         return
     from tactile_cube.training.ray_cluster import RayCluster
 
-    cluster = RayCluster(None if address == LOCAL else address, jobs, START, "address")
+    cluster = RayCluster(None if address == "local" else address, jobs, START, "address")
     try:
         yield from cluster.each(work, over)
     finally:
@@ -56,15 +53,11 @@ def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1, address: str 
 
 
 class Answered(NamedTuple):
-    """What `diagnose` answered, away from what it was made of.
-
-    Attributes:
-        text: the answer in plain words.
-        data: the content of diagnosis.json.
-    """
+    """What `diagnose` answered, in plain words and as diagnosis.json has it, and the files that it writes."""
 
     text: str
     data: dict[str, Any]
+    files: dict[str, bytes]
 
 
 def diagnose_each(
@@ -107,17 +100,10 @@ def diagnose_each(
         (Path(out) / name).mkdir(parents=True, exist_ok=True)
         for file, content in found.files.items():
             write_whole(Path(out) / name / file, content)
-        yield folders[name], found.answer
+        yield folders[name], found
 
 
-class _Found(NamedTuple):
-    answer: Answered
-    files: dict[str, bytes]
-
-
-def _diagnosed(settings: Sequence[str], out: Path, named: tuple[str, Recording]) -> _Found | InputError:
-    from tactile_cube.api.diagnosis import diagnose
-
+def _diagnosed(settings: Sequence[str], out: Path, named: tuple[str, Recording]) -> Answered | InputError:
     name, recording = named
     try:
         found = diagnose(recording, *settings, say=lambda line: None)
@@ -128,4 +114,4 @@ def _diagnosed(settings: Sequence[str], out: Path, named: tuple[str, Recording])
         files = {path.name: path.read_bytes() for path in Path(place).iterdir()}
     # its commands name the model where it will be
     files["report.html"] = files["report.html"].replace(place.encode(), str(out / name).encode())
-    return _Found(Answered(found.text, found.data), files)
+    return Answered(found.text, found.data, files)

@@ -6,25 +6,20 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.drivetrain.model_file import ModelFile
-    from tactile_cube.measurement.comparing.comparison import Comparison
-    from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.drivetrain.model_file import ModelFile, as_model
+from tactile_cube.identification.contact.diagnosis import compare_contact
+from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
+from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
 class ComparisonResult:
-    """How far a model and a measurement are apart, and where.
-
-    Attributes:
-        comparison: errors by joint, trial and regime [rad], noise floor, residuals, simulated signals.
-        job: the call.
-        seconds: how long it took [s].
-    """
+    """How far a model and a measurement are apart, and where; `comparison` has errors by joint, trial and regime."""
 
     comparison: Comparison
     job: Job
@@ -50,8 +45,6 @@ class ComparisonResult:
     @property
     def data(self) -> dict[str, Any]:
         """The content of comparison.json: plain numbers, errors in rad."""
-        from tactile_cube.measurement.comparing.comparison import comparison_json
-
         config = self.job.config
         origin = {"model": config.model, "engine": config.engine, "command": self.job.command}
         return comparison_json(self.comparison) | origin | {"seconds": self.seconds}
@@ -91,34 +84,30 @@ def compare(
         >>> result = tactile_cube.compare("my_recording", model="model.yaml")
         >>> print(f"{1e3 * result.error:.2f} mrad, noise floor {1e3 * result.noise_floor:.2f} mrad")
     """
-    job = called_job("compare", settings, recording=recording_name(recording), model=model_name(model))
-    return run_comparison(job, opened(recording), modelled(model), say or job.say)
+    job = called_job("compare", settings, recording=recording, model=model)
+    return run_comparison(job, recording, model, say)
 
 
-def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say: Say) -> ComparisonResult:
+def run_comparison(
+    job: Job, recording: Recording | PathLike, model: ModelFile | PathLike | None, say: Say | None = None
+) -> ComparisonResult:
     """Compare as a job says: free motion, or grasps where there is nothing else."""
-    from tactile_cube.identification.contact.diagnosis import compare_contact
-    from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
-    from tactile_cube.measurement.comparing import comparison
-
-    config = job.config
+    config, say = job.config, say or job.say
+    model, recording = modelled(model), opened(recording)
     held = len(with_object(recording).trials)
     if held and not has_free_motion(recording):
-        compared = compare_contact(recording, model, config.step or comparison.USUAL_STEP, say)
+        compared = compare_contact(recording, model, config.step or USUAL_STEP, say)
         return ComparisonResult(compared, job, job.seconds)
     if held:
         say(f"{held} trials with an object are left out here; diagnose and identify use them")
     spread = {str(key): float(value) for key, value in config.band.spread.items()}
     band = (config.band.simulations, spread, config.seed)
-    compared = comparison.compare_recording(without_touches(recording), model, config.engine, config.step, *band)
+    compared = compare_recording(without_touches(recording), model, config.engine, config.step, *band)
     return ComparisonResult(compared, job, job.seconds)
 
 
 def opened(recording: Recording | PathLike) -> Recording:
     """The recording, read if it is a folder's name; what is odd about it goes to stderr."""
-    from tactile_cube.measurement.recordings.reading import read_recording
-    from tactile_cube.measurement.recordings.recording import Recording
-
     if isinstance(recording, Recording):
         return recording
     read = read_recording(str(recording))  # on the command line 2026 is a number
@@ -127,20 +116,6 @@ def opened(recording: Recording | PathLike) -> Recording:
     return read
 
 
-def recording_name(recording: Recording | PathLike) -> str:
-    """The folder of a recording."""
-    return str(recording if isinstance(recording, str | Path) else recording.folder)
-
-
 def modelled(model: ModelFile | PathLike | None) -> ModelFile | None:
     """The model, read if it is a file's name."""
-    from tactile_cube.drivetrain.model_file import as_model
-
     return None if model is None else as_model(model)
-
-
-def model_name(model: ModelFile | PathLike | None) -> str | None:
-    """The file of a model; a model that is no file goes by its rig."""
-    if model is None or isinstance(model, str | Path):
-        return None if model is None else str(model)
-    return f"model of {model.rig}"

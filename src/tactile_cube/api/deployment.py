@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from hydra.utils import instantiate
+from omegaconf import OmegaConf
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.deployment.control_loop import ControlLoop
-    from tactile_cube.deployment.controller import Network, PlayedTargets
-    from tactile_cube.deployment.limits import JointLimits
-    from tactile_cube.deployment.robot import Robot
-    from tactile_cube.deployment.run_loop import LoopRun
-    from tactile_cube.deployment.training_setting import TrainingSetting
-    from tactile_cube.hand import Hand
+from tactile_cube.deployment.control_loop import ControlLoop, open_angles
+from tactile_cube.deployment.controller import Network, PlayedTargets, PolicyController, excited_targets, read_network
+from tactile_cube.deployment.export import export_policy
+from tactile_cube.deployment.limits import JointLimits
+from tactile_cube.deployment.robot import Robot
+from tactile_cube.deployment.run_loop import LoopRun, run_loop, write_runs
+from tactile_cube.deployment.simulated_hand import SimulatedHand
+from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.policy_path import policy_path
+from tactile_cube.hand import Hand
+from tactile_cube.simulation import constants_of
 
 
 @as_input_errors
@@ -31,9 +38,6 @@ def load_policy(policy: PathLike | None = None) -> Network:
     Example:
         >>> action = tactile_cube.load_policy("table")(observation)
     """
-    from tactile_cube.deployment.controller import read_network
-    from tactile_cube.evaluation.policy_path import policy_path
-
     return read_network(policy_path(None if policy is None else str(policy)))
 
 
@@ -52,40 +56,22 @@ def export(policy: PathLike | None, output: PathLike, *settings: str) -> Path:
     Raises:
         InputError: unknown ending, or ONNX is not installed.
     """
-    named = {"policy": None if policy is None else str(policy), "output": str(output)}
-    return run_export(called_job("export", settings, **named))[1]
+    return run_export(called_job("export", settings, policy=policy, output=output))[1]
 
 
 def run_export(job: Job) -> tuple[Path, Path]:
     """Write the files of a job; gives the network's and the contract's."""
-    from tactile_cube.deployment.export import FORMATS, export_policy
-    from tactile_cube.errors import InputError
-    from tactile_cube.evaluation.policy_path import policy_path
-
     config, source = job.config, policy_path(job.config.policy)
-    if config.output is None and config.format not in FORMATS:
-        raise InputError(f"format={config.format}: choose {' or '.join(FORMATS)}")
-    output = Path(config.output or f"{source.stem}.{config.format}")
+    output = Path(config.output or f"{source.stem}.npz")
     network = load_policy(source)
-    return output, export_policy(network, output, setting_of(config, network))
+    return output, export_policy(network, output, _setting(config, network))
 
 
-def setting_of(config: Any, network: Network, trained: bool = True) -> TrainingSetting:
-    """What the policy was trained with, on the hand and with the object that are named where its file cannot.
+def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSetting:
+    """What the policy was trained with, on the hand and with the object that `config` names where its file cannot.
 
-    Args:
-        config: with `hand` and `object` where they are named.
-        network: the policy.
-        trained: whether the hand has to be the policy's; else it is any, as for an excitation in place of a policy.
-
-    Raises:
-        InputError: a policy on another hand than its own.
+    With `trained`, the hand has to be the policy's; else it is any, as for an excitation in place of a policy.
     """
-    from hydra.utils import instantiate
-    from omegaconf import OmegaConf
-
-    from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
-
     hand: Hand | None = instantiate(config.hand, _convert_="all") if config.get("hand") else None
     if hand is not None and not trained:
         return TrainingSetting.of(hand)
@@ -100,8 +86,6 @@ class DeploymentResult:
     Attributes:
         runs: how each run ended, its log and its tick times.
         turned: how far the simulated hand turned the object the wanted way in each run [rad]; empty on another hand.
-        limits: of the commands.
-        job: the call.
         hand: the one that the policy was trained on.
     """
 
@@ -117,14 +101,8 @@ class DeploymentResult:
         lines = [f"run {number}: {run.reason}" for number, run in enumerate(self.runs)]
         if self.turned:
             lines = [f"{line}; cube turned {a:.2f} rad" for line, a in zip(lines, self.turned, strict=True)]
-        ticks = {name: 1e6 * value for name, value in self.runs[-1].tick_times.items()}
-        shown = ", ".join(f"{name} {value:.0f} us" for name, value in ticks.items())
+        shown = ", ".join(f"{name} {1e6 * value:.0f} us" for name, value in self.runs[-1].tick_times.items())
         return "\n".join([*lines, f"computing time of a tick: {shown}; a period lasts {1e6 / self.rate:.0f} us"])
-
-    @property
-    def touched(self) -> bool:
-        """Whether fingers touched what their recording does not describe: the object, or one another."""
-        return bool(self.turned) or self.job.config.motion == "policy"
 
     @property
     def rate(self) -> float:
@@ -133,9 +111,7 @@ class DeploymentResult:
 
     def write(self, folder: PathLike) -> Path | None:
         """Write the log of every run in which the policy decided as one recording; None if there is none."""
-        from tactile_cube.deployment.run_loop import write_runs
-
-        logs = [run.log for run in self.runs if run.log.time]
+        logs = [run.log for run in self.runs if run.log]
         resolution = float(self.job.config.robot.get("resolution", 0.0))
         return write_runs(logs, Path(folder), self.limits, self.rate, resolution, self.hand) if logs else None
 
@@ -152,18 +128,13 @@ def deploy(policy: PathLike | None = None, *settings: str, say: Say = print) -> 
     Raises:
         InputError: a policy without a filter time, a hand that is not there.
     """
-    return run_deployment(called_job("deploy", settings, policy=None if policy is None else str(policy)), say)
+    return run_deployment(called_job("deploy", settings, policy=policy), say)
 
 
 def run_deployment(job: Job, say: Say) -> DeploymentResult:
     """Home, run, stop, as often as the job says; every run with a new loop."""
-    from hydra.utils import instantiate
-
-    from tactile_cube.deployment.run_loop import run_loop
-    from tactile_cube.deployment.simulated_hand import SimulatedHand
-
     config, network = job.config, load_policy(job.config.policy)
-    setting = setting_of(config, network, config.motion == "policy")
+    setting = _setting(config, network, config.motion == "policy")
     limits = robot_limits(setting, config.rate_limit)
     target = str(config.robot._target_)
     simulated = target.endswith(".SimulatedHand")
@@ -171,29 +142,20 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
     runs, turned = [], []
     for number in range(config.runs):
         seed = {"seed": config.seed + number} if simulated else {}
-        loop = control_loop(job, network, setting, limits)
+        loop = _control_loop(config, network, setting, limits)
         # partial: hydra would make a dictionary of a hand that it is given
         robot: Robot = instantiate(config.robot, _partial_=True, **seed)(**own)
         runs.append(run_loop(loop, robot, say))
-        if isinstance(robot, SimulatedHand) and robot.has_cube:
+        if isinstance(robot, SimulatedHand) and robot.cube:
             turned.append(robot.turned(runs[-1].ended))
         if runs[-1].interrupted:
             break
     return DeploymentResult(runs, turned, limits, job, setting.hand)
 
 
-def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: JointLimits) -> ControlLoop:
-    """A new loop as a job describes it."""
-    from hydra.utils import instantiate
-
-    from tactile_cube.deployment.control_loop import ControlLoop
-    from tactile_cube.deployment.controller import PolicyController, excited_targets
-    from tactile_cube.deployment.homing import open_angles
-    from tactile_cube.errors import InputError
-
-    config, hand = job.config, setting.hand
-    trained: Any = network.info.get("time_constant")
-    time_constant = trained if config.filter_time is None else config.filter_time
+def _control_loop(config: Any, network: Network, setting: TrainingSetting, limits: JointLimits) -> ControlLoop:
+    hand, trained = setting.hand, network.info.get("time_constant")
+    time_constant: Any = trained if config.filter_time is None else config.filter_time
     if time_constant is None:
         raise InputError("the policy file does not say its filter time T_s; give filter_time=SECONDS")
     rules, homing, seconds = instantiate(config.stop), instantiate(config.homing), config.seconds
@@ -206,19 +168,10 @@ def control_loop(job: Job, network: Network, setting: TrainingSetting, limits: J
 
 
 def robot_limits(setting: TrainingSetting, rate: float) -> JointLimits:
-    """The limits of the interface contract: the hand's range, the gains and the torque of the training.
+    """The limits of the interface contract, with the largest change [rad/s]; range, gains and torque of the training.
 
     A policy that was trained with a softer hand gets no wider commands: the stiffness is at least the hand's.
-
-    Args:
-        setting: of the training.
-        rate: largest change of a desired angle [rad/s].
     """
-    import numpy as np
-
-    from tactile_cube.deployment.limits import JointLimits
-    from tactile_cube.simulation import constants_of
-
     hand, constants = setting.hand, setting.constants
     gains = (np.maximum(constants.kp, constants_of(hand).kp), np.asarray(constants.kd))
     return JointLimits(hand.lower, hand.upper, rate, constants.torque_limit, *gains)

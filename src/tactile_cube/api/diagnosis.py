@@ -6,16 +6,23 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
+from tactile_cube.api.comparison import modelled, opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.drivetrain.model_file import ModelFile
-    from tactile_cube.identification.contact.diagnosis import ContactDiagnosis
-    from tactile_cube.identification.diagnosis import Diagnosis
-    from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.drivetrain.effects import catalogue, find_effect
+from tactile_cube.drivetrain.model_file import ModelFile, write_model
+from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, diagnose_contact, with_contact
+from tactile_cube.identification.contact.identification import stated_model
+from tactile_cube.identification.criteria import Criteria
+from tactile_cube.identification.diagnosis import Diagnosis, diagnose_recording, write_experiment
+from tactile_cube.identification.diagnosis_json import as_json
+from tactile_cube.identification.in_words import answer
+from tactile_cube.identification.recommended import model_file
+from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
+from tactile_cube.measurement.comparing.comparison import compare_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.nominal import require_same_joints
 
 SHAPES = 3  # of the missing torque of one joint, most telling first
 
@@ -25,13 +32,10 @@ class DiagnosisResult:
     """The answer, what supports it, and the model with the effects that were found.
 
     Attributes:
-        recording: what was measured.
         known: the model that it began with; None: what the recording states.
         free: the diagnosis of trials in free motion; None without such trials.
         contact: the diagnosis of trials in which the hand holds an object; None without such trials.
-        model: values, effects and intervals.
         data: the content of diagnosis.json: plain numbers, errors in rad.
-        job: the call.
     """
 
     recording: Recording
@@ -56,48 +60,38 @@ class DiagnosisResult:
     @property
     def text(self) -> str:
         """The answer in plain words."""
-        from tactile_cube.identification.in_words import answer
-
         return answer(self.data, self.free.experiment if self.free else None)
 
     def write(self, folder: PathLike) -> None:
         """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""
-        from tactile_cube.drivetrain.model_file import write_model
-        from tactile_cube.identification.diagnosis import write_experiment
+        from tactile_cube.visualization.report import write_report
 
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_model(self.model, folder / "model.yaml")
         (folder / "diagnosis.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
-        if self.free is None:
-            self._report_contact(folder, self.data)
-        else:
-            write_experiment(self.free, folder)
-            self._report_free(folder, self.data, self.free)
-
-    def _report_contact(self, folder: Path, data: dict[str, Any]) -> None:
-        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
-        from tactile_cube.visualization.report import write_report
-
-        path, made = str(folder / "model.yaml"), self.model.provenance
-        page = contact_diagnosis_report(data, self.model.rig, made.command, made.recording, path)
+        page = self._contact_page(folder) if self.free is None else self._free_page(folder, self.free)
         write_report(page, folder / "report.html")
 
-    def _report_free(self, folder: Path, data: dict[str, Any], found: Diagnosis) -> None:
-        from tactile_cube.measurement.bench import without_touches
-        from tactile_cube.measurement.comparing.comparison import compare_recording
+    def _contact_page(self, folder: Path) -> Any:
+        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
+
+        made = self.model.provenance
+        path = str(folder / "model.yaml")
+        return contact_diagnosis_report(self.data, self.model.rig, made.command, made.recording, path)
+
+    def _free_page(self, folder: Path, found: Diagnosis) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
         from tactile_cube.visualization.diagnosis_report import diagnosis_report
-        from tactile_cube.visualization.report import write_report
 
+        write_experiment(found, folder)
         config, recording = self.job.config, without_touches(self.recording)
         before = compare_recording(recording, self.known, "fast", config.step, floor=found.floor)
         after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
+        write_comparison(after, folder / "diagnosis.rrd")
         shapes = [shape for one in found.unexplained for shape in one.shapes[:SHAPES]]
         path = str(folder / "model.yaml")
-        page = diagnosis_report(data, before, after, self.job.command, path, shapes, found.experiment)
-        write_report(page, folder / "report.html")
-        write_comparison(after, folder / "diagnosis.rrd")
+        return diagnosis_report(self.data, before, after, self.job.command, path, shapes, found.experiment)
 
 
 @as_input_errors
@@ -125,21 +119,15 @@ def diagnose(
         >>> print(found.text, found.verdict, found.effects)
         >>> found.write("outputs/my_diagnosis")
     """
-    job = called_job(
-        "diagnose",
-        settings,
-        recording=recording_name(recording),
-        model=model_name(model),
-        effects=list(effects) or None,
-    )
-    return run_diagnosis(job, opened(recording), modelled(model), say or job.say)
+    job = called_job("diagnose", settings, recording=recording, model=model, effects=list(effects) or None)
+    return run_diagnosis(job, recording, model, say)
 
 
-def run_diagnosis(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
+def run_diagnosis(
+    job: Job, recording: Recording | PathLike, known: ModelFile | PathLike | None, say: Say | None = None
+) -> DiagnosisResult:
     """Diagnose free motion, grasps, or both, as the recording has them."""
-    from tactile_cube.measurement.bench import has_free_motion, with_object
-    from tactile_cube.measurement.replay.nominal import require_same_joints
-
+    say, known, recording = say or job.say, modelled(known), opened(recording)
     if known is not None:
         require_same_joints(recording, known)
     if with_object(recording).trials and not has_free_motion(recording):
@@ -148,9 +136,6 @@ def run_diagnosis(job: Job, recording: Recording, known: ModelFile | None, say: 
 
 
 def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
-    from tactile_cube.identification.contact.diagnosis import diagnose_contact
-    from tactile_cube.identification.contact.identification import stated_model
-
     config = job.config
     contact = diagnose_contact(recording, known, config.step, config.seed, say)
     model = stated_model(recording, job.command, config.seed)
@@ -165,14 +150,6 @@ def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say
 
 
 def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
-    from tactile_cube.drivetrain.effects import catalogue, find_effect
-    from tactile_cube.identification.contact.diagnosis import diagnose_contact, with_contact
-    from tactile_cube.identification.criteria import Criteria
-    from tactile_cube.identification.diagnosis import diagnose_recording
-    from tactile_cube.identification.diagnosis_json import as_json
-    from tactile_cube.identification.recommended import model_file
-    from tactile_cube.measurement.bench import with_object, without_touches
-
     config = job.config
     effects = tuple(dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)]))
     moving = without_touches(recording)

@@ -7,27 +7,14 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 from tactile_cube.did_you_mean import suggestion
+from tactile_cube.drivetrain.effects import Effect, Parameter, catalogue
 from tactile_cube.errors import InputError
-
-if TYPE_CHECKING:
-    from tactile_cube.drivetrain.effects import Effect, Parameter
-    from tactile_cube.simulation.contact_effects import ContactEffect
+from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue
 
 NOTE = re.compile(r"^(In data|Confused with|Source): ", re.MULTILINE)
 COLUMNS = ("parameter", "unit", "neutral", "typical", "range searched", "source")
-ACTS_ON = {
-    "COMMAND": "command",
-    "VELOCITY_SENSOR": "measured velocity",
-    "MOTOR_TORQUE": "motor torque",
-    "DEFLECTION": "transmission",
-    "POSITION_SENSOR": "position sensor",
-    "JOINT_TORQUE": "joint torque",
-    "FRICTION": "friction",
-    "MECHANISM": "mechanism",
-}
 
 
 @dataclass(frozen=True)
@@ -78,9 +65,6 @@ def effects(name: str | None = None) -> tuple[EffectDescription, ...]:
         ...     print(effect.name, effect.summary)
         >>> print(tactile_cube.effects("stribeck_friction")[0].text)
     """
-    from tactile_cube.drivetrain.effects import catalogue
-    from tactile_cube.simulation.contact_effects import contact_catalogue
-
     known: dict[str, type[Effect] | type[ContactEffect]] = {**catalogue(), **contact_catalogue()}
     if name is None:
         return tuple(_described(kind) for kind in known.values())
@@ -108,7 +92,7 @@ def _described(kind: type[Effect] | type[ContactEffect]) -> EffectDescription:
     if simpler := getattr(kind, "contains", ()):
         notes["Special cases"] = ", ".join(f"`{name}`" for name in simpler)
     stage = getattr(kind, "stage", None)
-    acts_on = ACTS_ON[stage.name] if stage else "contact"
+    acts_on = stage.name.lower().replace("_", " ") if stage else "contact"
     return EffectDescription(kind.name, acts_on, " ".join(summary.split()), law, notes, kind.parameters)
 
 

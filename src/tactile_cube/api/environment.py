@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from hydra.utils import instantiate
+from torchrl.envs import TransformedEnv
+
+from tactile_cube import transforms
+from tactile_cube.agent.policy_file import current_commit
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.composition import composed
-
-if TYPE_CHECKING:
-    from torchrl.envs import TransformedEnv
-
-    from tactile_cube.randomization import Grasps
-    from tactile_cube.transforms import EnvConfig
+from tactile_cube.evaluation.grasp_search import find_grasps
+from tactile_cube.randomization import Grasps
+from tactile_cube.simulation import SimulationOptions, World
+from tactile_cube.transforms import EnvConfig
 
 
 @as_input_errors
@@ -25,8 +27,6 @@ def env_config(*settings: str) -> EnvConfig:
     Raises:
         InputError: a value that cannot be used.
     """
-    from hydra.utils import instantiate
-
     made: EnvConfig = instantiate(composed("train", settings).env)
     return made
 
@@ -45,9 +45,7 @@ def make_env(*settings: str, worlds: int = 1, seed: int = 0) -> TransformedEnv:
         >>> env = tactile_cube.make_env("task=table", worlds=4)
         >>> data = env.rollout(10)
     """
-    from tactile_cube.transforms import make_env as transformed
-
-    return transformed(env_config(*settings), worlds, seed)
+    return transforms.make_env(env_config(*settings), worlds, seed)
 
 
 @as_input_errors
@@ -67,12 +65,12 @@ def search_grasps(*settings: str, grasps: int = 2000, seed: int = 0) -> Grasps:
     Example:
         >>> tactile_cube.search_grasps("object=cylinder").save(Path("grasps.npz"))  # then start=grasps start.file=...
     """
-    from tactile_cube.agent.policy_file import current_commit
-    from tactile_cube.evaluation.grasp_search import find_grasps
-    from tactile_cube.simulation import World
-
-    config = env_config(*settings)
-    found = find_grasps(World(config.hand, config.simulation), config.constants, grasps, seed)
     words = ", ".join([*map(repr, settings), f"grasps={grasps}", f"seed={seed}"])
-    command = f"tactile_cube.search_grasps({words})"
-    return replace(found, origin={**found.origin, "command": command, "commit": current_commit()})
+    env = env_config(*settings)
+    return grasps_of(env, env.simulation, grasps, seed, f"tactile_cube.search_grasps({words})")
+
+
+def grasps_of(env: EnvConfig, options: SimulationOptions, grasps: int, seed: int, command: str) -> Grasps:
+    """Grasps of an environment's hand and object; their file says which command found them."""
+    found = find_grasps(World(env.hand, options), env.constants, grasps, seed)
+    return replace(found, origin=found.origin | {"command": command, "commit": current_commit()})

@@ -5,25 +5,21 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import torch
+from hydra.utils import instantiate
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.evaluation.episode_record import EpisodeRecord
-    from tactile_cube.evaluation.evaluation import Evaluation, EvaluationRun, VariantResult
-    from tactile_cube.evaluation.summary import Summary
+from tactile_cube.evaluation.environment import environment, worlds
+from tactile_cube.evaluation.episode_record import EpisodeRecord
+from tactile_cube.evaluation.evaluation import Evaluation, EvaluationRun, VariantResult, write_results
+from tactile_cube.evaluation.policies import find_policy
+from tactile_cube.evaluation.summary import HEADER, Summary, row
 
 
 @dataclass(frozen=True)
 class EvaluationResult:
-    """What came of a protocol.
-
-    Attributes:
-        run: what was run.
-        variants: what came of each condition, the first one first.
-        evaluation: runs an episode again.
-    """
+    """What came of a protocol: of each condition in `variants`, the protocol's first one first."""
 
     run: EvaluationRun
     variants: list[VariantResult]
@@ -46,8 +42,6 @@ class EvaluationResult:
 
     def write(self, folder: PathLike, film: bool = True) -> None:
         """Write results.json, the robustness map where conditions lie on axes, and films of the best episodes."""
-        from tactile_cube.evaluation.evaluation import write_results
-
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_results(folder / "results.json", self.run, self.variants)
@@ -83,21 +77,11 @@ def evaluate(
         >>> result = tactile_cube.evaluate("table", "protocol=smoke")
         >>> print(result.text, result.summary.mean_angle)
     """
-    names = {"policy": policy, "model": model}
-    job = called_job("evaluate", settings, **{key: None if name is None else str(name) for key, name in names.items()})
-    return run_evaluation(job, say)
+    return run_evaluation(called_job("evaluate", settings, policy=policy, model=model), say)
 
 
 def run_evaluation(job: Job, say: Say) -> EvaluationResult:
     """Run the episodes of a job's protocol."""
-    import torch
-    from hydra.utils import instantiate
-
-    from tactile_cube.evaluation.environment import environment, worlds
-    from tactile_cube.evaluation.evaluation import Evaluation, EvaluationRun
-    from tactile_cube.evaluation.policies import find_policy
-    from tactile_cube.evaluation.summary import HEADER, row
-
     torch.set_num_threads(1)
     config = job.config
     source = find_policy(config.policy)

@@ -6,16 +6,23 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tactile_cube.api.comparison import opened, recording_name
+from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.drivetrain.model_file import ModelFile
-    from tactile_cube.identification.contact.identification import ContactIdentification
-    from tactile_cube.identification.identification import Identification
-    from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.drivetrain.model_file import ModelFile, write_model
+from tactile_cube.identification.contact.identification import (
+    ContactIdentification,
+    contact_effects,
+    identify_contact,
+    stated_model,
+)
+from tactile_cube.identification.identification import Identification, identify_effects
+from tactile_cube.identification.in_words import errors_by_stage
+from tactile_cube.identification.recommended import model_file
+from tactile_cube.measurement.bench import has_free_motion, touch_offsets, without_touches
+from tactile_cube.measurement.comparing.comparison import compare_recording
+from tactile_cube.measurement.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -23,12 +30,9 @@ class IdentificationResult:
     """A fitted model, and the error after each stage.
 
     Attributes:
-        recording: what was measured.
         free: the fit of trials in free motion; None without such trials.
         contact: the fit of trials in which the hand holds an object; None without effects of fingertips and object.
-        model: values, effects and intervals.
         data: the content of identification.json: plain numbers, errors in rad.
-        job: the call.
     """
 
     recording: Recording
@@ -46,8 +50,6 @@ class IdentificationResult:
     @property
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
-        from tactile_cube.identification.in_words import errors_by_stage
-
         lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
         for parameter in self.contact.as_json()["silent"] if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
@@ -55,35 +57,30 @@ class IdentificationResult:
 
     def write(self, folder: PathLike) -> None:
         """Write model.yaml, identification.json, report.html and, of free motion, identification.rrd."""
-        from tactile_cube.drivetrain.model_file import write_model
+        from tactile_cube.visualization.diagnosis_report import contact_report
         from tactile_cube.visualization.report import write_report
 
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        write_model(self.model, folder / "model.yaml")
+        path = folder / "model.yaml"
+        write_model(self.model, path)
         (folder / "identification.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
         if self.free is not None:
-            write_report(self._free_report(folder, self.free), folder / "report.html")
+            write_report(self._free_page(folder, self.free), folder / "report.html")
         elif self.contact is not None:
-            from tactile_cube.visualization.diagnosis_report import contact_report
+            page = contact_report(self.contact, self.model.rig, self.job.command, str(path))
+            write_report(page, folder / "report.html")
 
-            path = str(folder / "model.yaml")
-            write_report(contact_report(self.contact, self.model.rig, self.job.command, path), folder / "report.html")
-
-    def _free_report(self, folder: Path, found: Identification) -> Any:
-        from tactile_cube.measurement.bench import without_touches
-        from tactile_cube.measurement.comparing.comparison import compare_recording
+    def _free_page(self, folder: Path, found: Identification) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
         from tactile_cube.visualization.diagnosis_report import contact_sections, identification_report
 
-        config, command = self.job.config, self.job.command
-        after = compare_recording(
-            without_touches(self.recording), self.model, config.engine, config.step, floor=found.floor
-        )
+        config, recording = self.job.config, without_touches(self.recording)
+        after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
         held = contact_sections(self.contact, alone=False) if self.contact else []
-        path = str(folder / "model.yaml")
-        return identification_report(after, self.data["error"], self.data["joints"], command, path, held)
+        stages, path = self.data["error"], str(folder / "model.yaml")
+        return identification_report(after, stages, self.data["joints"], self.job.command, path, held)
 
 
 @as_input_errors
@@ -107,15 +104,13 @@ def identify(
         >>> print(fitted.text, fitted.model.effects)
         >>> fitted.write("outputs/my_model")
     """
-    job = called_job("identify", settings, recording=recording_name(recording), effects=list(effects))
-    return run_identification(job, opened(recording), say or job.say)
+    job = called_job("identify", settings, recording=recording, effects=list(effects))
+    return run_identification(job, recording, say)
 
 
-def run_identification(job: Job, recording: Recording, say: Say) -> IdentificationResult:
+def run_identification(job: Job, recording: Recording | PathLike, say: Say | None = None) -> IdentificationResult:
     """Fit what a job names: effects of the drivetrain, of fingertips and object, or both."""
-    from tactile_cube.identification.contact.identification import contact_effects
-    from tactile_cube.measurement.bench import has_free_motion
-
+    say, recording = say or job.say, opened(recording)
     contact = contact_effects(job.config.effects, recording)
     names = [effect.name for effect in contact]
     drive = [name for name in job.config.effects if name not in names]
@@ -125,8 +120,6 @@ def run_identification(job: Job, recording: Recording, say: Say) -> Identificati
 
 
 def _of_grasps(job: Job, recording: Recording, effects: list[Any], say: Say) -> IdentificationResult:
-    from tactile_cube.identification.contact.identification import identify_contact, stated_model
-
     config = job.config
     found = identify_contact(recording, effects, None, config.step, config.seed, say)
     model = found.into(stated_model(recording, job.command, config.seed), alone=True)
@@ -139,11 +132,6 @@ def _of_grasps(job: Job, recording: Recording, effects: list[Any], say: Say) -> 
 def _of_free_motion(
     job: Job, recording: Recording, drive: list[str], effects: list[Any], say: Say
 ) -> IdentificationResult:
-    from tactile_cube.identification.contact.identification import identify_contact
-    from tactile_cube.identification.identification import identify_effects
-    from tactile_cube.identification.recommended import model_file
-    from tactile_cube.measurement.bench import touch_offsets, without_touches
-
     config = job.config
     moving = without_touches(recording)
     found = identify_effects(moving, drive, config.engine, config.step, config.seed, say)

@@ -6,20 +6,21 @@ import functools
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from tactile_cube.cli import usage_error, with_recipe
-from tactile_cube.composition import composed, refuse_unknown_keys
+from tactile_cube.composition import composed, refuse_unknown_keys, with_recipe
 from tactile_cube.errors import InputError
+from tactile_cube.usage_error import usage_error
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
 Say = Callable[[str], None]
 """Takes lines of progress, as `print` does."""
+shown_at_once: Say = functools.partial(print, flush=True)
 PathLike = str | Path
 EFFECTS = ("effects", "own_effects", "hidden")
 """Keys of the configuration that name effects."""
@@ -30,12 +31,10 @@ class Job:
     """One call of a command.
 
     Attributes:
-        config: its configuration.
-        folder: where its files go.
         command: the words on a command line that ask for the same.
         choices: group -> chosen option.
         words: of the command line, without those that are Hydra's own.
-        began: when it began, by `time.perf_counter` [s].
+        began: by `time.perf_counter` [s].
     """
 
     config: DictConfig
@@ -56,24 +55,29 @@ class Job:
 
 
 def typed_job(config: DictConfig) -> Job:
-    """The job that a command line asks for."""
+    """The job that a command line asks for.
+
+    Raises:
+        InputError: a class of effects that the configuration names cannot be imported.
+    """
     from hydra.core.hydra_config import HydraConfig
 
-    import_named_effects(config)
     hydra = HydraConfig.get()
-    words = ["python", "-m", f"tactile_cube.{hydra.job.config_name}", *sys.argv[1:]]
-    own = tuple(hydra.overrides.task)
-    return Job(config, Path(hydra.runtime.output_dir), shlex.join(words), dict(hydra.runtime.choices), own)
+    return _job(config, hydra, str(hydra.job.config_name), sys.argv[1:], hydra.runtime.output_dir)
 
 
-def called_job(command: str, settings: tuple[str, ...], folder: PathLike | None = None, **given: Any) -> Job:
+def called_job(command: str, settings: Sequence[str], folder: PathLike | None = None, **given: Any) -> Job:
     """The job that a call from a program asks for.
 
     Args:
         command: its name.
         settings: choices and values as on the command line.
         folder: where its files go; None: where the command would put them.
-        given: values of the command's keys, whatever characters they have; None: as `settings` say.
+        given: values of the command's keys, whatever characters they have; None: as `settings` say. A recording goes
+            by its folder, a model that is no file by its rig.
+
+    Raises:
+        InputError: as `typed_job`, or a setting that the command does not have.
     """
     from omegaconf import OmegaConf
 
@@ -82,30 +86,32 @@ def called_job(command: str, settings: tuple[str, ...], folder: PathLike | None 
     refuse_unknown_keys(command, config)
     for key, value in given.items():
         if value is not None:
-            OmegaConf.update(config, key, value)
-            words.append(f"{key}={value}")
-    import_named_effects(config)
-    target = Path(config.hydra.run.dir if folder is None else folder)
-    choices, own = dict(config.hydra.runtime.choices), tuple(config.hydra.overrides.task)
+            named = value if isinstance(value, list) else _name(value)
+            OmegaConf.update(config, key, named)
+            words.append(f"{key}={named}")
     OmegaConf.set_struct(config, False)
-    del config["hydra"]
+    hydra = config.pop("hydra")
     OmegaConf.set_struct(config, True)
-    return Job(config, target, shlex.join(["python", "-m", f"tactile_cube.{command}", *words]), choices, own)
+    return _job(config, hydra, command, words, hydra.run.dir if folder is None else folder)
 
 
-def import_named_effects(config: DictConfig) -> None:
-    """Import the user's own classes of effects that a configuration names; it is the user's, as no file's is.
+def _name(thing: Any) -> str:
+    if hasattr(thing, "rig") and not hasattr(thing, "folder"):
+        return f"model of {thing.rig}"
+    return str(getattr(thing, "folder", thing))
 
-    Raises:
-        InputError: one that cannot be imported.
-    """
+
+def _job(config: DictConfig, hydra: Any, command: str, words: Sequence[str], folder: PathLike) -> Job:
     from omegaconf import OmegaConf
 
+    # the user's own classes are imported: it is the user who names them here, as no file does
     names = [name for name in _effects(OmegaConf.to_container(config)) if "." in name.partition(":")[0]]
     if names:
         from tactile_cube.drivetrain.effects import import_own_effects  # imports slowly
 
         import_own_effects(names)
+    text = shlex.join(["python", "-m", f"tactile_cube.{command}", *words])
+    return Job(config, Path(folder), text, dict(hydra.runtime.choices), tuple(hydra.overrides.task))
 
 
 def _effects(part: Any) -> Iterator[str]:

@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tactile_cube.api.comparison import model_name, modelled, opened, recording_name
+from tactile_cube.api.comparison import opened
+from tactile_cube.api.diagnosis import DiagnosisResult, diagnose
+from tactile_cube.api.identification import IdentificationResult, identify
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
+from tactile_cube.drivetrain.effects import resolve
+from tactile_cube.drivetrain.model_file import ModelFile, as_model, write_model
 from tactile_cube.errors import InputError
-
-if TYPE_CHECKING:
-    from tactile_cube.api.diagnosis import DiagnosisResult
-    from tactile_cube.api.identification import IdentificationResult
-    from tactile_cube.drivetrain.model_file import ModelFile
-    from tactile_cube.identification.drift import Drift
-    from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.identification.drift import Drift, changed, drifts
+from tactile_cube.identification.identification import judge_known
+from tactile_cube.identification.search.evidence import worse
+from tactile_cube.measurement.bench import without_touches
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.nominal import require_same_joints
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,6 @@ class MonitorResult:
             the reference on the newest; `now`, of the refitted model there.
         missing: whether the refitted model has become so much worse that something new is missing.
         diagnosis: names it, where that was asked for.
-        job: the call.
     """
 
     before: ModelFile
@@ -78,18 +80,18 @@ class MonitorResult:
             }
             for one in self.drifts
         }
-        named = self.diagnosis.effects if self.diagnosis else None
-        made = {"command": self.job.command, "seconds": self.job.seconds}
-        return (
-            {"alarm": self.alarm, "missing": self.missing, "error_over_noise": self.errors, "named": named}
-            | made
-            | {"numbers": rows}
-        )
+        return {
+            "alarm": self.alarm,
+            "missing": self.missing,
+            "error_over_noise": self.errors,
+            "named": self.diagnosis.effects if self.diagnosis else None,
+            "command": self.job.command,
+            "seconds": self.job.seconds,
+            "numbers": rows,
+        }
 
     def write(self, folder: PathLike) -> None:
         """Write monitor.json and model.yaml, the refitted model; with a diagnosis its files in diagnosis/."""
-        from tactile_cube.drivetrain.model_file import write_model
-
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "monitor.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
@@ -117,33 +119,30 @@ def monitor(
         >>> seen = tactile_cube.monitor("log_of_today", "last_week/model.yaml")
         >>> print(seen.alarm, seen.text)
     """
-    job = called_job("monitor", settings, recording=recording_name(recording), model=model_name(model))
-    reference = modelled(model)
-    assert reference is not None  # there is one
-    return run_monitor(job, opened(recording), reference, say or job.say)
+    return run_monitor(called_job("monitor", settings, recording=recording, model=model), recording, model, say)
 
 
-def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> MonitorResult:
+def run_monitor(
+    job: Job, recording: Recording | PathLike, model: ModelFile | PathLike, say: Say | None = None
+) -> MonitorResult:
     """Refit the reference's effects on the newest recording, and hold the numbers and the errors side by side.
 
     Numbers that trade places with each other differ from recording to recording by more than their intervals say; a
     machine that has changed is not followed any more by the numbers as they were.
     """
-    from tactile_cube.api.diagnosis import diagnose
-    from tactile_cube.api.identification import identify
-    from tactile_cube.drivetrain.effects import resolve
-    from tactile_cube.identification.drift import changed, drifts
-    from tactile_cube.identification.identification import judge_known
-    from tactile_cube.identification.search.evidence import worse
-    from tactile_cube.measurement.bench import without_touches
-    from tactile_cube.measurement.replay.nominal import require_same_joints
-
-    config = job.config
-    then = error_over_noise(before)
+    config, say = job.config, say or job.say
+    before, recording = as_model(model), opened(recording)
+    then = before.errors.over_noise
+    if then is None:
+        raise InputError(
+            f"model of {before.rig}: errors.over_noise is missing; take the model.yaml that identify or diagnose wrote"
+        )
     require_same_joints(recording, before)
     effects = [one.effect for one in before.drive_effects]
     resolve(effects, recording.joints)  # before they are named as if by the user, whose own are imported
-    newest = newest_trials(recording, config.last)
+    if config.last is not None and not (isinstance(config.last, int) and config.last >= 2):
+        raise InputError(f"last={config.last}: give at least 2 trials, of which one is held out, or null for all")
+    newest = recording if config.last is None else recording.with_trials(recording.trials[-config.last :])
     settings = [f"engine={config.engine}", f"step={config.step}", f"seed={config.seed}"]
     refitted = identify(newest, effects, *settings, say=say)
     assert refitted.free is not None  # it was asked for effects of the drive
@@ -154,32 +153,6 @@ def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> 
     errors = {"before": then, "as_before": kept.error, "now": now.error}
     named = diagnose(newest, *settings, model=before, say=say) if config.name_it and (gone or missing) else None
     return MonitorResult(before, refitted, found, gone, errors, missing, named, job)
-
-
-def newest_trials(recording: Recording, last: int | None) -> Recording:
-    """The last so many trials of a recording; all with None.
-
-    Raises:
-        InputError: fewer than two, of which one could be held out.
-    """
-    if last is None:
-        return recording
-    if not isinstance(last, int) or last < 2:
-        raise InputError(f"last={last}: give at least 2 trials, of which one is held out, or null for all")
-    return recording.with_trials(recording.trials[-last:])
-
-
-def error_over_noise(model: ModelFile) -> float:
-    """Held-out error of an identified model over the sensor noise of its recording.
-
-    Raises:
-        InputError: the model's file does not state it.
-    """
-    if model.errors.over_noise is None:
-        raise InputError(
-            f"model of {model.rig}: errors.over_noise is missing; take the model.yaml that identify or diagnose wrote"
-        )
-    return model.errors.over_noise
 
 
 def _described(one: Drift) -> str:

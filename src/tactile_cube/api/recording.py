@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from hydra.utils import instantiate
+from omegaconf import OmegaConf
 
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
-
-if TYPE_CHECKING:
-    from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.writing import require_free, write_recordings
+from tactile_cube.measurement.sources.source import require_settings
 
 
 @as_input_errors
@@ -29,18 +32,11 @@ def record(out: PathLike, *settings: str) -> dict[str, Recording]:
     Example:
         >>> measured = tactile_cube.record("made", "source=finger", "source.hidden=[backlash@q2]")[""]
     """
-    return run_recording(called_job("record", settings, out=str(out)))
+    return run_recording(called_job("record", settings, out=out))
 
 
 def run_recording(job: Job) -> dict[str, Recording]:
     """Write what a job's source gives."""
-    from hydra.utils import instantiate
-    from omegaconf import OmegaConf
-
-    from tactile_cube.measurement.recordings.reading import read_recording
-    from tactile_cube.measurement.recordings.writing import require_free, write_recordings
-    from tactile_cube.measurement.sources.source import require_settings
-
     out = Path(job.config.out)
     require_free(out)
     require_settings(job.config.source, str(job.choices["source"]))

@@ -1,15 +1,57 @@
-"""Train a policy from a program."""
+"""Train a policy from a program: in one run, or in stages of which each begins with the networks of the one before."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import csv
+import hashlib
+import io
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hydra.utils import instantiate
+from omegaconf import OmegaConf
+
+from tactile_cube.agent.averaging import averaged, kept_policies
+from tactile_cube.agent.policy_file import read_policy, save_policy
+from tactile_cube.api.environment import grasps_of
+from tactile_cube.api.evaluation import evaluate
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
+from tactile_cube.drivetrain.model_file import read_model
+from tactile_cube.errors import InputError
+from tactile_cube.evaluation.policy_path import networks_path, policy_path
+from tactile_cube.evaluation.training_curve import read_curve
+from tactile_cube.hand.urdf_hand import urdf_file
+from tactile_cube.randomization import GraspStarts
+from tactile_cube.simulation import SimulationOptions
+from tactile_cube.training.build import build_run
+from tactile_cube.training.environment import as_environment
+from tactile_cube.training.finished import Finished
+from tactile_cube.training.ledger import LEDGER, Costs, read_costs, write_costs
+from tactile_cube.training.recovery import train_on
+from tactile_cube.training.run import INTERRUPTED, MASTERED, POLICY, Run
+from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
+from tactile_cube.whole_file import write_whole
 
-if TYPE_CHECKING:
-    from tactile_cube.training.run import Run
+PUBLISHED: dict[str, dict[str, Any]] = {
+    "hand": {"_target_": "tactile_cube.hand.published_hand"},
+    "object": {"shape": "box", "size": 0.08, "mass": 0.05},
+}
+"""Hand and object of the paper, by the groups of conf/."""
+KEY = re.compile(r"[+~]*([\w./@]+)")
+"""What a word of a command line sets."""
+NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")
+"""Keys of the training as a whole."""
+ENGINES = ("bullet", "mujoco")
+AVERAGED = 5
+"""Policies whose mean is what comes out, as in conf/average.yaml."""
+GRASPS = 1000
+"""As many as those that come with the package."""
+COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
+"""Columns of metrics.csv that go on from stage to stage."""
 
 
 @dataclass(frozen=True)
@@ -31,26 +73,11 @@ class TrainingResult:
     @property
     def policy(self) -> Path:
         """The latest policy."""
-        return self.folder / "policy.safetensors"
-
-    @property
-    def best_policy(self) -> Path | None:
-        """The policy of the best training episodes; None while too few have ended."""
-        path = self.folder / "policy_best.safetensors"
-        return path if path.is_file() else None
+        return self.folder / POLICY
 
     def curve(self) -> dict[str, list[float]]:
         """Columns of metrics.csv, one number for each line of the log."""
-        from tactile_cube.evaluation.training_curve import read_curve
-
         return read_curve(self.folder, self.folder.name).columns
-
-
-PUBLISHED: dict[str, dict[str, Any]] = {
-    "hand": {"_target_": "tactile_cube.hand.published_hand"},
-    "object": {"shape": "box", "size": 0.08, "mass": 0.05},
-}
-"""Hand and object of the paper, by the groups of conf/."""
 
 
 @as_input_errors
@@ -70,48 +97,34 @@ def train(*settings: str, model: PathLike | None = None, folder: PathLike | None
         >>> result = tactile_cube.train("+experiment=table", "training.steps=60000")
         >>> print(result.final_angle, result.policy)
     """
-    job = called_job("train", settings, folder, model=None if model is None else str(model))
-    return run_training(job)
+    return run_training(called_job("train", settings, folder, model=model))
 
 
 def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
-    """Build the run of a job, train through faults of the workers, and say how it went.
+    """Train what a job says, in one run or in stages, and say how it went.
 
     Args:
-        job: what to train, perhaps in stages.
+        job: what to train.
         stage: what lines of progress begin with where the run is a stage of several.
         later: environment steps of the stages after it, at most.
     """
-    from functools import partial
-
-    from tactile_cube.training.finished import Finished
-    from tactile_cube.training.recovery import train_on
-
-    if job.config.stages:
-        from tactile_cube.api.stages import run_stages  # needs this module
-
-        return run_stages(job)
-    before = Finished.of(job.folder, plain_settings(job))
+    plain = plain_settings(job)
+    before = Finished.of(job.folder, plain)
     if before is not None:
         print(f"{job.folder}: finished before ({before.reason}); training.resume=never starts over")
         return TrainingResult(job.folder, before.reason, before.steps, before.final_angle)
-    run, reason = train_on(partial(training_run, job, stage, later))
+    return _in_stages(job, plain) if job.config.stages else _in_one(job, plain, stage, later)
+
+
+def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
+    """Train through faults of the workers."""
+    run, reason = train_on(partial(_training_run, job, plain, stage, later))
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 
-def training_run(job: Job, stage: str = "", later: int = 0) -> Run:
-    """The run that a job describes: new, or where its checkpoint says; see `run_training`."""
-    from hydra.utils import instantiate
-    from omegaconf import OmegaConf
-
-    from tactile_cube.agent.policy_file import read_policy
-    from tactile_cube.evaluation.policy_path import networks_path, policy_path
-    from tactile_cube.training.build import build_run
-    from tactile_cube.training.environment import as_environment
-    from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
-
+def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int) -> Run:
+    """The run that a job describes: new, or where its checkpoint says."""
     config: Any = job.config
-    plain = plain_settings(job)
     if teacher := config.exploration.get("teacher"):
         file = policy_path(teacher, "exploration.teacher")
         read_policy(file)  # a damaged one is the user's error here, a worker's later
@@ -123,39 +136,137 @@ def training_run(job: Job, stage: str = "", later: int = 0) -> Run:
         make_agent=instantiate(config.agent, _partial_=True),
         collector=CollectorSettings(**plain["collector"]),
         training=TrainingSettings(**plain["training"] | {"init_from": networks_path(config.training.init_from)}),
-        loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
+        loggers={
+            name: instantiate(entry, _partial_=True)
+            for name, entry in (*config.logger.items(), *config.visualization.items())
+        },
         config=plain,
     )
     run.line.stage, run.line.later = stage, later
     return run
 
 
+def _in_stages(job: Job, plain: dict[str, Any]) -> TrainingResult:
+    """Train each stage until its goal or its last step, then judge; the same call goes on where it was."""
+    stages, results = stages_of(job), list[TrainingResult]()
+    settings = [TrainingSettings(**dict(stage.config.training)) for stage in stages]
+    for number, stage in enumerate(stages):
+        goal, later = settings[number].goal, sum(one.steps for one in settings[number + 1 :])
+        title = f"stage {number + 1} of {len(stages)}, {stage.folder.name}{f', until {goal}' if goal else ''}"
+        print(f"{_overview(stages, results)}\n{title}", flush=True)
+        results.append(run_training(stage, title, later))
+        _sum_up(job.folder, results)
+        if results[-1].reason == INTERRUPTED:
+            return replace(results[-1], folder=job.folder)
+    print(_overview(stages, results))
+    reason, total = judged(job, results[-1].folder), sum(result.steps for result in results)
+    Finished(reason, total, results[-1].final_angle, plain).write(job.folder)
+    return TrainingResult(job.folder, reason, total, results[-1].final_angle)
+
+
+def stages_of(job: Job) -> list[Job]:
+    """The stages that a job's configuration lists; what the user asked for holds in each of them.
+
+    Raises:
+        InputError: a stage that cannot be composed.
+    """
+    own = [word for word in job.words if not NOT_A_STAGES.match(_key(word))]
+    chosen = {_key(word) for word in own}
+    jobs: list[Job] = []
+    for name, words in job.config.stages.items():
+        fitting = [word for word in words if _key(word).partition(".")[0] not in chosen]  # not of another choice
+        asked = {_key(word): word for word in (*fitting, *own, f"name={name}")}
+        stage = called_job("train", [*asked.values()], job.folder / name, model=job.config.model)
+        if jobs:
+            stage.config.training.init_from = str(jobs[-1].folder / "checkpoint.pt")
+        if "file" in stage.config.start and stage.config.start.file is None:
+            stage.config.start.file = _own_grasps(stage, job.folder / "grasps.npz")
+        jobs.append(stage)
+    return jobs
+
+
+def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
+    """What is mastered, what is not, and what is to come, in one line."""
+    lines = [
+        f"{one.folder.name}: {one.reason if one.reason.startswith(MASTERED) else f'not mastered: {one.reason}'}"
+        for one in results
+    ]
+    ahead = [*(stage.folder.name for stage in stages[len(results) :]), "mean of the last policies, judgement"]
+    return "; ".join([*lines, f"to come: {', '.join(ahead)}"])
+
+
+def judged(job: Job, last: Path) -> str:
+    """Write the mean of the last stage's policies, and judge it in fresh draws of its worlds, in both engines."""
+    kept = len(list(last.glob("policy_[0-9]*.safetensors")))
+    policy = job.folder / POLICY
+    save_policy(policy, *averaged(kept_policies(last, min(AVERAGED, kept)) if kept else [last / POLICY]))
+    said = []
+    for engine in ENGINES:
+        result = evaluate(policy, *job.config.judgement, f"engine={engine}")
+        result.write(job.folder / engine, film=False)
+        said.append(f"{engine}: {result.text}")
+    print("\n".join(said))
+    return "trained and judged"
+
+
+def _key(word: str) -> str:
+    found = KEY.match(word)
+    return found[1] if found else word
+
+
+def _own_grasps(job: Job, file: Path) -> str | None:
+    """Grasps of another hand or object than the package has them of, found before the first episode; else None."""
+    env = instantiate(job.config.env)
+    try:
+        GraspStarts().of(env.hand, env.constants)
+    except InputError:
+        if not file.is_file():
+            print(f"searching {GRASPS} grasps of hand '{env.hand.name}': {file}", flush=True)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            grasps_of(env, SimulationOptions(), GRASPS, 0, job.command).save(file)
+        return str(file)
+    return None
+
+
+def _sum_up(folder: Path, results: Sequence[TrainingResult]) -> None:
+    """Write costs and curve of all stages so far into the folder of the whole training."""
+    costs = [asdict(read_costs(result.folder / LEDGER)) for result in results]
+    spent = Costs(**{name: sum(one[name] for one in costs) for name in costs[0]})
+    write_costs(folder / LEDGER, sum(result.steps for result in results), spent)
+    _write_joined_curve([result.folder / "metrics.csv" for result in results], folder / "metrics.csv")
+
+
+def _write_joined_curve(files: Iterable[Path], output: Path) -> None:
+    """Write the curves of runs, each begun with the one before, as one: what is counted goes on."""
+    rows, reached = list[dict[str, str]](), dict.fromkeys(COUNTED, 0.0)
+    for file in filter(Path.is_file, files):
+        with file.open(newline="", encoding="utf-8") as stream:
+            read = [row | {"stage": file.parent.name} for row in csv.DictReader(stream)]
+        sums = [{key: f"{float(row[key]) + reached[key]:.9g}" for key in COUNTED if key in row} for row in read]
+        rows += [row | more for row, more in zip(read, sums, strict=True)]
+        reached |= {key: float(value) for key, value in sums[-1].items()} if sums else {}
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(rows[0]) if rows else list(COUNTED), extrasaction="ignore")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_whole(output, text.getvalue().encode())
+
+
 def plain_settings(job: Job) -> dict[str, Any]:
-    """The resolved configuration: with a model's contents in the place of its file, and the checksum of a URDF."""
-    import hashlib
+    """The resolved configuration: with a model's contents in the place of its file, and the checksum of a URDF.
 
-    from omegaconf import OmegaConf
-
-    from tactile_cube.drivetrain.model_file import read_model
-    from tactile_cube.hand.urdf_hand import urdf_file
-
+    It says nothing of stages where there are none, nor of hand and object where they are the published ones: so runs
+    and policies from before one could choose them stay the same.
+    """
     plain: dict[str, Any] = OmegaConf.to_container(job.config, resolve=True)  # type: ignore[assignment]
-    if not plain["stages"]:  # so runs from before there were stages stay the same
+    if not plain["stages"]:
         del plain["stages"], plain["judgement"]
+    environment = plain["env"]
     if job.config.model is not None:
-        plain["env"]["model"] = read_model(job.config.model).model_dump()
-    hand = plain["env"].get("hand") or {}
+        environment["model"] = read_model(job.config.model).model_dump()
+    hand = environment.get("hand") or {}
     if "urdf" in hand:
         hand["sha256"] = hashlib.sha256(urdf_file(hand["urdf"]).read_bytes()).hexdigest()
-    return _without_published(plain)
-
-
-def _without_published(plain: dict[str, Any]) -> dict[str, Any]:
-    """A configuration that says nothing of hand and object where they are the published ones.
-
-    So runs and policies from before one could choose them stay the same.
-    """
-    environment = plain["env"]
     constants = environment.get("constants") or {}
     if "hand" not in environment or "object" not in constants:  # another environment than the package's
         return plain

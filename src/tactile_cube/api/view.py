@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from tactile_cube.api.evaluation import EvaluationResult, evaluate
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.errors import InputError
-
-if TYPE_CHECKING:
-    from tactile_cube.api.evaluation import EvaluationResult
-    from tactile_cube.evaluation.training_curve import Curve
-    from tactile_cube.evaluation.verdict import EpisodeResult
-
-RECORDING = "view.rrd"
+from tactile_cube.evaluation.policy_path import BASELINES, policy_path
+from tactile_cube.evaluation.training_curve import Curve, read_curve
+from tactile_cube.evaluation.verdict import EpisodeResult
+from tactile_cube.visualization.episode_recording import description, write_pair
+from tactile_cube.visualization.viewer import require_viewer, show_files
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
     Args:
         run: folder of a training run, a policy file, or a policy that ships with the package; of a folder of `evaluate`
             or `compare`, the recordings in it are opened.
-        settings: values as on the command line, e.g. "episodes=4", "viewer=none".
+        settings: values as on the command line, e.g. "episodes=4", "viewer=web".
         folder: where the recording goes; None: outputs/view/...
         say: takes a line for each episode.
 
@@ -57,40 +55,28 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
         >>> seen = tactile_cube.view("table", "episodes=4", "viewer=none")
         >>> print(seen.files[0], seen.episodes["best"].final_angle)
     """
-    return run_view(called_job("view", settings, folder, run=str(run)), say)
+    return run_view(called_job("view", settings, folder, run=run), say)
 
 
 def run_view(job: Job, say: Say) -> ViewResult:
     """See what a job names."""
-    from tactile_cube.visualization.viewer import require_viewer, show_files
-
-    config = job.config
+    config, run = job.config, Path(job.config.run)
     require_viewer(config.viewer)
     if not isinstance(config.episodes, int) or config.episodes < 2:
         raise InputError(f"episodes={config.episodes}: give at least 2, of which the best and the worst are shown")
-    there = recordings_in(Path(config.run))
+    trained = (run / "policy.safetensors").is_file()
+    there = sorted(run.glob("*.rrd")) if run.is_dir() and not trained else []
     if there:
         return ViewResult(there, {}, show_files(there, config.viewer))
-    file = job.folder / RECORDING
-    episodes = write_run(job, file, say)
+    file = job.folder / "view.rrd"
+    episodes = _write_run(job, file, say)
     return ViewResult([file], episodes, show_files([file], config.viewer))
 
 
-def recordings_in(folder: Path) -> list[Path]:
-    """The Rerun recordings of a folder in which no policy was trained."""
-    if not folder.is_dir() or (folder / "policy.safetensors").is_file():
-        return []
-    return sorted(folder.glob("*.rrd"))
-
-
-def write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
+def _write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
     """Run the episodes of a job and write the best and the worst; gives what they were."""
-    from tactile_cube.api.evaluation import evaluate
-    from tactile_cube.evaluation.policy_path import BASELINES, policy_path
-    from tactile_cube.visualization.episode_recording import description, write_pair
-
     config = job.config
-    # Found here, so that an error names the key that the user wrote.
+    # found here, so that an error names the key that the user wrote
     curve = None if config.run in BASELINES else learning_curve(policy_path(config.run, "run").parent)
     settings = [f"protocol.episodes={config.episodes}", f"seed={config.seed}", *config.evaluate]
     settings += [] if config.seconds is None else [f"protocol.seconds={config.seconds}"]
@@ -108,8 +94,6 @@ def write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
 
 def learning_curve(folder: Path) -> Curve | None:
     """The learning curve of a run's folder; None without metrics."""
-    from tactile_cube.evaluation.training_curve import read_curve
-
     metrics = folder / "metrics.csv"
     if not metrics.is_file() or metrics.read_text(encoding="utf-8").count("\n") < 2:  # no row yet
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import inf, nan
 
 import numpy as np
@@ -22,11 +21,6 @@ class CommandGuard:
 
     Every command is finite, within the range, at most rate * dt away from the one before, and at most torque / K_P
     away from the last accepted angles. A reading around which no such command exists is not accepted.
-
-    Args:
-        limits: of every command.
-        rules: what a reading may be.
-        names: of the joints.
 
     Attributes:
         state: last accepted reading; before the first command the newest of those that agree.
@@ -56,7 +50,8 @@ class CommandGuard:
         """Take a reading over as the state; return "" or why it is not believed."""
         doubt = self._doubt(now, reading)
         if not doubt:
-            self.state = replace(reading, time=min(reading.time, now), q_m=np.array(reading.q_m, dtype=np.float64))
+            torque = None if reading.torque is None else np.array(reading.torque)  # the robot may use its arrays again
+            self.state = Reading(min(reading.time, now), np.array(reading.q_m, dtype=np.float64), torque)
             self._agreeing += 1
         elif self.command is None:
             self.state, self._agreeing = None, 0
@@ -65,9 +60,7 @@ class CommandGuard:
     def checked(self, now: float, wanted: Array) -> Array:
         """Return the command to send `(joints,)` [rad]: the nearest to the wanted one that keeps every limit.
 
-        Args:
-            now: when it is sent [s].
-            wanted: `(joints,)` [rad]; where it is no number, the command stays.
+        Where what is wanted is no number, the command stays.
         """
         if self.state is None:
             raise RuntimeError("no command before an accepted reading")

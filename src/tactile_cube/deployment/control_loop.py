@@ -2,52 +2,90 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from math import inf, isfinite
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.command_guard import CommandGuard
-from tactile_cube.deployment.controller import POLICY_RATE, PolicyController, TargetFilter
-from tactile_cube.deployment.homing import Homing, Move
+from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.training_setting import TrainingSetting
+from tactile_cube.drivetrain.control_law import low_pass
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.hand.kinematics import grasp_angles
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9  # [s] of clocks that add up ticks
 
 
 class Mode(StrEnum):
-    """What the loop is doing.
+    """What the loop is doing."""
 
-    - `waiting`: too few measurements agree yet; nothing is sent.
-    - `homing`: the fingers open for the object, or go to the start angles where none is awaited.
-    - `wait for object`: the open fingers hold position until somebody confirms that the object is there.
-    - `closing`: the fingers go to the start angles around the object.
-    - `running`: the policy decides.
-    - `stopped`: the fingers hold position; only a new loop starts again.
-    """
-
-    WAITING = "waiting"
-    HOMING = "homing"
-    WAIT_FOR_OBJECT = "wait for object"
-    CLOSING = "closing"
-    RUNNING = "running"
-    STOPPED = "stopped"
+    WAITING = "waiting"  # too few measurements agree yet; nothing is sent
+    HOMING = "homing"  # the fingers open for the object, or go to the start angles where none is awaited
+    WAIT_FOR_OBJECT = "wait for object"  # until somebody confirms that it is there
+    CLOSING = "closing"  # the fingers go to the start angles around the object
+    RUNNING = "running"  # the policy decides
+    STOPPED = "stopped"  # the fingers hold position; only a new loop starts again
 
 
-class Decides(Protocol):
-    """Gives the desired joint angles of the next 0.1 s."""
+@dataclass(frozen=True)
+class Homing:
+    """How the fingers open, wait for the object and close: `homing` of conf/deploy.yaml [rad/s, rad, s, s, m]."""
 
-    def reset(self) -> None:
-        """Begin a run."""
+    speed: float = 0.5
+    tolerance: float = 0.05
+    settle: float = 0.5
+    timeout: float = 10.0
+    clearance: float = 0.015
 
-    def step(self, q_m: Array, q_f: Array) -> Array:
-        """Return q_n `(joints,)` [rad] for measured angles and filtered targets `(joints,)` [rad]."""
+    def __post_init__(self) -> None:
+        """Refuse what never arrives."""
+        require_positive({f"homing.{name}": value for name, value in asdict(self).items()})
+
+
+def open_angles(setting: TrainingSetting, clearance: float) -> Array:
+    """Return the angles `(joints,)` [rad] with the fingertips `clearance` [m] off the object's faces."""
+    known, upright = setting.constants, np.array([0.0, 0.0, 0.0, 1.0])
+    size = np.asarray(known.cube_size)
+    return grasp_angles(setting.hand, size, np.zeros(3), upright, clearance, known.object_shape)
+
+
+class Move:
+    """A straight line from `start` to `goal`, both `(joints,)` [rad], judged by what is measured."""
+
+    def __init__(self, homing: Homing, now: float, start: Array, goal: Array) -> None:
+        self._homing, self._began, self._start, self._goal = homing, now, start, goal
+        self._needs = float(np.max(np.abs(goal - start))) / homing.speed
+        self._in_place = now
+
+    def target(self, now: float) -> Array:
+        """Return where the fingers should be `(joints,)` [rad]."""
+        return self._start + self._share(now) * (self._goal - self._start)
+
+    def arrived(self, now: float, q_m: Array) -> bool:
+        """Whether the fingers have rested at the goal for long enough."""
+        if self._share(now) < 1.0 or self._away(q_m) > self._homing.tolerance:
+            self._in_place = now
+        return now - self._in_place >= self._homing.settle
+
+    def failure(self, now: float, q_m: Array) -> str:
+        """Return why there is nothing more to wait for; "" while there is."""
+        took = now - self._began
+        if took <= self._needs + self._homing.timeout:
+            return ""
+        return f"still {self._away(q_m):.2f} rad from the goal after {took:.0f} s"
+
+    def _share(self, now: float) -> float:
+        return 1.0 if self._needs == 0.0 else min(1.0, (now - self._began) / self._needs)
+
+    def _away(self, q_m: Array) -> float:
+        return float(np.max(np.abs(q_m - self._goal)))
 
 
 class ControlLoop:
@@ -56,7 +94,7 @@ class ControlLoop:
     What it sends passes `CommandGuard` last.
 
     Args:
-        decides: gives q_n at 10 Hz, the policy's `PolicyController` or anything else.
+        decides: gives q_n at 10 Hz.
         time_constant: T_s of the target filter [s].
         limits: of every command.
         rules: when to stop.
@@ -66,13 +104,9 @@ class ControlLoop:
         opened: angles at which the fingers wait for the object `(joints,)` [rad]; None: there is none to wait for.
 
     Attributes:
-        mode: what it is doing.
         reason: why it stopped; "" before.
-        time: of the last tick [s].
-        doubted: measurements that were not believed.
-        doubt: why the last of them was not.
-        q_n: desired angles of the policy `(joints,)` [rad].
-        q_f: filtered ones `(joints,)` [rad].
+        doubted: measurements that were not believed; `doubt` says why the last of them was not.
+        q_n: desired angles of the policy `(joints,)` [rad]; q_f are the filtered ones.
 
     Raises:
         InputError: a time or a filter time without a meaning.
@@ -80,7 +114,7 @@ class ControlLoop:
 
     def __init__(
         self,
-        decides: Decides,
+        decides: PolicyController | PlayedTargets,
         time_constant: float,
         limits: JointLimits,
         rules: StopRules,
@@ -94,7 +128,7 @@ class ControlLoop:
             raise InputError(f"filter_time is {time_constant}; give a finite number of 0 s or more")
         self._decides, self._limits, self._homing, self._seconds = decides, limits, homing, seconds
         self._home, self._opened = np.array(hand.start_angles, dtype=np.float64), opened
-        self._filter = TargetFilter(time_constant, rate=1.0, filtered=self._home.copy())
+        self._time_constant, self._filtered = time_constant, self._home.copy()
         self._guard = CommandGuard(limits, rules, hand.joint_names)
         self._watchdog = Watchdog(rules, hand.joint_names)
         self.mode, self.reason, self.time = Mode.WAITING, "", -inf
@@ -123,7 +157,7 @@ class ControlLoop:
         """Compile and load all that a tick needs, so that none comes late for it; nothing is sent."""
         self._decides.reset()
         self._decides.step(self._home.copy(), self._home.copy())
-        self._filter.step(self._home)
+        low_pass(0.0, 0.0, self._time_constant, 1.0)
         self._decides.reset()
 
     def tick(self, now: float, reading: Reading | None = None) -> Array | None:
@@ -134,15 +168,19 @@ class ControlLoop:
             reading: what has been measured since the tick before; None: nothing.
         """
         dt = self._clock(now)
-        doubt = self._listen(now, reading)
+        doubt = "" if reading is None else self._guard.accept(now, reading)
+        if doubt:
+            self.doubted, self.doubt = self.doubted + 1, doubt
         last = self.accepted
         if last is None or (self._guard.command is None and (self.mode is Mode.STOPPED or not self._guard.ready)):
             return None
         if self.mode is Mode.WAITING:
-            self._move_to(self._home if self._opened is None else self._opened, last.q_m)
-            self.mode = Mode.HOMING
-        elif self.mode is not Mode.STOPPED:
-            self._judge(dt, now - last.time)
+            goal = self._home if self._opened is None else self._opened
+            self._move, self.mode = Move(self._homing, now, last.q_m, goal), Mode.HOMING
+        elif self.mode is not Mode.STOPPED and (
+            why := self._watchdog.judge(dt, now - last.time, self._guard.saturated)
+        ):
+            self.stop(why)
         if not doubt:
             self._go_on(now, dt, last.q_m.copy())
         return self._guard.checked(now, self.q_f)
@@ -150,8 +188,7 @@ class ControlLoop:
     def confirm_object(self) -> None:
         """Close the fingers around the object, which somebody has put between them."""
         if self.mode is Mode.WAIT_FOR_OBJECT:
-            self._move_to(self._home, self.q_f)
-            self.mode = Mode.CLOSING
+            self._move, self.mode = Move(self._homing, self.time, self.q_f, self._home), Mode.CLOSING
 
     def stop(self, reason: str) -> None:
         """Hold position from now on, at the last accepted angles."""
@@ -169,35 +206,16 @@ class ControlLoop:
         dt, self.time = now - self.time, now
         return dt
 
-    def _listen(self, now: float, reading: Reading | None) -> str:
-        if reading is None:
-            return ""
-        doubt = self._guard.accept(now, reading)
-        if doubt:
-            self.doubted, self.doubt = self.doubted + 1, doubt
-        return doubt
-
-    def _judge(self, dt: float, silent: float) -> None:
-        reason = self._watchdog.judge(dt, silent, self._guard.saturated)
-        if reason:
-            self.stop(reason)
-
     def _go_on(self, now: float, dt: float, q_m: Array) -> None:
         if self.mode in (Mode.HOMING, Mode.CLOSING):
-            self._move_on(now, q_m)
+            self.q_f = self._move.target(now)
+            failure = self._move.failure(now, q_m)
+            if self._move.arrived(now, q_m):
+                self._arrive(now, q_m)
+            elif failure:
+                self.stop(f"{self.mode}: {failure}")
         if self.mode is Mode.RUNNING:
             self._run_on(now, dt, q_m)
-
-    def _move_to(self, goal: Array, start: Array) -> None:
-        self._move = Move(self._homing, self.time, start, goal)
-
-    def _move_on(self, now: float, q_m: Array) -> None:
-        self.q_f = self._move.target(now)
-        failure = self._move.failure(now, q_m)
-        if self._move.arrived(now, q_m):
-            self._arrive(now, q_m)
-        elif failure:
-            self.stop(f"{self.mode}: {failure}")
 
     def _arrive(self, now: float, q_m: Array) -> None:
         if self.mode is Mode.HOMING and self._opened is not None:
@@ -205,18 +223,19 @@ class ControlLoop:
             return
         self.mode, self._since, self._asked = Mode.RUNNING, now, now
         self._decides.reset()
-        self._filter.filtered = q_m.copy()
+        self._filtered = q_m.copy()
 
     def _run_on(self, now: float, dt: float, q_m: Array) -> None:
         if now - self._since > self._seconds - ROUNDING:
             self.stop("time is over")
         elif now < self._asked - ROUNDING or self._ask(q_m):
-            self._filter.rate = 1.0 / dt
-            self.q_f = self._filter.step(self.q_n).copy()
+            for joint, goal in enumerate(self.q_n):
+                self._filtered[joint] = low_pass(self._filtered[joint], goal, self._time_constant, dt)
+            self.q_f = self._filtered.copy()
 
     def _ask(self, q_m: Array) -> bool:
         """Ask for the next q_n; False, and stopped, if it is none."""
-        q_n = np.asarray(self._decides.step(q_m, self._filter.filtered.copy()), dtype=np.float64)
+        q_n = np.asarray(self._decides.step(q_m, self._filtered.copy()), dtype=np.float64)
         self._asked += 1.0 / POLICY_RATE
         if q_n.shape != self._home.shape or not np.isfinite(q_n).all():
             self.stop(f"desired angles that are no numbers of {len(self._home)} joints: {q_n}")

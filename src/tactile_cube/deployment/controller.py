@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from tactile_cube.agent.policy_file import read_policy
 from tactile_cube.deployment.training_setting import training_setting
-from tactile_cube.drivetrain.control_law import low_pass
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.excitation import excitation
 
 Weights = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+POLICY_RATE = 10.0
+"""Rate at which the policy is asked [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +27,7 @@ class Network:
     """Linear layers with ReLU between them; the first half of the last layer's outputs, through tanh, is the action.
 
     Attributes:
-        weights: one matrix `(out, in)` a layer.
-        biases: one vector `(out,)` a layer.
+        weights: one matrix `(out, in)` a layer, float32, as the biases `(out,)`.
         info: the policy file's metadata.
         label: how the policy is called in a message.
     """
@@ -42,7 +44,7 @@ class Network:
 
     @property
     def action_size(self) -> int:
-        """Number of joints commanded; the other half of the outputs is the exploration's scale."""
+        """Number of joints; the other half of the outputs is the exploration's scale."""
         return int(self.weights[-1].shape[0]) // 2
 
     def deterministic_layers(self) -> list[tuple[Weights, Weights]]:
@@ -53,11 +55,11 @@ class Network:
 
     def __call__(self, observation: Weights) -> Weights:
         """Return the action `(..., 12)` in [-1, 1] for observations `(..., 120)`."""
+        *hidden, (last, offset) = self.deterministic_layers()
         signal = observation
-        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+        for weight, bias in hidden:
             signal = np.maximum(signal @ weight.T + bias, 0.0)
-        mean = signal @ self.weights[-1][: self.action_size].T + self.biases[-1][: self.action_size]
-        return np.asarray(np.tanh(mean), dtype=np.float32)
+        return np.asarray(np.tanh(signal @ last.T + offset), dtype=np.float32)
 
 
 def read_network(path: Path) -> Network:
@@ -67,22 +69,8 @@ def read_network(path: Path) -> Network:
     return Network(weights, biases, info.model_dump(), f"policy={path}")
 
 
-Array = NDArray[np.float64]
-
-POLICY_RATE = 10.0
-"""Rate at which the policy is asked [Hz]."""
-
-
-def reading_size(hand: Hand) -> int:
-    """Numbers in one reading: q_m and e_q of every joint."""
-    return 2 * hand.joints
-
-
 class PolicyController:
-    """Asks the network at 10 Hz.
-
-    Once a policy step: read q_m from the hand and q_f from the filter that runs in the fast loop, call `step`, and give
-    its q_n to the filter.
+    """Asks the network at 10 Hz: `step` takes q_m of the hand and q_f of the fast loop's filter, which takes its q_n.
 
     Args:
         network: the policy.
@@ -96,7 +84,7 @@ class PolicyController:
 
     def __init__(self, network: Network, hand: Hand | None = None) -> None:
         hand = hand or training_setting(network.info).hand
-        self._reading = reading_size(hand)
+        self._reading = 2 * hand.joints  # q_m and e_q of every joint
         if network.observation_size % self._reading or network.action_size != hand.joints:
             raise InputError(
                 f"the policy maps {network.observation_size} numbers to {network.action_size}; this controller "
@@ -113,12 +101,7 @@ class PolicyController:
         self._stack = None
 
     def step(self, q_m: Array, q_f: Array) -> Array:
-        """Return the desired joint angles q_n `(joints,)` [rad] for the next 0.1 s.
-
-        Args:
-            q_m: measured joint angles `(joints,)` [rad], in the hand's order.
-            q_f: filtered targets at the same instant `(joints,)` [rad].
-        """
+        """Return q_n for the next 0.1 s, for q_m and q_f of the same instant, all `(joints,)` [rad]."""
         reading = np.concatenate([q_m, np.asarray(q_f) - q_m]).astype(np.float32)
         if self._stack is None:
             self._stack = np.tile(reading, self._readings)
@@ -127,33 +110,8 @@ class PolicyController:
         return np.asarray(self._middle + self._half_range * self._network(self._stack))
 
 
-@dataclass
-class TargetFilter:
-    """The low-pass between q_n and q_f, run in the fast loop.
-
-    Attributes:
-        time_constant: T_s [s]: 0.5 at the end of the paper's training.
-        rate: of the fast loop [Hz]: 500 in simulation, 1000 on the robot.
-        filtered: q_f `(joints,)` [rad]; set it to the measured angles before the first step.
-    """
-
-    time_constant: float
-    rate: float
-    filtered: Array = field(default_factory=lambda: np.zeros(12))
-
-    def step(self, q_n: Array) -> Array:
-        """Advance by one period of the fast loop and return q_f `(joints,)` [rad]."""
-        for joint, goal in enumerate(q_n):
-            self.filtered[joint] = low_pass(self.filtered[joint], goal, self.time_constant, 1.0 / self.rate)
-        return self.filtered
-
-
 class PlayedTargets:
-    """Gives one row after the other at 10 Hz, and the last one for good.
-
-    Args:
-        targets: q_n `(steps, 12)` [rad].
-    """
+    """Gives one row of `targets` `(steps, 12)` [rad] after the other at 10 Hz, and the last one for good."""
 
     def __init__(self, targets: Array) -> None:
         self._targets, self._row = targets, 0
@@ -170,17 +128,10 @@ class PlayedTargets:
 
 
 def excited_targets(kind: str, reach: float, seconds: float, seed: int, hand: Hand = DLR_HAND2) -> PlayedTargets:
-    """Return an excitation about the start angles, within the action range.
-
-    Args:
-        kind: `ramps`, `holds`, `multisine` or another kind of excitation.
-        reach: half width [rad].
-        seconds: length [s].
-        seed: of its corners and phases.
-        hand: that moves.
+    """Return an excitation of `reach` [rad] about the start angles, within the action range.
 
     Raises:
-        InputError: an unknown kind.
+        InputError: an unknown kind; see `excitation`.
     """
     home = np.asarray(hand.start_angles)
     low, high = np.maximum(home - reach, hand.action_lower), np.minimum(home + reach, hand.action_upper)

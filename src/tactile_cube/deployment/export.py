@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from tactile_cube.deployment.controller import POLICY_RATE, Network, reading_size
-from tactile_cube.deployment.homing import Homing
+from tactile_cube.deployment.control_loop import Homing
+from tactile_cube.deployment.controller import POLICY_RATE, Network
 from tactile_cube.deployment.limits import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
-from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.hand import Hand
 
 FORMAT = "tactile_cube contract 3"
 FINGER = {
@@ -27,28 +27,42 @@ TOLERANCE = 1e-5  # between float32 products in different orders
 
 
 def interface_contract(network: Network, setting: TrainingSetting | None = None) -> dict[str, Any]:
-    """Return the contract of a policy on the hand that it was trained on, ready for JSON.
-
-    Args:
-        network: the policy.
-        setting: that it was trained in; None: as its file says.
-    """
+    """Return the contract of a policy, ready for JSON; `setting` is that of its training, None: as its file says."""
     setting = setting or training_setting(network.info, label=network.label)
     hand, constants = setting.hand, setting.constants
     names = list(hand.joint_names)
+    known = isinstance(hand, HandModel)  # else what a joint does stands in its URDF
+    meanings = [FINGER[name[-2:]] if known else "as in the URDF of the hand" for name in names]
     return {
         "format": FORMAT,
         "hand": _hand(setting),
         "joints": names,
         "joint_convention": {
             name: {"unit": "rad", "zero": 0.0, "direction": 1, "meaning": meaning}
-            for name, meaning in zip(names, _meanings(hand), strict=True)
+            for name, meaning in zip(names, meanings, strict=True)
         },
         "joint_range": {"lower": _plain(hand.lower), "upper": _plain(hand.upper), "unit": "rad"},
         "task": _task(setting),
         "start_angles": {"angles": _plain(hand.start_angles), "unit": "rad", "homing": asdict(Homing())},
-        "observation": _observation(network, hand),
-        "action": _action(network, hand),
+        "observation": {
+            "name": "observation",
+            "shape": ["batch", network.observation_size],
+            "dtype": "float32",
+            "readings": network.observation_size // (2 * hand.joints),
+            "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
+            "unit": "rad, not scaled",
+            "at_start": "the first reading fills all places",
+        },
+        "action": {
+            "name": "action",
+            "shape": ["batch", network.action_size],
+            "dtype": "float32",
+            "range": [-1.0, 1.0],
+            "meaning": "q_n = 0.5 * (lower + upper) + 0.5 * (upper - lower) * action, desired joint angles",
+            "lower": _plain(hand.action_lower),
+            "upper": _plain(hand.action_upper),
+            "unit": "rad",
+        },
         "rates": {"policy_hz": POLICY_RATE, "fast_loop_hz": {"simulation": 500, "robot": 1000}},
         "target_filter": {
             "law": "q_f += (1 - exp(-dt / T_s)) * (q_n - q_f), in the fast loop; starts at the measured angles",
@@ -78,41 +92,17 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
     }
 
 
-def _observation(network: Network, hand: Hand) -> dict[str, Any]:
-    """What the policy reads."""
-    return {
-        "name": "observation",
-        "shape": ["batch", network.observation_size],
-        "dtype": "float32",
-        "readings": network.observation_size // reading_size(hand),
-        "order": "oldest reading first; a reading is q_m then e_q = q_f - q_m, joints in the order of `joints`",
-        "unit": "rad, not scaled",
-        "at_start": "the first reading fills all places",
-    }
-
-
-def _action(network: Network, hand: Hand) -> dict[str, Any]:
-    """What the policy gives."""
-    return {
-        "name": "action",
-        "shape": ["batch", network.action_size],
-        "dtype": "float32",
-        "range": [-1.0, 1.0],
-        "meaning": "q_n = 0.5 * (lower + upper) + 0.5 * (upper - lower) * action, desired joint angles",
-        "lower": _plain(hand.action_lower),
-        "upper": _plain(hand.action_upper),
-        "unit": "rad",
-    }
-
-
 def _hand(setting: TrainingSetting) -> dict[str, Any]:
-    """Which mechanism it is, how it is held, and what touches the object."""
     hand, constants = setting.hand, setting.constants
     tips = [hand.finger_tips(k, hand.start_angles[None, hand.of_finger(k)])[0] for k in range(len(hand.fingers))]
     return {
         "name": hand.name,
         "urdf": {"file": hand.urdf_name, "sha256": hand.urdf_sha256},
-        "coupled_joints": [_coupled(hand, k, *pair) for k in range(len(hand.fingers)) for pair in hand.coupled()],
+        "coupled_joints": [
+            {"joint": hand.chain_joints(k)[link], "follows": hand.chain_joints(k)[leader], "ratio": 1.0}
+            for k in range(len(hand.fingers))
+            for link, leader in hand.coupled()
+        ],
         "palm": {
             "position": {"value": _plain(hand.position), "unit": "m"},
             "rotation": [_plain(row) for row in hand.rotation],
@@ -123,7 +113,7 @@ def _hand(setting: TrainingSetting) -> dict[str, Any]:
         "fingertips": [
             {
                 "finger": finger.name,
-                "link": hand.fingers[k].links[-1],
+                "link": finger.links[-1],
                 "radius": hand.tip_radius,
                 "at_start": _plain(hand.rotation.T @ (tip - hand.position)),
             }
@@ -133,20 +123,7 @@ def _hand(setting: TrainingSetting) -> dict[str, Any]:
     }
 
 
-def _coupled(hand: Hand, finger: int, link: int, leader: int) -> dict[str, Any]:
-    joints = hand.chain_joints(finger)
-    return {"joint": joints[link], "follows": joints[leader], "ratio": 1.0}
-
-
-def _meanings(hand: Hand) -> list[str]:
-    """What each joint does: known of the DLR-Hand II, else as its URDF says."""
-    if hand.name == DLR_HAND2.name:
-        return [FINGER[name[-2:]] for name in hand.joint_names]
-    return ["as in the URDF of the hand"] * hand.joints
-
-
 def _task(setting: TrainingSetting) -> dict[str, Any]:
-    """What is to be turned, and how."""
     constants, task = setting.constants, setting.task
     return {
         "object": {
@@ -175,9 +152,7 @@ def weights_hash(network: Network) -> str:
 def _test_vector(network: Network, hand: Hand) -> dict[str, Any]:
     """An observation that leaves no place at zero, and the action that belongs to it."""
     places = np.arange(network.observation_size)
-    rest = np.tile(
-        np.concatenate([hand.start_angles, np.zeros(hand.joints)]), network.observation_size // reading_size(hand)
-    )
+    rest = np.resize([*hand.start_angles, *np.zeros(hand.joints)], network.observation_size)
     observation = (rest + 0.05 * np.sin(1.0 + places)).astype(np.float32)
     return {"observation": _plain(observation), "action": _plain(network(observation))}
 
@@ -192,20 +167,11 @@ def _alike(values: Any) -> float | list[float]:
     return numbers[0] if len(set(numbers)) == 1 else numbers
 
 
-OPSET = 17
-FORMATS = ("npz", "onnx")
-METADATA = "tactile_cube.contract"
-"""Key of the contract in the metadata of an ONNX file."""
 Contract = dict[str, Any]
 
 
 def export_policy(network: Network, path: Path, setting: TrainingSetting | None = None) -> Path:
     """Write the network, `.npz` or `.onnx`, and `<path>.contract.json` beside it; return the contract's path.
-
-    Args:
-        network: the policy.
-        path: file to write.
-        setting: that it was trained in; None: as its file says.
 
     Raises:
         InputError: unknown ending, or ONNX is not installed.
@@ -251,7 +217,7 @@ def _write_onnx(network: Network, contract: Contract, path: Path) -> None:
     observation = helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["batch", network.observation_size])
     action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["batch", network.action_size])
     graph = helper.make_graph(nodes, "tactile_cube", [observation], [action], weights)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
-    helper.set_model_props(model, {METADATA: json.dumps(contract)})
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    helper.set_model_props(model, {"tactile_cube.contract": json.dumps(contract)})
     onnx.checker.check_model(model)
     onnx.save(model, path)

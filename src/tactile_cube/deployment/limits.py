@@ -17,14 +17,7 @@ RATE = 6.28
 
 
 def require_positive(numbers: Mapping[str, float]) -> None:
-    """Refuse a setting that is no finite number above 0.
-
-    Args:
-        numbers: key of the configuration -> its value.
-
-    Raises:
-        InputError: one of them bounds nothing, or everything.
-    """
+    """Raise an `InputError` for a key of the configuration whose value is no finite number above 0."""
     for key, value in numbers.items():
         if not (isinstance(value, (int, float)) and 0 < value < inf):
             raise InputError(f"{key} is {value}; give a finite number above 0")
@@ -32,15 +25,9 @@ def require_positive(numbers: Mapping[str, float]) -> None:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Range, rate and torque of the desired angles.
+    """Range `lower` to `upper` `(joints,)` [rad], rate [rad/s] and torque K_P (q_d - q_m) [N m] of desired angles q_d.
 
-    Attributes:
-        lower: `(joints,)` [rad].
-        upper: `(joints,)` [rad].
-        rate: largest change of a desired angle [rad/s].
-        torque: largest torque K_P (q_d - q_m) that a command may demand [N m].
-        kp: stiffness of the impedance law `(joints,)` [N m/rad].
-        kd: its damping `(joints,)` [N m s/rad]; it only brakes, so no limit depends on it.
+    With the gains of the impedance law `(joints,)`: kp [N m/rad], and kd [N m s/rad], which only brakes.
 
     Raises:
         InputError: a limit that bounds nothing.
@@ -69,16 +56,7 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class StopRules:
-    """What a measurement may be, and bounds beyond which the loop stops and holds position.
-
-    Attributes:
-        silence: longest time without an accepted measurement [s]; also how far a time stamp may be off the clock.
-        lateness: longest time between two ticks [s].
-        margin: how far a measured angle may lie outside the hand's range [rad]: joint offsets are up to 0.06 rad.
-        speed: fastest that a measured angle may move [rad/s]: a simulated finger that slips off an edge reaches 12
-            for some ms.
-        saturation: longest time that a joint may demand all the torque it has [s].
-    """
+    """What a measurement may be, and bounds beyond which the loop stops: `stop` of conf/deploy.yaml [s, rad, rad/s]."""
 
     silence: float = 0.02
     lateness: float = 0.02
@@ -92,12 +70,7 @@ class StopRules:
 
 
 class Watchdog:
-    """Judges every tick by the stop rules.
-
-    Args:
-        rules: the bounds.
-        names: of the joints.
-    """
+    """Judges every tick by the stop rules."""
 
     def __init__(self, rules: StopRules, names: tuple[str, ...]) -> None:
         self._rules, self._names = rules, names

@@ -31,27 +31,21 @@ class Robot(Protocol):
 
     def wait(self) -> float:
         """Wait for the next tick of the fast loop; return its time on a monotonic clock [s]."""
-        ...
 
     def read(self) -> Reading | None:
         """Return the newest measurement, or None if none has come since the last call."""
-        ...
 
     def send(self, q_d: Array) -> None:
         """Give the impedance controller its desired angles `(joints,)` [rad]."""
-        ...
 
     def wait_for_object(self) -> bool:
         """Return whether somebody confirmed, here at the robot, that the object is between the open fingers.
 
         Called every tick while the loop waits for it; Enter on the terminal confirms too.
         """
-        ...
 
     def release(self) -> None:
         """Called once, when the policy begins to decide: whoever holds the object lets go of it."""
-        ...
 
     def close(self) -> None:
         """End the connection."""
-        ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,16 +15,7 @@ from tactile_cube.hand import DLR_HAND2, Hand
 
 
 class Ros2Hand:
-    """A node that subscribes to joint states and publishes desired angles; needs rclpy and messages of ROS 2.
-
-    Args:
-        states: topic of the joint states, stamped by a clock that agrees with this computer's.
-        commands: topic of the desired angles, for an impedance controller with the contract's gains.
-        confirm: topic of std_msgs/Empty that confirms that the object is between the fingers.
-        names: joint of this package -> joint of the robot, where they are called otherwise.
-        zeros: angle of the robot's joint where this package's is zero [rad]; by default 0.
-        directions: -1 where the robot counts the other way; by default 1.
-        rate: of the fast loop [Hz].
+    """A node that subscribes to joint states and publishes desired angles; arguments are those of conf/robot/ros2.yaml.
 
     Raises:
         InputError: ROS 2 is not there, a joint that the hand has not, or no angle or direction.
@@ -50,7 +41,10 @@ class Ros2Hand:
             raise InputError(f"robot=ros2: {error}; source ROS 2's setup.bash, whose Python must be this one") from None
         joints = hand.joint_names
         require_positive({"robot.rate": rate})
-        _refuse_unknown(joints, names=names, zeros=zeros, directions=directions)
+        for key, mapping in {"names": names, "zeros": zeros, "directions": directions}.items():
+            for name in mapping or {}:
+                if name not in joints:
+                    raise InputError(f"robot.{key}: no joint {name!r}; the hand has {', '.join(joints)}")
         self._names = [(names or {}).get(joint, joint) for joint in joints]
         self._zeros = np.array([(zeros or {}).get(joint, 0.0) for joint in joints], dtype=np.float64)
         self._directions = np.array([float((directions or {}).get(joint, 1)) for joint in joints])
@@ -109,9 +103,9 @@ class Ros2Hand:
             return
         stamp, order = message.header.stamp, [places[name] for name in self._names]
         age = 1e-9 * (self._node.get_clock().now().nanoseconds - 1_000_000_000 * stamp.sec - stamp.nanosec)
-        q_m = self._directions * (_ordered(message.position, order) - self._zeros)
+        q_m = self._directions * (np.array(message.position, dtype=np.float64)[order] - self._zeros)
         felt = len(message.effort) == len(message.name)
-        torque = self._directions * _ordered(message.effort, order) if felt else None
+        torque = self._directions * np.array(message.effort, dtype=np.float64)[order] if felt else None
         self._new = Reading(time.monotonic() - age, q_m, torque)
 
     def _confirm(self, message: Any) -> None:
@@ -126,14 +120,3 @@ class Ros2Hand:
             raise InputError(f"robot.directions: {self._directions}; give 1 or -1")
         if len(set(self._names)) < len(self._names):
             raise InputError(f"robot.names: two joints with one name in {', '.join(self._names)}")
-
-
-def _ordered(values: Sequence[float], order: list[int]) -> Array:
-    return np.asarray(values, dtype=np.float64)[order]
-
-
-def _refuse_unknown(joints: Sequence[str], **given: Mapping[str, Any] | None) -> None:
-    for key, mapping in given.items():
-        for name in mapping or {}:
-            if name not in joints:
-                raise InputError(f"robot.{key}: no joint {name!r}; the hand has {', '.join(joints)}")

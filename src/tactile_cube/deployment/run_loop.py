@@ -28,114 +28,75 @@ from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTa
 Array = NDArray[np.float64]
 
 
-@dataclass
-class RunLog:
-    """One run of the loop, a row a measurement that was believed: time, measured, sent then."""
-
-    time: list[float] = field(default_factory=list)
-    command: list[Array] = field(default_factory=list)
-    position: list[Array] = field(default_factory=list)
-    torque: list[Array] = field(default_factory=list)
-
-    def add(self, reading: Reading, q_d: Array) -> None:
-        """Take over one tick; one without a measurement leaves a gap in the recording."""
-        self.time.append(reading.time)
-        self.command.append(np.array(q_d))
-        self.position.append(np.array(reading.q_m))
-        self.torque.append(np.full(len(reading.q_m), np.nan) if reading.torque is None else np.array(reading.torque))
-
-    def table(self, number: int) -> TrialTable:
-        """The run as a trial of kind `policy`, its time from 0 [s]."""
-        entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
-        torque = np.array(self.torque)
-        measured = None if np.isnan(torque).any() else torque
-        time = np.array(self.time) - self.time[0]
-        return TrialTable(entry, time, np.array(self.command), np.array(self.position), measured)
+Log = list[tuple[Reading, Array]]
+"""One run of the loop: each measurement that was believed, and the command `(joints,)` [rad] that was sent then."""
 
 
 def write_runs(
-    runs: Sequence[RunLog], folder: Path, limits: JointLimits, rate: float, resolution: float, hand: Hand = DLR_HAND2
+    runs: Sequence[Log], folder: Path, limits: JointLimits, rate: float, resolution: float, hand: Hand = DLR_HAND2
 ) -> Path:
-    """Write runs of the loop as one recording: of the hand alone, for no object is described.
+    """Write runs of the loop as one recording, a trial each: of the hand alone, for no object is described.
 
-    Args:
-        runs: one trial each.
-        folder: where.
-        limits: of the loop; its gains are the controller's.
-        rate: of the fast loop [Hz].
-        resolution: of the measured angles [rad].
-        hand: that was run.
+    The gains of `limits` are the controller's; `rate` is the fast loop's [Hz], `resolution` the sensors' [rad].
     """
     nominal = {"stiffness": STIFFNESS, "static_friction": STATIC_FRICTION, "reflected_inertia": REFLECTED_INERTIA}
     told = {key: hand.drive.get(key, value) for key, value in nominal.items()}
-    followers = {
-        hand.chain_joints(k)[link]: hand.chain_joints(k)[leader]
-        for k in range(len(hand.fingers))
-        for link, leader in hand.coupled()
-    }
+    chains = [hand.chain_joints(k) for k in range(len(hand.fingers))]
     description = Description(
         format=1,
-        gravity=[float(value) for value in hand.rotation.T @ (0.0, 0.0, -9.81)],
+        gravity=(hand.rotation.T @ (0.0, 0.0, -9.81)).tolist(),
         rate_hz=rate,
         joints=list(hand.joint_names),
-        coupled={name: Coupling(joint=leader) for name, leader in followers.items()},
-        controller=Controller(
-            kp=[float(value) for value in limits.kp], kd=[float(value) for value in limits.kd],
-            torque_limit=limits.torque,
-        ),
+        coupled={chain[link]: Coupling(joint=chain[leader]) for chain in chains for link, leader in hand.coupled()},
+        controller=Controller(kp=limits.kp.tolist(), kd=limits.kd.tolist(), torque_limit=limits.torque),
         nominal={key: np.asarray(value).tolist() for key, value in told.items()},
         sensors=Sensors(read="before", position_resolution=resolution),
         trials=[TrialEntry(file="none")],
         source="log of the control loop",
-    )  # fmt: skip
-    tables = [run.table(number) for number, run in enumerate(runs)]
+    )
+    tables = [_table(number, run) for number, run in enumerate(runs)]
     write_recording(folder, RecordingTables(description, hand.urdf(), tables))
     return folder
 
 
+def _table(number: int, run: Log) -> TrialTable:
+    """A run as a trial of kind `policy`, its time from 0 [s]."""
+    entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
+    time, position, command = (np.array(rows) for rows in zip(*((r.time, r.q_m, q_d) for r, q_d in run), strict=True))
+    torques = [reading.torque for reading, _ in run if reading.torque is not None]
+    measured = len(torques) == len(run) and not np.isnan(torques).any()
+    return TrialTable(entry, time - time[0], command, position, np.array(torques) if measured else None)
+
+
 NO_HAND = 5.0  # [s] without believable measurements at the beginning
 HOLD_TICKS = 200  # of the hold at the end: the command comes to rest, and a lost message does no harm
+TICK_TIMES = {"median": 0.5, "p99.9": 0.999, "largest": 1.0}
 Say = Callable[[str], None]
 
 
 @dataclass
 class LoopRun:
-    """One run of the loop.
+    """One run of the loop: why it ended and whether by a signal, and the log of the time in which the policy decided.
 
-    Attributes:
-        reason: why it ended.
-        interrupted: whether by a signal, as Ctrl-C is.
-        ended: when, on the robot's clock [s]; the time of the last tick while it runs.
-        log: of the time in which the policy decided.
-        ticks: computing time of every tick [s], without the hand's own.
+    `ended` is on the robot's clock [s]; `ticks` has the computing time of every tick [s], without the hand's own.
     """
 
     reason: str = ""
     interrupted: bool = False
     ended: float = 0.0
-    log: RunLog = field(default_factory=RunLog)
+    log: Log = field(default_factory=list, repr=False)
     ticks: list[float] = field(default_factory=list, repr=False)
 
     @property
     def tick_times(self) -> dict[str, float]:
         """Median, 99.9th percentile and largest computing time of a tick [s]."""
-        times = np.array(self.ticks)
-        return {
-            "median": float(np.median(times)),
-            "p99.9": float(np.quantile(times, 0.999)),
-            "largest": float(times.max()),
-        }
+        return {name: float(np.quantile(self.ticks, q)) for name, q in TICK_TIMES.items()}
 
 
 def run_loop(loop: ControlLoop, robot: Robot, say: Say = print) -> LoopRun:
-    """Run the loop until it stops by itself or a signal ends it.
+    """Run a new loop until it stops by itself or a signal ends it; `say` takes a line at each change of mode.
 
     However it ends, by an exception too, the hold is sent and the robot is closed.
-
-    Args:
-        loop: a new one.
-        robot: the hand.
-        say: takes a line at each change of mode.
     """
     run = LoopRun()
     with noted_signals() as signals, closing(robot):
@@ -178,7 +139,7 @@ def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun) -> None:
     run.ticks.append(time.perf_counter() - began)
     if q_d is not None:
         if running and loop.accepted is not None and loop.accepted is not before:
-            run.log.add(loop.accepted, q_d)
+            run.log.append((loop.accepted, q_d.copy()))
         robot.send(q_d)
 
 
@@ -209,11 +170,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class EnterKey:
-    """Enter on the terminal, from now on: what was typed before does not count.
-
-    Attributes:
-        usable: whether there is a terminal to type at.
-    """
+    """Enter on the terminal, where there is one, from now on: what was typed before does not count."""
 
     def __init__(self) -> None:
         self.usable = sys.stdin is not None and sys.stdin.isatty()

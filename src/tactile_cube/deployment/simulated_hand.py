@@ -22,29 +22,17 @@ NO_FILTER = 1e-9  # [s]: the loop filters, the world must not filter again
 
 @dataclass(frozen=True)
 class Disturbed:
-    """What a link between loop and hand gets wrong.
-
-    Attributes:
-        lost: share of the measurements that never arrive.
-        jitter: share of the ticks that come one to five periods late.
-    """
+    """Shares of the measurements that a link loses, and of the ticks that come one to five periods late."""
 
     lost: float = 0.0
     jitter: float = 0.0
 
 
 class SimulatedHand:
-    """A world that moves on while the loop waits, at the rate of the loop.
+    """A world that moves on while the loop waits; arguments are those of conf/robot/simulated.yaml.
 
-    Args:
-        rate: of the fast loop [Hz].
-        cube: whether there is one to turn.
-        noise: standard deviation of the measured angles [rad].
-        resolution: of the measured angles [rad].
-        opened: how far the fingers are from the start angles at first [rad].
-        link: what gets lost on the way.
-        seed: of noise and link.
-        setting: hand, object, table and task; None: the DLR-Hand II around the nominal cube.
+    `setting` has hand, object, table and task; None: the DLR-Hand II around the nominal cube. `cube` says whether there
+    is an object to turn.
     """
 
     def __init__(
@@ -63,7 +51,7 @@ class SimulatedHand:
         hand = self._setting.hand
         self._world = World(hand, options=SimulationOptions(dt=1.0 / rate, substeps=1))
         self._rate, self._noise, self._resolution = rate, noise, resolution
-        self._cube, self._link = cube, link or Disturbed()
+        self.cube, self._link = cube, link or Disturbed()
         self._rng = np.random.default_rng(seed)
         self._given = self._setting.constants
         self._ticks, self._late = 0, 0
@@ -73,16 +61,6 @@ class SimulatedHand:
         self._world.reset(empty, Start(np.maximum(away, hand.lower), AWAY))
         self._q_d = np.array(self._world.q_m)
         self._frame, self._theta = frame_along(self._setting.task.axis_vector()), [0.0]
-
-    @property
-    def world(self) -> World:
-        """What simulates."""
-        return self._world
-
-    @property
-    def has_cube(self) -> bool:
-        """Whether there is a cube to turn."""
-        return self._cube
 
     def turned(self, at: float) -> float:
         """Return how far the object had been turned the wanted way at a time [s] of the clock, unwrapped [rad]."""
@@ -116,7 +94,7 @@ class SimulatedHand:
 
     def release(self) -> None:
         """Put the object between the fingers; without a table under it, it has no weight for the first 0.4 s."""
-        if self._cube:
+        if self.cube:
             world, held = self._world, self._given.gravity_onset
             start = Start(np.array(world.q), target=np.array(self._q_d), velocities=np.array(world.dq))
             onset = round(0.1 * held * self._rate)

@@ -22,13 +22,9 @@ CONSTANTS = {"object", *(field.name for field in fields(EpisodeConstants))}
 
 @dataclass(frozen=True)
 class TrainingSetting:
-    """What a robot's loop takes over from the training.
+    """What a robot's loop takes over from the training: the hand, with start angles around the object, and the task.
 
-    Attributes:
-        hand: its start angles are those around the object.
-        constants: of an episode, without what randomisation varied: gains, torque limit, object, table. The object
-            weighs in full, wherever the curriculum stood: on a robot it does.
-        task: which way to turn the object, and about which axis.
+    The constants are without what randomisation varied; the object weighs in full, wherever the curriculum stood.
     """
 
     hand: Hand

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tactile_cube.console_log import NOBODY_READS, console_kept_in
+from tactile_cube.cli import PIPE_CLOSED
+from tactile_cube.run_folder import console_kept_in
 
 
 def test_lines_errors_and_lines_in_place_are_kept_without_colours(
@@ -37,8 +38,9 @@ def test_the_next_session_appends(tmp_path: Path) -> None:
 
 def test_a_reader_that_leaves_ends_the_command_without_a_word(tmp_path: Path) -> None:
     talks = (
-        "from pathlib import Path; from tactile_cube.console_log import NOBODY_READS, console_kept_in\n"
-        f"with console_kept_in(Path({str(tmp_path / 'talk.log')!r})):\n"
+        "from pathlib import Path; from tactile_cube.run_folder import console_kept_in\n"
+        "from tactile_cube.cli import quiet_when_nobody_reads\n"
+        f"with quiet_when_nobody_reads(), console_kept_in(Path({str(tmp_path / 'talk.log')!r})):\n"
         "    for line in range(100_000): print('line', line)\n"
     )
     with subprocess.Popen([sys.executable, "-c", talks], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as talker:
@@ -47,5 +49,5 @@ def test_a_reader_that_leaves_ends_the_command_without_a_word(tmp_path: Path) ->
         assert talker.stdout.readline() == b"line 0\n"
         talker.stdout.close()
         assert talker.stderr.read() == b""
-    assert talker.returncode == NOBODY_READS
+    assert talker.returncode == PIPE_CLOSED
     assert "line 0\n" in (tmp_path / "talk.log").read_text()

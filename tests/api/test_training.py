@@ -11,7 +11,7 @@ import tactile_cube
 from benchmarks.paper.ancestry import read_ancestry
 from tactile_cube import InputError
 from tactile_cube.agent.policy_file import load_policy
-from tactile_cube.api import stages
+from tactile_cube.api import training
 from tactile_cube.api.job import Job, called_job
 from tactile_cube.api.training import TrainingResult
 from tactile_cube.training.run import INTERRUPTED, Run
@@ -41,7 +41,7 @@ def trained(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, int]]:
     """What stages are asked to train: folder, networks to begin with, steps still to come after it; nothing is."""
     asked: list[tuple[str, str, int]] = []
 
-    def run(job: Job, stage: str, later: int) -> TrainingResult:
+    def run(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
         asked.append((job.folder.name, str(job.config.training.init_from), later))
         return TrainingResult(job.folder, "mastered: above 5 rad" if len(asked) < 3 else "all 9 steps done", 9, 5.0)
 
@@ -49,8 +49,8 @@ def trained(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, int]]:
         (job.folder / "policy.safetensors").touch()
         return f"judged {last.name}"
 
-    monkeypatch.setattr(stages, "run_training", run)
-    monkeypatch.setattr(stages, "judged", judge)
+    monkeypatch.setattr(training, "_in_one", run)
+    monkeypatch.setattr(training, "judged", judge)
     return asked
 
 
@@ -71,25 +71,25 @@ def test_each_stage_goes_on_from_the_one_before_and_the_screen_says_what_is_mast
 
 def test_what_the_user_asks_for_holds_in_every_stage(tmp_path: Path) -> None:
     words = ("+experiment=curriculum", "seed=3", "name=mine", "reward=air", "start=paper", "~stages.holding")
-    found = stages.stages_of(called_job("train", words, tmp_path, model="mine.yaml"))
-    assert [stage.name for stage in found] == ["gaiting", "worlds"]
-    assert {(stage.job.config.seed, stage.job.config.reward.spin) for stage in found} == {(3, 16)}
-    assert found[1].job.config.randomization.steered == 0.7
-    assert {stage.job.config.model for stage in found} == {"mine.yaml"}
+    found = training.stages_of(called_job("train", words, tmp_path, model="mine.yaml"))
+    assert [stage.folder.name for stage in found] == ["gaiting", "worlds"]
+    assert {(stage.config.seed, stage.config.reward.spin) for stage in found} == {(3, 16)}
+    assert found[1].config.randomization.steered == 0.7
+    assert {stage.config.model for stage in found} == {"mine.yaml"}
 
 
 def test_no_stage_is_taught_by_anybody(tmp_path: Path) -> None:
-    for stage in stages.stages_of(called_job("train", ("+experiment=curriculum",), tmp_path)):
-        config = stage.job.config
+    for stage in training.stages_of(called_job("train", ("+experiment=curriculum",), tmp_path)):
+        config = stage.config
         assert (config.exploration.demonstrations, config.agent.demonstration_weight) == (0.0, 0)
         assert "gaits" not in config.exploration
         assert "teacher" not in config.exploration
 
 
 def test_a_hand_that_the_package_has_no_grasps_of_gets_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stages, "GRASPS", 1)
-    first = stages.stages_of(called_job("train", ("+experiment=curriculum", "hand=three_finger"), tmp_path))[0]
-    assert first.job.config.start.file == str(tmp_path / "grasps.npz")
+    monkeypatch.setattr(training, "GRASPS", 1)
+    first = training.stages_of(called_job("train", ("+experiment=curriculum", "hand=three_finger"), tmp_path))[0]
+    assert first.config.start.file == str(tmp_path / "grasps.npz")
     assert (tmp_path / "grasps.npz").is_file()
 
 
@@ -101,7 +101,7 @@ def test_a_stage_that_cannot_be_composed_is_an_input_error(tmp_path: Path) -> No
 def interrupted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C in the middle of the second stage, the first time it is there; then before the third stage begins."""
     to_come = ["in holding", "before worlds"]
-    reason, run = Run._reason_to_stop, stages.run_training
+    reason, run = Run._reason_to_stop, training._in_one
 
     def stop(self: Run) -> str:
         if "in holding" in to_come and self.folder.name == "holding" and self.learner.steps == 16:
@@ -116,7 +116,7 @@ def interrupted_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return run(job, *rest)
 
     monkeypatch.setattr(Run, "_reason_to_stop", stop)
-    monkeypatch.setattr(stages, "run_training", before)
+    monkeypatch.setattr(training, "_in_one", before)
 
 
 def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_policy(
