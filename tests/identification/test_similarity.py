@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
-from tactile_cube.identification.search.search import Findings, Search
+from tactile_cube.identification.search.findings import Findings, find
+from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
@@ -27,7 +28,7 @@ def findings(folder: Path, size: Size) -> Findings:
     """What a search among a few effects finds of a rig that hides viscous friction."""
     recording = simulated(folder, size, VISCOUS, {"damping": 0.08 * size.damping})
     fitted, held_out = held_out_split(recording)
-    return Search(fitted, held_out, sensor_noise(recording), EFFECTS, lambda line: None).run()
+    return find(Search(fitted, held_out, sensor_noise(recording), EFFECTS, lambda line: None))
 
 
 @pytest.mark.parametrize("name", SIZES)

@@ -10,9 +10,8 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, worse
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.search import Findings
-from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
+from tactile_cube.identification.search.explanation import Explanation, least_gain, unproven, worthwhile
+from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.simulations import Unexplained, follows_signals
 from tactile_cube.identification.verdict import Questions, at_bound, decide, unexplained_joints
 from tactile_cube.measurement.replay.model import Model, Term

@@ -21,7 +21,8 @@ from tactile_cube.identification.late_commands import in_time
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import judge
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.search import Findings, Search
+from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
 from tactile_cube.identification.simulations import Unexplained, with_offsets
 from tactile_cube.identification.verdict import Verdict

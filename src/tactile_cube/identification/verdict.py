@@ -9,9 +9,8 @@ from typing import Literal
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.search.evidence import gain, p_value, worse
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.search import Findings
-from tactile_cube.identification.search.simplicity import contains, named, simplest
+from tactile_cube.identification.search.explanation import Explanation, contains, named, simplest
+from tactile_cube.identification.search.findings import Findings
 
 Kind = Literal["adequate", "missing_effect", "ambiguous", "partly_explained", "unknown_effect"]
 

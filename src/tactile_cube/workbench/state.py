@@ -28,8 +28,7 @@ from tactile_cube.identification.recommended import UNITS, model_file
 from tactile_cube.identification.search.division import BRIEF
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques
-from tactile_cube.identification.search.screening import Score, screen
-from tactile_cube.identification.search.shortlist import resized
+from tactile_cube.identification.search.screening import Score, resized, screen
 from tactile_cube.identification.simulations import with_offsets
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison

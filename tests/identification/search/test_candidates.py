@@ -8,15 +8,13 @@ import pytest
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales
 from tactile_cube.identification.search.candidates import Candidate, candidates
-from tactile_cube.identification.search.screening import Score
-from tactile_cube.identification.search.shortlist import resized, start
+from tactile_cube.identification.search.screening import Score, resized, start
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
 from tests.measurement.small_rig import write
 
-SCORE = Score(Candidate(find_effect("command_delay"), ("q1",), {"delay": 0.005}), Model({}, (), {}), 1.0, 3.0)
+SCORE = Score(Candidate(find_effect("command_delay"), ("q1",), {"delay": 0.005}), 1.0, 3.0)
 
 
 def sizes(recording: Recording) -> dict[str, Scales]:

@@ -4,7 +4,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.search.candidates import Candidate, forms
-from tactile_cube.identification.search.other_starts import other_starts
+from tactile_cube.identification.search.relatives import other_starts
 from tactile_cube.measurement.replay.model import Model
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.identification.search.periodicity import peaks
+from tactile_cube.identification.search.residual_starts import peaks
 
 
 @pytest.mark.parametrize("harmonic", [6.0, 24.7, 91.0])

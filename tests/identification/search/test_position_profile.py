@@ -7,8 +7,8 @@ from tactile_cube.drivetrain.effects import ANGLE, JOINT_TORQUE, find_effect
 from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.identification.search.candidates import forms
-from tactile_cube.identification.search.position_profile import PROFILE, start_of
 from tactile_cube.identification.search.residual_shape import Missing
+from tactile_cube.identification.search.residual_starts import PROFILE, start_of
 
 EFFECT = find_effect("position_torque")
 FORM = next(form for form in forms(EFFECT) if PROFILE in form)

@@ -5,8 +5,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.identification.search.candidates import Candidate, forms
-from tactile_cube.identification.search.position_profile import PROFILE
-from tactile_cube.identification.search.special_laws import special_candidates
+from tactile_cube.identification.search.residual_starts import PROFILE, special_candidates
 from tactile_cube.measurement.replay.model import Term
 
 EFFECT = find_effect("position_torque")

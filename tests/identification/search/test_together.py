@@ -10,10 +10,9 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, all_of
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.screening import Score
-from tactile_cube.identification.search.subsets import Columns, best_subsets, possible
-from tactile_cube.identification.search.together import Proposal, Together
+from tactile_cube.identification.search.explanation import Explanation, Proposal
+from tactile_cube.identification.search.screening import Columns, Score, best_subsets, possible
+from tactile_cube.identification.search.together import Together
 from tactile_cube.measurement.replay.model import Model, Term
 from tests.identification.test_verdict import FIT, MODEL, judged
 
@@ -24,7 +23,7 @@ def candidate(name: str) -> Candidate:
 
 
 def columns(names: list[str], gradient: list[float], gram: list[list[float]]) -> Columns:
-    scores = [Score(candidate(name), MODEL, 0.0, 1.0) for name in names]
+    scores = [Score(candidate(name), 0.0, 1.0) for name in names]
     return Columns(scores, np.array(gradient), np.array(gram))
 
 
@@ -34,16 +33,16 @@ def test_two_effects_that_help_only_together_are_the_best_pair() -> None:
     first, second, third = np.array([1.0, 0.0, 0.0]), np.array([-0.98, 0.2, 0.0]), np.array([0.0, 0.3, 1.0])
     residual, stacked = np.array([0.02, 0.2, 0.0]), np.stack([first, second, third])
     looked_at = columns(names, list(stacked @ residual), (stacked @ stacked.T).tolist())
-    single, pair = best_subsets(looked_at, 1)[0], best_subsets(looked_at, 2)[0]
-    assert single.gain < 0.5 * pair.gain
-    assert {one.effect.name for one in pair.candidates} == {"viscous_friction", "reflected_inertia"}
-    assert pair.gain == pytest.approx(float(residual @ residual), rel=1e-6)
+    (single, _), (together, pair) = best_subsets(looked_at, 1)[0], best_subsets(looked_at, 2)[0]
+    assert single < 0.5 * together
+    assert {one.effect.name for one in pair} == {"viscous_friction", "reflected_inertia"}
+    assert together == pytest.approx(float(residual @ residual), rel=1e-6)
 
 
 def test_a_friction_that_would_have_to_drive_the_joint_is_in_no_set() -> None:
     names = ["coulomb_friction", "torque_gain"]
     found = best_subsets(columns(names, [-3.0, -2.0], [[10.0, 0.0], [0.0, 10.0]]), 1)
-    assert [one.candidates[0].effect.name for one in found] == ["torque_gain"]
+    assert [one.effect.name for _, (one,) in found] == ["torque_gain"]
     assert not possible(candidate("coulomb_friction"), -0.5)
     assert possible(candidate("torque_gain"), -0.5)
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.relatives import with_effects
 from tactile_cube.identification.search.residual_shape import Missing, missing_torques
-from tactile_cube.identification.search.together import with_effects
-
-if TYPE_CHECKING:
-    from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.search.search import Search
 
 ITERATIONS = 12
 MOVES = 0.05  # of a joint's speed: slower samples say little of its friction

@@ -3,45 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
-from tactile_cube.identification.criteria import Criteria
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.fitting.gauss_newton import fit
 from tactile_cube.identification.search.division import BRIEF, Division
 from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
-from tactile_cube.identification.search.explanation import Explanation, without_effect
-from tactile_cube.identification.search.relatives import special_cases
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
+from tactile_cube.identification.search.relatives import special_cases, with_effects, without_effect
 from tactile_cube.identification.search.residual_starts import residual_candidates
-from tactile_cube.identification.search.simplicity import named_by
-from tactile_cube.identification.search.subsets import best_subsets, candidate_columns
+from tactile_cube.identification.search.screening import best_subsets, candidate_columns
+from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.replay.model import Model
-
-if TYPE_CHECKING:
-    from tactile_cube.identification.search.search import Search
 
 MOST = 4  # effects in a set; one more than are looked for one by one, for pruning takes back what was too much
 REFITTED = 6  # sets of each size that are refitted briefly, of which the best ones go on
 KEPT = 2  # sets that are grown further
 JUDGED = 4  # sets that the held-out trials are asked about
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """A set of effects and how it fits; no held-out trial has been asked.
-
-    Attributes:
-        effects: in the order in which they came.
-        fit: of everything together.
-    """
-
-    effects: tuple[Candidate, ...]
-    fit: Fit = field(repr=False)
-
-    def price(self, criteria: Criteria) -> float:
-        """Squared error, with as much for each number as an effect has to explain at least."""
-        return float(self.fit.cost / (1.0 - criteria.least_gain) ** sum(one.size for one in self.effects))
 
 
 class Together:
@@ -114,10 +91,10 @@ class Together:
         wanted = [*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)]
         wanted = [one for one in search.new(wanted) if there.isdisjoint(named_by([one]))]
         columns, brief = candidate_columns(problem, frozen, wanted), []
-        for chosen in (one for size in sizes for one in best_subsets(columns, size)[:REFITTED]):
-            model = with_effects(frozen.model, chosen.candidates)
+        for _, chosen in (one for size in sizes for one in best_subsets(columns, size)[:REFITTED]):
+            model = with_effects(frozen.model, chosen)
             own = search.unknowns(model)[len(frozen.unknowns) :]
-            brief.append(Proposal((*parent.effects, *chosen.candidates), fit(problem, model, own, BRIEF, frozen)))
+            brief.append(Proposal((*parent.effects, *chosen), fit(problem, model, own, BRIEF, frozen)))
         leading = self.best(brief)[:KEPT]
         full = [replace(one, fit=search.refitted(one.fit.model)) for one in leading]
         for one in full:
@@ -166,10 +143,3 @@ class Together:
         found = Explanation(one.effects, one.fit, own, corrected, gain(self.base_evidence, evidence))
         self.search.say(f"  held-out error {evidence.error:.3f}  p {corrected:.1e}  {found.label}")
         return found
-
-
-def with_effects(model: Model, candidates: Sequence[Candidate]) -> Model:
-    """The model with all of them at their starts."""
-    for candidate in candidates:
-        model, _ = candidate.added_to(model)
-    return model
