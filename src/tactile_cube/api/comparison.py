@@ -98,7 +98,7 @@ def compare(
 
 def run_comparison(job: Job, recording: Recording, model: ModelFile | None, say: Say) -> ComparisonResult:
     """Compare as a job says: free motion, or grasps where there is nothing else."""
-    from tactile_cube.identification.contact.diagnosis import compare_contact
+    from tactile_cube.identification.contact.trial import compare_contact
     from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
     from tactile_cube.measurement.comparing import comparison
 

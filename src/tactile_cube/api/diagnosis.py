@@ -150,7 +150,7 @@ def run_diagnosis(job: Job, recording: Recording, known: ModelFile | None, say: 
 
 def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
     from tactile_cube.identification.contact.diagnosis import diagnose_contact
-    from tactile_cube.identification.contact.identification import stated_model
+    from tactile_cube.identification.recommended import stated_model
 
     config = job.config
     contact = diagnose_contact(recording, known, config.step, config.seed, say)

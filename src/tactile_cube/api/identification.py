@@ -127,7 +127,8 @@ def run_identification(job: Job, recording: Recording, say: Say) -> Identificati
 
 
 def _of_grasps(job: Job, recording: Recording, effects: list[Any], say: Say) -> IdentificationResult:
-    from tactile_cube.identification.contact.identification import identify_contact, stated_model
+    from tactile_cube.identification.contact.identification import identify_contact
+    from tactile_cube.identification.recommended import stated_model
 
     config = job.config
     found = identify_contact(recording, effects, None, config.step, config.seed, say)

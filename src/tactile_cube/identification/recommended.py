@@ -12,6 +12,7 @@ from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelEr
 from tactile_cube.identification.fitting.intervals import Fitted, bounds
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term
+from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
 
 UNITS = {
     "kp": "N m/rad",
@@ -38,16 +39,32 @@ def model_file(
         values={key: _constants(fitted.model, key, joints, known) for key in UNITS},
         effects=[effect_estimate(term, place, known) for place, term in enumerate(fitted.model.terms)],
         offsets={joint: _offset(fitted.model, j) for j, joint in enumerate(joints)},
-        provenance=Provenance(
-            recording=str(recording.folder),
-            command=command,
-            created=datetime.now(UTC).isoformat(timespec="seconds"),
-            version=version("tactile-cube"),
-            seed=seed,
-            trials=[trial.name for trial in recording.trials if trial.name not in held_out],
-            held_out=held_out,
-        ),
+        provenance=_provenance(recording, held_out, command, seed),
         errors=errors,
+    )
+
+
+def stated_model(recording: Recording, command: str, seed: int) -> ModelFile:
+    """What recording.yaml says of the drivetrain, as a model without intervals; it is silent where the recording is."""
+    every = nominal_model(recording).constants
+    values = {
+        key: {joint: _estimate(float(v), None, "") for joint, v in zip(recording.joints, row, strict=True)}
+        for key, row in every.items()
+        if key in (*CONTROLLER, *recording.nominal)
+    }
+    provenance = _provenance(recording, [], command, seed)
+    return ModelFile(rig=recording.name, joints=list(recording.joints), values=values, provenance=provenance)
+
+
+def _provenance(recording: Recording, held_out: list[str], command: str, seed: int) -> Provenance:
+    return Provenance(
+        recording=str(recording.folder),
+        command=command,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        version=version("tactile-cube"),
+        seed=seed,
+        trials=[trial.name for trial in recording.trials if trial.name not in held_out],
+        held_out=held_out,
     )
 
 
