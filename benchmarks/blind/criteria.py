@@ -33,8 +33,7 @@ from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.explanation import Explanation, Proposal, least_gain
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.together import Together
-from tactile_cube.identification.simulations import Simulations, Unexplained
-from tactile_cube.identification.verdict import Verdict, decide
+from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, decide
 from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_cube.identification.command_limits import Envelope, Limits, limits_of, share_used, within_limits
+from tactile_cube.identification.safe_commands import Envelope, Limits, limits_of, share_used, within_limits
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import URDF, write
 

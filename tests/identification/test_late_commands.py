@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 
 from tactile_cube.drivetrain.effects import find_effect
-from tactile_cube.identification.late_commands import in_time
+from tactile_cube.identification.disturbances import in_time
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.identification.rigs_of_any_size import EFFECTS, SAMPLES, STEP, Size, simulated
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tactile_cube.identification.experiment_in_words import next_steps
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.in_words import next_steps
 from tactile_cube.identification.next_experiment import next_experiment
 from tactile_cube.identification.safe_commands import (
     PossibleMotions,

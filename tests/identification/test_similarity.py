@@ -8,11 +8,11 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.identification.search.findings import Findings, find
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.verdict import decide
 from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import EFFECTS, Size, simulated
+from tests.identification.test_verdict import decide
 
 VISCOUS = find_effect("viscous_friction")
 FINGER = Size()

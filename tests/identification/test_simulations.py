@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tactile_cube.identification import simulations as asked
+from tactile_cube.identification import verdict as asked
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.simulations import Simulations
+from tactile_cube.identification.verdict import Simulations, Unexplained
 from tests.identification.test_verdict import explanation
 
 
@@ -29,7 +28,7 @@ class Judges:
 
 def simulations(monkeypatch: pytest.MonkeyPatch, source: str = "repeats", off: float = 0.0) -> Simulations:
     monkeypatch.setattr(asked, "Problem", lambda *_: None)
-    search = SimpleNamespace(shooting=None, all_windows=None, criteria=STANDARD, validation=Judges(off))
+    search = SimpleNamespace(shooting=None, all_windows=None, criteria=STANDARD, validation=Judges(off), held_out=None)
     floor = SimpleNamespace(source=source, overall=2e-3)
     return Simulations(search, explanation("backlash", 9.0), floor, "fast", 0.002)  # type: ignore[arg-type]
 
@@ -43,18 +42,29 @@ def test_laws_that_differ_by_a_part_of_the_noise_are_one(
 
 
 @pytest.mark.parametrize(
-    ("source", "error", "answer"), [("repeats", 1e-3, True), ("repeats", 3e-3, False), ("guess", 1e-3, False)]
+    ("source", "left", "answer"), [("repeats", 1e-3, True), ("repeats", 3e-3, False), ("guess", 1e-3, False)]
 )
 def test_a_free_run_is_compared_with_repeats_once(
-    monkeypatch: pytest.MonkeyPatch, source: str, error: float, answer: bool
+    monkeypatch: pytest.MonkeyPatch, source: str, left: float, answer: bool
 ) -> None:
     ask, runs = simulations(monkeypatch, source), []
 
-    def run(one: Explanation) -> object:
-        runs.append(one.label)
-        return SimpleNamespace(overall=error)
+    def error(held_out: object, simulated: object) -> object:
+        runs.append(simulated)
+        return SimpleNamespace(overall=left)
 
-    monkeypatch.setattr(ask, "simulated_error", run)
+    monkeypatch.setattr(ask, "final", lambda one: SimpleNamespace(model=one.judgement.model))
+    monkeypatch.setattr(asked, "free_run", lambda *_: "run")
+    monkeypatch.setattr(asked, "free_run_error", error)
     one = explanation("coulomb_friction", 1.0)
     assert ask.as_repeats(one) is ask.as_repeats(one) is answer
-    assert runs == ([one.label] if source == "repeats" else [])
+    assert runs == (["run"] if source == "repeats" else [])
+
+
+@pytest.mark.parametrize(("left", "answer"), [((), False), ((0.1, 0.0), False), ((0.0, 0.45), True)])
+def test_what_is_left_follows_the_signals_where_a_black_box_explains_more_than_chance(
+    monkeypatch: pytest.MonkeyPatch, left: tuple[float, ...], answer: bool
+) -> None:
+    ask = simulations(monkeypatch)
+    monkeypatch.setattr(ask, "unexplained", lambda one: [Unexplained("q1", [], share) for share in left])
+    assert ask.follows_signals(explanation("backlash", 2.0)) is answer

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification import verdict as module
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, worse
 from tactile_cube.identification.search.explanation import Explanation, least_gain, unproven, worthwhile
 from tactile_cube.identification.search.findings import Findings
-from tactile_cube.identification.simulations import Unexplained, follows_signals
-from tactile_cube.identification.verdict import Questions, at_bound, decide, unexplained_joints
+from tactile_cube.identification.verdict import Verdict, at_bound, unexplained_joints
 from tactile_cube.measurement.replay.model import Model, Term
 
 MODEL = Model({}, (), {})
@@ -31,7 +31,7 @@ def judged(error: float, seed: int = 0) -> Judgement:
 JOINTS = ("q1", "q2")
 
 
-class Answers(Questions):
+class Answers:
     """What simulations would say, made up."""
 
     def __init__(self, repeats: bool = False, follows: bool = False, alike: bool = False) -> None:
@@ -45,6 +45,11 @@ class Answers(Questions):
 
     def alike(self, one: Explanation, other: Explanation) -> bool:
         return self.same
+
+
+def decide(found: Findings, answers: Answers | None = None, criteria: Criteria = STANDARD) -> Verdict:
+    """The verdict where simulations would say so."""
+    return module.decide(found, answers or Answers(), criteria)  # type: ignore[arg-type]
 
 
 def explanation(name: str, error: float, base: float = 20.0, seed: int = 0) -> Explanation:
@@ -197,12 +202,6 @@ def test_most_of_what_is_missing_is_named_and_said_not_to_be_all() -> None:
     assert (verdict.kind, verdict.chosen.effects[0].effect.name, verdict.rivals) == ("partly_explained", "backlash", ())
     assert [one.effects[0].effect.name for one in decide(findings(20.0, lever, scale)).rivals] == ["payload"]
     assert decide(findings(20.0, explanation("backlash", 7.0))).kind == "unknown_effect"
-
-
-def test_what_a_black_box_still_explains_is_not_noise() -> None:
-    assert not follows_signals([])
-    assert not follows_signals([Unexplained("q1", [], 0.1), Unexplained("q2", [], 0.0)])
-    assert follows_signals([Unexplained("q1", [], 0.0), Unexplained("q2", [], 0.45)])
 
 
 def test_joints_are_unexplained_while_their_error_stays_above_the_noise() -> None:

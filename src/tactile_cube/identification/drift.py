@@ -9,8 +9,8 @@ import numpy as np
 from scipy import stats
 
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
+from tactile_cube.identification.fitting.intervals import NORMAL_95
 
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)

@@ -13,16 +13,16 @@ from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.errors import InputError
+from tactile_cube.identification.disturbances import in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
-from tactile_cube.identification.late_commands import in_time
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.simulations import with_offsets
+from tactile_cube.identification.verdict import with_offsets
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording

@@ -14,8 +14,7 @@ from tactile_cube.identification.disturbances import Disturbance, disturbances, 
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.findings import Findings, among, find
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.simulations import Simulations
-from tactile_cube.identification.verdict import Verdict, decide
+from tactile_cube.identification.verdict import Simulations, Verdict, decide
 from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.simulator import Engine

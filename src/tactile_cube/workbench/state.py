@@ -29,7 +29,7 @@ from tactile_cube.identification.search.division import BRIEF
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques
 from tactile_cube.identification.search.screening import Score, resized, screen
-from tactile_cube.identification.simulations import with_offsets
+from tactile_cube.identification.verdict import with_offsets
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error, raw_residuals, summarise_errors

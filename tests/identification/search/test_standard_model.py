@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.identification.search.residual_shape import Missing
-from tactile_cube.identification.search.standard_model import regressed
+from tactile_cube.identification.search.together import regressed
 
 RNG = np.random.default_rng(0)
 

@@ -11,8 +11,7 @@ from tactile_cube.identification.search.relatives import without_effect
 from tactile_cube.identification.search.screening import Score, screen, with_groups
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import shared_offset
-from tactile_cube.identification.search.standard_model import standard_explanation
-from tactile_cube.identification.search.together import Together
+from tactile_cube.identification.search.together import Together, standard_explanation
 
 
 @dataclass(frozen=True)
