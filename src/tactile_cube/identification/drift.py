@@ -12,7 +12,6 @@ from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.identification.fitting.intervals import NORMAL_95
 
 
-
 @dataclass(frozen=True)
 class Drift:
     """One number of a model, before and now.

@@ -1,4 +1,4 @@
-"""Simpler and richer laws of the same kind as one that is fitted."""
+"""Simpler and richer laws of the same kind as one that is fitted, and values around a fit."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,7 +10,7 @@ from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, candidates, forms
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.relatives import special_cases, with_details
+from tactile_cube.identification.search.relatives import other_starts, special_cases, with_details
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.replay.model import Model
 from tests.identification.test_verdict import FIT, judged
@@ -132,3 +132,37 @@ def test_details_come_along_where_they_help_clearly(cost: float, tried: int, mon
     monkeypatch.setattr(module, "fit", lambda problem, model, *_: SimpleNamespace(cost=cost, model=model))
     found = Stubbed({}).and_richer(FIT, [(drift, SimpleNamespace(cost=100.0, model=model))])  # type: ignore[list-item]
     assert [len(one.form) for one, _ in found] == [2, 3][:tried]
+
+
+def at_first(name: str, joints: tuple[str, ...] = ("q2",), form: int = 0) -> tuple[Candidate, Model]:
+    effect = find_effect(name)
+    candidate = Candidate(effect, joints, forms(effect)[form])
+    return candidate, candidate.added_to(Model({}, (), {}))[0]
+
+
+def test_every_combination_but_the_fit_itself_is_there_once() -> None:
+    candidate, model = at_first("stribeck_friction")
+    starts = [tuple(one.terms[0].values[name] for name in candidate.form) for one in other_starts(candidate, model)]
+    assert len(set(starts)) == len(starts) == 24
+    excess, velocity = (model.terms[0].values[name] for name in candidate.form)
+    assert (0.5 * excess, pytest.approx(2.0 * velocity)) in starts
+    assert (excess, velocity) not in starts
+
+
+def test_all_joints_of_an_effect_change_together_and_stay_within_bounds() -> None:
+    candidate, model = at_first("coulomb_friction", ("q1", "q2"))
+    high = {p.name: p.high for p in candidate.effect.parameters}["friction"]
+    starts = [[term.values["friction"] for term in one.terms] for one in other_starts(candidate, model)]
+    assert all(first == second <= high for first, second in starts)
+
+
+def test_only_the_last_effect_changes() -> None:
+    _, before = at_first("torque_bias")
+    candidate, _ = at_first("stribeck_friction")
+    model = candidate.added_to(before)[0]
+    assert {one.terms[0].values["bias"] for one in other_starts(candidate, model)} == {before.terms[0].values["bias"]}
+
+
+def test_ripples_and_profiles_have_no_other_starts() -> None:
+    assert other_starts(*at_first("cogging")) == []
+    assert other_starts(*at_first("position_torque", form=1)) == []

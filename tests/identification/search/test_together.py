@@ -1,4 +1,4 @@
-"""The search from everything at once, with fits and held-out costs that are made up."""
+"""The search from everything at once, with fits and held-out costs that are made up; the standard model."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,8 +11,9 @@ from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, all_of
 from tactile_cube.identification.search.explanation import Explanation, Proposal
+from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.identification.search.screening import Columns, Score, best_subsets, possible
-from tactile_cube.identification.search.together import Together
+from tactile_cube.identification.search.together import Together, regressed
 from tactile_cube.measurement.replay.model import Model, Term
 from tests.identification.test_verdict import FIT, MODEL, judged
 
@@ -134,3 +135,19 @@ def test_a_set_in_the_price_of_which_each_number_counts() -> None:
     assert one.price(STANDARD) == pytest.approx(100.0 / 0.96)
     two = Proposal((plain, rich), SimpleNamespace(cost=97.0))  # type: ignore[arg-type]
     assert two.price(STANDARD) > one.price(STANDARD)
+
+
+RNG = np.random.default_rng(0)
+
+
+def test_friction_by_direction_offset_and_gain_come_back_from_the_missing_torque() -> None:
+    speed, drive = RNG.normal(size=5000), 30.0 * RNG.normal(size=5000)
+    torque = -20.4 * np.sign(speed) - np.where(speed > 0, 167.0, 240.0) * speed - 3.2 + 0.05 * drive
+    signals = {"velocity of slide [rad/s]": speed, "torque of slide [N m]": drive}
+    blocks = np.zeros(5000, dtype=np.int64)
+    found = regressed(Missing("slide", torque + RNG.normal(size=5000), signals, blocks, blocks))
+    assert found["coulomb_friction"]["friction"] == pytest.approx(20.4, rel=0.01)
+    assert found["viscous_friction"]["damping"] == pytest.approx(0.5 * (167.0 + 240.0), rel=0.01)
+    assert found["viscous_friction"]["difference"] == pytest.approx(167.0 - 240.0, rel=0.02)
+    assert found["torque_bias"]["bias"] == pytest.approx(-3.2, rel=0.05)
+    assert found["torque_gain"]["error"] == pytest.approx(0.05, rel=0.05)
