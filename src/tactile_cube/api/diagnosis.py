@@ -150,7 +150,7 @@ def run_diagnosis(job: Job, recording: Recording, known: ModelFile | None, say: 
 
 def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
     from tactile_cube.identification.contact.diagnosis import diagnose_contact
-    from tactile_cube.identification.recommended import stated_model
+    from tactile_cube.identification.model_files import stated_model
 
     config = job.config
     contact = diagnose_contact(recording, known, config.step, config.seed, say)
@@ -171,7 +171,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     from tactile_cube.identification.criteria import Criteria
     from tactile_cube.identification.diagnosis import diagnose_recording
     from tactile_cube.identification.diagnosis_json import as_json
-    from tactile_cube.identification.recommended import model_file
+    from tactile_cube.identification.model_files import model_file
     from tactile_cube.measurement.bench import with_object, without_touches
 
     config = job.config

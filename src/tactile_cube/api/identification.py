@@ -128,7 +128,7 @@ def run_identification(job: Job, recording: Recording, say: Say) -> Identificati
 
 def _of_grasps(job: Job, recording: Recording, effects: list[Any], say: Say) -> IdentificationResult:
     from tactile_cube.identification.contact.identification import identify_contact
-    from tactile_cube.identification.recommended import stated_model
+    from tactile_cube.identification.model_files import stated_model
 
     config = job.config
     found = identify_contact(recording, effects, None, config.step, config.seed, say)
@@ -144,7 +144,7 @@ def _of_free_motion(
 ) -> IdentificationResult:
     from tactile_cube.identification.contact.identification import identify_contact
     from tactile_cube.identification.identification import identify_effects
-    from tactile_cube.identification.recommended import model_file
+    from tactile_cube.identification.model_files import model_file
     from tactile_cube.measurement.bench import without_touches
     from tactile_cube.measurement.bench_fit import BenchEstimates, bench_estimates
 

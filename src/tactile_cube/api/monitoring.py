@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.diagnosis import DiagnosisResult
     from tactile_cube.api.identification import IdentificationResult
     from tactile_cube.drivetrain.model_file import ModelFile
-    from tactile_cube.identification.drift import Drift
+    from tactile_cube.identification.model_files import Drift
     from tactile_cube.measurement.recordings.recording import Recording
 
 
@@ -132,8 +132,8 @@ def run_monitor(job: Job, recording: Recording, before: ModelFile, say: Say) -> 
     from tactile_cube.api.diagnosis import diagnose
     from tactile_cube.api.identification import identify
     from tactile_cube.drivetrain.effects import resolve
-    from tactile_cube.identification.drift import changed, drifts
     from tactile_cube.identification.identification import judge_known
+    from tactile_cube.identification.model_files import changed, drifts
     from tactile_cube.identification.search.evidence import worse
     from tactile_cube.measurement.bench import without_touches
     from tactile_cube.measurement.replay.nominal import require_same_joints

@@ -23,7 +23,7 @@ from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
-from tactile_cube.identification.verdict import Unexplained, Verdict, with_offsets
+from tactile_cube.identification.verdict import Unexplained, Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.joint_scales import joint_scales
@@ -206,11 +206,11 @@ def test_errors(
     summaries = {"nominal": free_run_error(test, free_run(test, stated, engine, step))}
     over_noise = {}
     for stage, model in models.items():
-        found = Model(model.constants, model.terms, {**stated.offsets, **model.offsets})
+        found = model.with_offsets(stated.offsets)
         problem.linearise_starts(found)
         judged = judge(problem, test, found)
         over_noise[stage] = judged.error
-        seen = with_offsets(model, judged.model)
+        seen = model.with_offsets(judged.model.offsets)
         summaries[stage] = free_run_error(test, free_run(test, seen, engine, step))
     return summaries, over_noise
 

@@ -60,8 +60,7 @@ def disturbances(division: Division, recording: Recording, model: Model) -> list
         model: fitted; joint offsets that it lacks are fitted here.
     """
     problem = Problem(division.shooting, division.windows(recording))
-    offsets = {**nominal_model(recording, division.known).offsets, **model.offsets}
-    found = replace(model, offsets=offsets)
+    found = model.with_offsets(nominal_model(recording, division.known).offsets)
     problem.linearise_starts(found)
     errors = segment_errors(problem, judge(problem, recording, found).residual)
     usual = np.maximum(np.nanquantile(errors, USUAL, axis=0), 1.0)

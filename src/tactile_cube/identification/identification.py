@@ -22,7 +22,6 @@ from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.verdict import with_offsets
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
@@ -100,7 +99,7 @@ def identify_effects(
         say(f"fitted {label}")
     fitted = final_fit(Problem(search.shooting, search.all_windows), current.model, search.unknowns(current.model))
     last = list(stages)[-1]
-    stages[last] = with_offsets(fitted.model, stages[last])
+    stages[last] = fitted.model.with_offsets(stages[last].offsets)
     say("simulating the held-out trials")
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
     return Identification(fitted, summaries, floor, judgement, [trial.name for trial in held_out.trials])

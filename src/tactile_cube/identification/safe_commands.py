@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -303,8 +303,8 @@ class PossibleMotions:
     def of_fits(cls, shooting: Shooting, recording: Recording, fits: Sequence[Fit], margin: float) -> PossibleMotions:
         """The motions in models that may be true."""
         zero = no_offsets(recording)
-        models = [_with_offsets(fit.model, zero) for fit in fits]
-        ends = [[_with_offsets(model, zero) for model in interval_ends(fit)] for fit in fits]
+        models = [fit.model.with_offsets(zero) for fit in fits]
+        ends = [[model.with_offsets(zero) for model in interval_ends(fit)] for fit in fits]
         return cls(shooting, recording, models, ends, limits_of(recording), margin)
 
     def safe_trials(self, seed: int) -> list[tuple[Trial, Safety]]:
@@ -387,8 +387,3 @@ def covariance_of_numbers(fit: Fit) -> tuple[Array, tuple[Unknown, ...]]:
     kept = [k for k, unknown in enumerate(fit.unknowns) if unknown.kind != "offset"]
     covariance = np.linalg.pinv(fit.information + np.diag(precision(fit.unknowns)))[np.ix_(kept, kept)]
     return np.asarray(covariance), tuple(fit.unknowns[k] for k in kept)
-
-
-def _with_offsets(model: Model, zero: Mapping[int, Array]) -> Model:
-    """The model with no joint offset in initialisations that it was not fitted to."""
-    return replace(model, offsets={**zero, **model.offsets})

@@ -19,7 +19,6 @@ from tactile_cube.identification.search.residual_shape import Shape, black_box, 
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.error import free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
-from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
 
 SHOWN_SHAPES = 6
@@ -212,7 +211,7 @@ class Simulations:
     def free_error(self, one: Explanation) -> float:
         """Error of its free run on the held-out trials [rad]."""
         if one.label not in self._errors:
-            model, held_out = with_offsets(self.final(one).model, one.judgement.model), self.search.held_out
+            model, held_out = self.final(one).model.with_offsets(one.judgement.model.offsets), self.search.held_out
             simulated = free_run(held_out, model, self.engine, self.step)
             self._errors[one.label] = free_run_error(held_out, simulated).overall
         return self._errors[one.label]
@@ -241,8 +240,3 @@ class Simulations:
                 left = black_box(recommended[j])
                 found.append(Unexplained(joint, clearest[:SHOWN_SHAPES], left, max(0.0, float(explained))))
         return found
-
-
-def with_offsets(model: Model, judged: Model) -> Model:
-    """The final model with the joint offsets that were found for the held-out initialisations."""
-    return Model(model.constants, model.terms, {**judged.offsets, **model.offsets})

@@ -60,6 +60,8 @@ ERRORS = {
 class MadeUp:
     """A division of the trials in which the error follows from the names of a model's effects."""
 
+    offsets: dict[int, np.ndarray] = {}  # noqa: RUF012
+
     def __init__(self, seed: int = 0, chance: bool = False) -> None:
         self.seed, self.chance, self.candidates = seed, chance, []
         self.criteria, self.said = STANDARD, []
@@ -77,9 +79,6 @@ class MadeUp:
 
     def settled(self, model: Model) -> tuple[object, Judgement]:
         return self.refitted(model), self.judged(model)
-
-    def with_known_offsets(self, model: Model) -> Model:
-        return model
 
     def fit_base(self) -> Explanation:
         return Explanation((), replace(FIT, cost=400.0), self.judged(MODEL), 1.0, 0.0)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tactile_cube.identification.search.candidates import without_effect
 from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import Explanation, named, named_by, simplest
-from tactile_cube.identification.search.relatives import without_effect
 from tactile_cube.identification.search.screening import Score, screen, with_groups
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import shared_offset

@@ -16,7 +16,15 @@ from tactile_cube.identification.fitting.base import every_effect
 from tactile_cube.identification.fitting.error_growth import steady_rows
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.candidates import Candidate, candidates
+from tactile_cube.identification.search.candidates import (
+    Candidate,
+    candidates,
+    fewer_joints,
+    other_starts,
+    special_cases,
+    with_details,
+    without_effect,
+)
 from tactile_cube.identification.search.division import BRIEF, LONG, SEGMENTS, Division, some
 from tactile_cube.identification.search.evidence import gain, p_value, worse
 from tactile_cube.identification.search.explanation import (
@@ -26,13 +34,6 @@ from tactile_cube.identification.search.explanation import (
     simplest,
     unproven,
     worthwhile,
-)
-from tactile_cube.identification.search.relatives import (
-    fewer_joints,
-    other_starts,
-    special_cases,
-    with_details,
-    without_effect,
 )
 from tactile_cube.identification.search.residual_starts import residual_candidates, special_candidates
 from tactile_cube.identification.search.screening import Score, of_each, screen, with_groups

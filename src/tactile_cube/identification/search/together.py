@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.search.candidates import Candidate, special_cases, with_effects, without_effect
 from tactile_cube.identification.search.division import BRIEF, Division
 from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
-from tactile_cube.identification.search.relatives import special_cases, with_effects, without_effect
 from tactile_cube.identification.search.residual_shape import Missing, missing_torques
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.screening import best_subsets, candidate_columns
@@ -107,7 +106,7 @@ class Together:
 
     def evidence(self, model: Model) -> Judgement:
         """How a model does on the held-out trials of all divisions, refitted in each."""
-        folds = [fold.settled(fold.with_known_offsets(model))[1] for fold in self.folds]
+        folds = [fold.settled(model.with_offsets(fold.offsets))[1] for fold in self.folds]
         return all_of([self.search.settled(model)[1], *folds])
 
     def pruned(self, proposal: Proposal, evidence: Judgement) -> tuple[Proposal, Judgement]:
