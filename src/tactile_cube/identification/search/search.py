@@ -113,8 +113,10 @@ class Search(Division):
 
     def fold_divisions(self) -> list[Division]:
         """The same trials divided in the other ways."""
-        how = (self.noise, self.segment, self.known, self.segments)
-        return [Division(self.shooting, *one, *how) for one in self.folds]
+        return [
+            Division(self.shooting, fitted, held_out, self.noise, self.segment, self.known, self.segments)
+            for fitted, held_out in self.folds
+        ]
 
     def one_by_one(
         self, base: Explanation, standard: Explanation | None = None
