@@ -26,15 +26,14 @@ from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.resolution import resolved
+from tactile_cube.identification.search import findings as finding
 from tactile_cube.identification.search import search as searching
 from tactile_cube.identification.search.division import Division
 from tactile_cube.identification.search.evidence import Judgement
-from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.explanation import Explanation, Proposal, least_gain
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.search.together import Proposal, Together
-from tactile_cube.identification.search.worth import least_gain
-from tactile_cube.identification.simulations import Simulations, Unexplained
-from tactile_cube.identification.verdict import Verdict, decide
+from tactile_cube.identification.search.together import Together
+from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, decide
 from tactile_cube.measurement.comparing.noise_floor import noise_floor, sensor_noise
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.split import held_out_split, turned, with_test_part
@@ -93,7 +92,7 @@ class RememberingSearch(Remembered, Search):
     def answer(self, criteria: Criteria, simulations: Simulations | None) -> tuple[Verdict, Simulations]:
         """The verdict by other criteria."""
         self.criteria, self.leaders = criteria, []
-        findings = self.run()
+        findings = finding.find(self)
         asked = simulations or RememberingSimulations(self, findings.base, self.floor, "fast", 0.002)  # type: ignore[attr-defined]
         return decide(findings, asked, criteria), asked
 
@@ -206,7 +205,7 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--out", type=Path, default=Path("outputs/criteria"))
     given = parser.parse_args()
-    searching.Together = RememberingTogether  # type: ignore[misc,attr-defined]
+    finding.Together = RememberingTogether  # type: ignore[misc,attr-defined]
     given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / "answers.jsonl"
     lines = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tactile_cube.identification.command_limits import QUANTITIES, Envelope, Limits
-from tactile_cube.identification.safe_commands import Safety
+from tactile_cube.identification.safe_commands import QUANTITIES, Envelope, Limits, Safety
 
 
 def half_used(joints: int) -> Safety:

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
-from tactile_cube.identification.search.search import Findings, Search
-from tactile_cube.identification.verdict import decide
+from tactile_cube.identification.search.findings import Findings, find
+from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import EFFECTS, Size, simulated
+from tests.identification.test_verdict import decide
 
 VISCOUS = find_effect("viscous_friction")
 FINGER = Size()
@@ -27,7 +28,7 @@ def findings(folder: Path, size: Size) -> Findings:
     """What a search among a few effects finds of a rig that hides viscous friction."""
     recording = simulated(folder, size, VISCOUS, {"damping": 0.08 * size.damping})
     fitted, held_out = held_out_split(recording)
-    return Search(fitted, held_out, sensor_noise(recording), EFFECTS, lambda line: None).run()
+    return find(Search(fitted, held_out, sensor_noise(recording), EFFECTS, lambda line: None))
 
 
 @pytest.mark.parametrize("name", SIZES)

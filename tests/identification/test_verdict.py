@@ -1,20 +1,20 @@
-"""What the evidence says, without any simulation: costs of segments are made up."""
+"""What the evidence says: costs of segments are made up; what a decision asks is simulated, once each."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification import verdict as asked
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, worse
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.search import Findings
-from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
-from tactile_cube.identification.simulations import Unexplained, follows_signals
-from tactile_cube.identification.verdict import Questions, at_bound, decide, unexplained_joints
+from tactile_cube.identification.search.explanation import Explanation, least_gain, unproven, worthwhile
+from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, at_bound, unexplained_joints
 from tactile_cube.measurement.replay.model import Model, Term
 
 MODEL = Model({}, (), {})
@@ -32,7 +32,7 @@ def judged(error: float, seed: int = 0) -> Judgement:
 JOINTS = ("q1", "q2")
 
 
-class Answers(Questions):
+class Answers:
     """What simulations would say, made up."""
 
     def __init__(self, repeats: bool = False, follows: bool = False, alike: bool = False) -> None:
@@ -46,6 +46,11 @@ class Answers(Questions):
 
     def alike(self, one: Explanation, other: Explanation) -> bool:
         return self.same
+
+
+def decide(found: Findings, answers: Answers | None = None, criteria: Criteria = STANDARD) -> Verdict:
+    """The verdict where simulations would say so."""
+    return asked.decide(found, answers or Answers(), criteria)  # type: ignore[arg-type]
 
 
 def explanation(name: str, error: float, base: float = 20.0, seed: int = 0) -> Explanation:
@@ -198,12 +203,6 @@ def test_most_of_what_is_missing_is_named_and_said_not_to_be_all() -> None:
     assert (verdict.kind, verdict.chosen.effects[0].effect.name, verdict.rivals) == ("partly_explained", "backlash", ())
     assert [one.effects[0].effect.name for one in decide(findings(20.0, lever, scale)).rivals] == ["payload"]
     assert decide(findings(20.0, explanation("backlash", 7.0))).kind == "unknown_effect"
-
-
-def test_what_a_black_box_still_explains_is_not_noise() -> None:
-    assert not follows_signals([])
-    assert not follows_signals([Unexplained("q1", [], 0.1), Unexplained("q2", [], 0.0)])
-    assert follows_signals([Unexplained("q1", [], 0.0), Unexplained("q2", [], 0.45)])
 
 
 def test_joints_are_unexplained_while_their_error_stays_above_the_noise() -> None:
@@ -394,3 +393,62 @@ def test_a_drift_as_slow_as_can_be_told_is_no_implausible_law() -> None:
         term = replace(slow, values=values, fitted=fitted)
         fit = replace(FIT, model=Model({}, (term,), {}), unknowns=tuple(term_unknowns(term, 0, {})))
         assert at_bound(replace(drift, fit=fit)) is edge
+
+
+class Judges:
+    """Held-out trials on which a second model is off by so many standard deviations of the noise."""
+
+    weight = np.full((3, 5), 1e4)
+
+    def __init__(self, off: float) -> None:
+        self.off = off
+
+    def predictions(self, models: list[object]) -> np.ndarray:
+        return np.stack([np.zeros((3, 5)), np.full((3, 5), self.off / 1e4)])
+
+    def limited(self, change: np.ndarray) -> np.ndarray:
+        return change
+
+
+def simulations(monkeypatch: pytest.MonkeyPatch, source: str = "repeats", off: float = 0.0) -> Simulations:
+    monkeypatch.setattr(asked, "Problem", lambda *_: None)
+    search = SimpleNamespace(shooting=None, all_windows=None, criteria=STANDARD, validation=Judges(off), held_out=None)
+    floor = SimpleNamespace(source=source, overall=2e-3)
+    return Simulations(search, explanation("backlash", 9.0), floor, "fast", 0.002)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("off", "alike"), [(0.0, True), (0.09, True), (0.3, False)])
+def test_laws_that_differ_by_a_part_of_the_noise_are_one(
+    monkeypatch: pytest.MonkeyPatch, off: float, alike: bool
+) -> None:
+    ask = simulations(monkeypatch, off=off)
+    assert ask.alike(explanation("coulomb_friction", 1.0), explanation("presliding_friction", 1.0)) is alike
+
+
+@pytest.mark.parametrize(
+    ("source", "left", "answer"), [("repeats", 1e-3, True), ("repeats", 3e-3, False), ("guess", 1e-3, False)]
+)
+def test_a_free_run_is_compared_with_repeats_once(
+    monkeypatch: pytest.MonkeyPatch, source: str, left: float, answer: bool
+) -> None:
+    ask, runs = simulations(monkeypatch, source), []
+
+    def error(held_out: object, simulated: object) -> object:
+        runs.append(simulated)
+        return SimpleNamespace(overall=left)
+
+    monkeypatch.setattr(ask, "final", lambda one: SimpleNamespace(model=one.judgement.model))
+    monkeypatch.setattr(asked, "free_run", lambda *_: "run")
+    monkeypatch.setattr(asked, "free_run_error", error)
+    one = explanation("coulomb_friction", 1.0)
+    assert ask.as_repeats(one) is ask.as_repeats(one) is answer
+    assert runs == (["run"] if source == "repeats" else [])
+
+
+@pytest.mark.parametrize(("left", "answer"), [((), False), ((0.1, 0.0), False), ((0.0, 0.45), True)])
+def test_what_is_left_follows_the_signals_where_a_black_box_explains_more_than_chance(
+    monkeypatch: pytest.MonkeyPatch, left: tuple[float, ...], answer: bool
+) -> None:
+    ask = simulations(monkeypatch)
+    monkeypatch.setattr(ask, "unexplained", lambda one: [Unexplained("q1", [], share) for share in left])
+    assert ask.follows_signals(explanation("backlash", 2.0)) is answer

@@ -13,12 +13,11 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, diagnose_contact, with_contact
-from tactile_cube.identification.contact.identification import stated_model
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis, diagnose_recording, write_experiment
 from tactile_cube.identification.diagnosis_json import as_json
 from tactile_cube.identification.in_words import answer
-from tactile_cube.identification.recommended import model_file
+from tactile_cube.identification.model_files import model_file, stated_model
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording

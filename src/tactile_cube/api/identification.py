@@ -15,11 +15,10 @@ from tactile_cube.identification.contact.identification import (
     ContactIdentification,
     contact_effects,
     identify_contact,
-    stated_model,
 )
 from tactile_cube.identification.identification import Identification, identify_effects
 from tactile_cube.identification.in_words import errors_by_stage
-from tactile_cube.identification.recommended import model_file
+from tactile_cube.identification.model_files import model_file, stated_model
 from tactile_cube.measurement.bench import has_free_motion, touch_offsets, without_touches
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording

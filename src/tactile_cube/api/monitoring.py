@@ -14,8 +14,8 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.model_file import ModelFile, as_model, write_model
 from tactile_cube.errors import InputError
-from tactile_cube.identification.drift import Drift, changed, drifts
 from tactile_cube.identification.identification import judge_known
+from tactile_cube.identification.model_files import Drift, changed, drifts
 from tactile_cube.identification.search.evidence import worse
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.recordings.recording import Recording

@@ -15,7 +15,7 @@ from tactile_cube.deployment.controller import POLICY_RATE, Network
 from tactile_cube.deployment.limits import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
-from tactile_cube.hand import Hand
+from tactile_cube.hand import DLR_HAND2, Hand
 
 FORMAT = "tactile_cube contract 3"
 FINGER = {
@@ -31,7 +31,7 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
     setting = setting or training_setting(network.info, label=network.label)
     hand, constants = setting.hand, setting.constants
     names = list(hand.joint_names)
-    known = isinstance(hand, HandModel)  # else what a joint does stands in its URDF
+    known = hand.name == DLR_HAND2.name  # else what a joint does stands in its URDF
     meanings = [FINGER[name[-2:]] if known else "as in the URDF of the hand" for name in names]
     return {
         "format": FORMAT,

@@ -11,20 +11,19 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.disturbances import Disturbance
+from tactile_cube.identification.disturbances import Disturbance, in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved, stated_error
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
-from tactile_cube.identification.late_commands import in_time
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import judge
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.search import Findings, Search
+from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
-from tactile_cube.identification.simulations import Unexplained, with_offsets
-from tactile_cube.identification.verdict import Verdict
+from tactile_cube.identification.verdict import Unexplained, Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.joint_scales import joint_scales
@@ -34,7 +33,6 @@ from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
 from tactile_cube.measurement.replay.windows import steps_per_row
 
-SHOWN_SHAPES = 6
 UNPROVEN = 3
 FAR_OFF = 10.0  # a model as many times further off than its steps hides them, until it is known what it lacks
 MUCH_LONGER = 4  # times as long are steps that are worth a search of their own
@@ -208,11 +206,11 @@ def test_errors(
     summaries = {"nominal": free_run_error(test, free_run(test, stated, engine, step))}
     over_noise = {}
     for stage, model in models.items():
-        found = Model(model.constants, model.terms, {**stated.offsets, **model.offsets})
+        found = model.with_offsets(stated.offsets)
         problem.linearise_starts(found)
         judged = judge(problem, test, found)
         over_noise[stage] = judged.error
-        seen = with_offsets(model, judged.model)
+        seen = model.with_offsets(judged.model.offsets)
         summaries[stage] = free_run_error(test, free_run(test, seen, engine, step))
     return summaries, over_noise
 

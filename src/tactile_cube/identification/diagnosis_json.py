@@ -8,8 +8,8 @@ from typing import Any
 from tactile_cube.drivetrain.model_file import EffectEstimate
 from tactile_cube.identification.diagnosis import Diagnosis
 from tactile_cube.identification.fitting.intervals import Fitted, bounds
+from tactile_cube.identification.model_files import effect_estimate
 from tactile_cube.identification.next_experiment import FILE, Experiment
-from tactile_cube.identification.recommended import effect_estimate
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.verdict import unexplained_joints

@@ -13,16 +13,15 @@ from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.errors import InputError
+from tactile_cube.identification.disturbances import in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
-from tactile_cube.identification.late_commands import in_time
 from tactile_cube.identification.search.candidates import candidates
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.simulations import with_offsets
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
@@ -100,7 +99,7 @@ def identify_effects(
         say(f"fitted {label}")
     fitted = final_fit(Problem(search.shooting, search.all_windows), current.model, search.unknowns(current.model))
     last = list(stages)[-1]
-    stages[last] = with_offsets(fitted.model, stages[last])
+    stages[last] = fitted.model.with_offsets(stages[last].offsets)
     say("simulating the held-out trials")
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
     return Identification(fitted, summaries, floor, judgement, [trial.name for trial in held_out.trials])

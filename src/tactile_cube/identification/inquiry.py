@@ -12,9 +12,9 @@ from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.disturbances import Disturbance, disturbances, undisturbed
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.search import Findings, Search
-from tactile_cube.identification.simulations import Simulations
-from tactile_cube.identification.verdict import Verdict, decide
+from tactile_cube.identification.search.findings import Findings, among, find
+from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.verdict import Simulations, Verdict, decide
 from tactile_cube.measurement.comparing.noise_floor import noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.simulator import Engine
@@ -110,7 +110,7 @@ class Inquiry:
 
     def answered(self, search: Search, known: Sequence[Explanation] = ()) -> Answer:
         """What one search finds, or says of explanations that are `known`."""
-        findings = search.among(known) if known else search.run()
+        findings = among(search, known) if known else find(search)
         simulations = Simulations(search, findings.base, noise_floor(self.recording), self.engine, self.step)
         return Answer(search, findings, simulations, decide(findings, simulations, self.criteria))
 

@@ -1,18 +1,27 @@
-"""From everything that was tried to an answer: one of five verdicts."""
+"""From everything that was tried to an answer: one of five verdicts, and the simulations that it asks for."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.search.evidence import gain, p_value, worse
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.search import Findings
-from tactile_cube.identification.search.simplicity import contains, named, simplest
+import numpy as np
 
+from tactile_cube.identification.criteria import STANDARD, Criteria
+from tactile_cube.identification.fitting.intervals import Fitted, final_fit
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.search.evidence import gain, p_value, worse
+from tactile_cube.identification.search.explanation import Explanation, contains, named, simplest
+from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.search.residual_shape import Shape, black_box, missing_torques, shapes
+from tactile_cube.identification.search.search import Search
+from tactile_cube.measurement.comparing.error import free_run_error
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
+from tactile_cube.measurement.replay.simulator import Engine, free_run
+
+SHOWN_SHAPES = 6
 Kind = Literal["adequate", "missing_effect", "ambiguous", "partly_explained", "unknown_effect"]
 
 
@@ -31,29 +40,9 @@ class Verdict:
     rivals: tuple[Explanation, ...] = ()
 
 
-class Questions:
-    """What a decision may ask of an explanation beside its fit; answered by simulations, so only where it matters."""
-
-    def as_repeats(self, one: Explanation) -> bool:
-        """Whether its free run is hardly further from the held-out trials than the machine is from itself in repeats.
-
-        Where a machine can tip over, a few segments are far off all the same; and one that does not repeat itself is
-        further from any model than its sensor's noise.
-        """
-        return False
-
-    def follows_signals(self, one: Explanation) -> bool:
-        """Whether what it leaves is a function of the logged signals, and so no noise."""
-        return False
-
-    def alike(self, one: Explanation, other: Explanation) -> bool:
-        """Whether the two predict the held-out trials so much alike that they are one law in practice."""
-        return False
-
-
-def decide(findings: Findings, questions: Questions | None = None, criteria: Criteria = STANDARD) -> Verdict:
+def decide(findings: Findings, ask: Simulations, criteria: Criteria = STANDARD) -> Verdict:
     """The answer to what a search has found."""
-    base, ask = findings.base, questions or Questions()
+    base = findings.base
     if not findings.levels:
         return Verdict("adequate" if base.largest_error <= criteria.adequate else "unknown_effect", base)
     found = [one for level in findings.levels for one in level]
@@ -88,7 +77,7 @@ def closest(found: Sequence[Explanation]) -> Explanation:
     return min(found, key=lambda one: one.judgement.costs.sum())
 
 
-def _explains(chosen: Explanation, base: Explanation, ask: Questions, criteria: Criteria) -> bool:
+def _explains(chosen: Explanation, base: Explanation, ask: Simulations, criteria: Criteria) -> bool:
     """Whether an explanation is the whole of it.
 
     One effect may leave more than is tolerated: real laws differ in detail from those of the catalogue. Where several
@@ -118,7 +107,7 @@ def at_bound(one: Explanation) -> bool:
 
 
 def find_rivals(
-    chosen: Explanation, found: Sequence[Explanation], ask: Questions, criteria: Criteria = STANDARD
+    chosen: Explanation, found: Sequence[Explanation], ask: Simulations, criteria: Criteria = STANDARD
 ) -> tuple[Explanation, ...]:
     """Explanations by as many other effects that are as good: with at most a number more, or else clearly better.
 
@@ -159,3 +148,95 @@ def unexplained_joints(chosen: Explanation, joints: tuple[str, ...], criteria: C
     """Joints whose held-out error stays above what is tolerated."""
     errors = chosen.judgement.joint_errors
     return [joint for joint, error in zip(joints, errors, strict=True) if error > criteria.tolerated]
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left at a joint.
+
+    Attributes:
+        joint: its name.
+        shapes: the missing torque over signals, most telling first.
+        black_box: share of the rest that a black box could still explain beside the recommended model.
+        explained: share of the torque missing beside the base model that the recommended model accounts for.
+    """
+
+    joint: str
+    shapes: list[Shape] = field(repr=False)
+    black_box: float
+    explained: float = 0.0
+
+    @property
+    def of_explainable(self) -> float:
+        """Share that the effects explain of what they and a black box explain together."""
+        together = self.explained + (1.0 - self.explained) * self.black_box
+        return self.explained / together if together > 0.0 else 0.0
+
+
+class Simulations:
+    """What a decision asks of an explanation beside its fit: simulated where it matters, each question once."""
+
+    def __init__(self, search: Search, base: Explanation, floor: NoiseFloor, engine: Engine, step: float) -> None:
+        self.search, self.base, self.floor, self.engine, self.step = search, base, floor, engine, step
+        self.problem = Problem(search.shooting, search.all_windows)
+        self._final: dict[str, Fitted] = {}
+        self._errors: dict[str, float] = {}
+
+    def as_repeats(self, one: Explanation) -> bool:
+        """Whether its free run is hardly further from the held-out trials than the machine is from itself in repeats.
+
+        Where a machine can tip over, a few segments are far off all the same; and one that does not repeat itself is
+        further from any model than its sensor's noise.
+        """
+        most = self.search.criteria.adequate * self.floor.overall
+        return self.floor.source == "repeats" and self.free_error(one) <= most
+
+    def follows_signals(self, one: Explanation) -> bool:
+        """Whether what it leaves is a function of the logged signals, and so no noise: what was named is not all."""
+        return any(left.black_box > self.search.criteria.large_gain for left in self.unexplained(one))
+
+    def alike(self, one: Explanation, other: Explanation) -> bool:
+        """Whether the two predict the held-out trials so much alike that they are one law in practice."""
+        validation = self.search.validation
+        first, second = validation.predictions([one.judgement.model, other.judgement.model])
+        difference = validation.limited(first - second) * validation.weight
+        return bool(np.mean(difference[validation.weight > 0.0] ** 2) < self.search.criteria.alike**2)
+
+    def final(self, one: Explanation) -> Fitted:
+        """An explanation refitted on all fitted trials, with intervals."""
+        if one.label not in self._final:
+            self._final[one.label] = final_fit(self.problem, one.fit.model, self.search.unknowns(one.fit.model))
+        return self._final[one.label]
+
+    def free_error(self, one: Explanation) -> float:
+        """Error of its free run on the held-out trials [rad]."""
+        if one.label not in self._errors:
+            model, held_out = self.final(one).model.with_offsets(one.judgement.model.offsets), self.search.held_out
+            simulated = free_run(held_out, model, self.engine, self.step)
+            self._errors[one.label] = free_run_error(held_out, simulated).overall
+        return self._errors[one.label]
+
+    def unexplained(self, one: Explanation, beside_base: bool = False) -> list[Unexplained]:
+        """What is left at each joint that is not explained; `beside_base`, also beside the base model.
+
+        Effects that help and are not the cause blur the shape of what is missing.
+        """
+        search, found = self.search, list[Unexplained]()
+        joints = unexplained_joints(one, search.fitted.joints, search.criteria)
+        if not joints:
+            return found
+        beside = {"the recommended model": one.judgement, "the model with refitted constants": self.base.judgement}
+        missing = {
+            name: missing_torques(search.validation, search.held_out, judged.model, judged.residual)
+            for name, judged in beside.items()
+        }
+        recommended, base = missing.values()
+        for j, joint in enumerate(search.fitted.joints):
+            if joint in joints:
+                shown = missing.items() if beside_base else [*missing.items()][:1]
+                curves = [[replace(one, beside=name) for one in shapes(torques[j])] for name, torques in shown]
+                clearest = max(curves, key=lambda curve: curve[0].explained)
+                explained = 1.0 - recommended[j].torque.var() / max(base[j].torque.var(), 1e-30)
+                left = black_box(recommended[j])
+                found.append(Unexplained(joint, clearest[:SHOWN_SHAPES], left, max(0.0, float(explained))))
+        return found

@@ -3,8 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactile_cube.identification.experiment_in_words import joint_rows, proposal, watch_for
-from tactile_cube.identification.in_words import GAIN_OF
+from tactile_cube.identification.in_words import GAIN_OF, joint_rows, proposal, watch_for
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison

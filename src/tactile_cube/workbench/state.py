@@ -23,14 +23,12 @@ from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, fin
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.identification.identification import divided, with_effect
+from tactile_cube.identification.model_files import UNITS, model_file
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.recommended import UNITS, model_file
 from tactile_cube.identification.search.division import BRIEF
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques
-from tactile_cube.identification.search.screening import Score, screen
-from tactile_cube.identification.search.shortlist import resized
-from tactile_cube.identification.simulations import with_offsets
+from tactile_cube.identification.search.screening import Score, resized, screen
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error, raw_residuals, summarise_errors
@@ -189,7 +187,7 @@ class Workbench:
         """Return the torque that a candidate supplies after a brief refit of its own numbers; see `missing`."""
         search, problem = self.search, self.search.validation
         _, fitted = search.refit(search.frozen(self.stage.fit), resized(score), BRIEF)
-        added = search.with_known_offsets(fitted.model)
+        added = fitted.model.with_offsets(search.offsets)
         before, after = problem.predictions([replace(added, terms=added.terms[:-1]), added])
         return self._as_torque(joint, problem.limited(after - before) * problem.weight)
 
@@ -341,7 +339,7 @@ class Workbench:
             fitted = final_fit(problem, stage.fit.model, self.search.unknowns(stage.fit.model))
         else:
             fitted = Fitted(stage.fit.model, stage.fit, stage.half_width, stage.half_width)
-        last = self._errors(with_offsets(fitted.model, stage.judgement.model))[0]
+        last = self._errors(fitted.model.with_offsets(stage.judgement.model.offsets))[0]
         steps = {"nominal": self.stages[0].errors, "refitted": self.stages[1].errors, "with_effects": last}
         errors = ModelErrors(
             **{key: one.overall for key, one in steps.items()},
@@ -359,7 +357,7 @@ class Workbench:
         scales = np.array([unknown.scale for unknown in fit.unknowns])
         errors = standard_errors(self.search.problem, fit) if fitted else np.zeros(len(scales))
         judgement = self.search.judged(fit.model)
-        model = with_offsets(fit.model, judgement.model)
+        model = fit.model.with_offsets(judgement.model.offsets)
         fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and taken anew by whoever builds on it
         return Stage(label, fit, model, judgement, *self._errors(model), NORMAL_95 * errors * scales)
 

@@ -5,8 +5,9 @@ import pytest
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, Provenance
 from tactile_cube.errors import InputError
-from tactile_cube.identification.contact.choice import ContactSearch
-from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, compare_contact, verdict_of, with_contact
+from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, ContactSearch, with_contact
+from tactile_cube.identification.contact.fit import ContactFit
+from tactile_cube.identification.contact.trial import compare_contact
 from tactile_cube.measurement.comparing.comparison import comparison_json
 from tactile_cube.measurement.comparing.error import ErrorSummary
 from tactile_cube.measurement.recordings.reading import read_recording
@@ -36,7 +37,7 @@ def search(lateral: float = 0.9, spinning: float = 0.1) -> ContactSearch:
 def test_the_effects_that_are_missing_are_found_and_no_others(truth: dict[str, float], names: list[str]) -> None:
     found = search(**truth)
     assert [one.effect.name for one in found.found] == names
-    assert verdict_of(found, 1e-3) == ("missing_effect" if names else "adequate")
+    assert found.verdict(1e-3) == ("missing_effect" if names else "adequate")
 
 
 @pytest.mark.parametrize(("size", "names"), [(0.0, []), (0.006, ["object_size"])])
@@ -51,7 +52,7 @@ def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list
 
 def test_what_no_effect_explains_is_unknown() -> None:
     found = search()
-    assert verdict_of(found, 0.02) == "unknown_effect"
+    assert found.verdict(0.02) == "unknown_effect"
 
 
 def test_an_effect_that_explains_as_much_is_a_rival() -> None:
@@ -67,7 +68,7 @@ def test_an_effect_that_explains_as_much_is_a_rival() -> None:
     trials = [Confused("hold", k, {}, {}) for k in range(4)]
     found = ContactSearch(trials[:3], trials[3:], lambda line: None)  # type: ignore[arg-type]
     found.run(ContactModel({}))
-    assert verdict_of(found, 1e-3) == "ambiguous"
+    assert found.verdict(1e-3) == "ambiguous"
     named = {found.found[-1].effect.name, *(one.effect.name for one in found.rivals)}
     assert named == {"lateral_friction", "tip_compliance"}
 
@@ -75,7 +76,7 @@ def test_an_effect_that_explains_as_much_is_a_rival() -> None:
 def diagnosis(lateral: float) -> ContactDiagnosis:
     made = search(lateral)
     stages = {key: ErrorSummary(1e-3, {"a": 1e-3}) for key in ("nominal", "with_effects")}
-    return ContactDiagnosis(verdict_of(made, 1e-3), made.found, made.rivals, made.tried, {}, stages, 2e-4, ["hold_3"])
+    return ContactDiagnosis(ContactFit(ContactModel({}), {}, {}), stages, 2e-4, ["hold_3"], made)
 
 
 def test_the_answer_has_the_keys_of_diagnosis_json() -> None:
@@ -96,6 +97,8 @@ def test_the_answer_has_the_keys_of_diagnosis_json() -> None:
         ("adequate", 0.5, "missing_effect"),
         ("missing_effect", 0.9, "missing_effect"),
         ("unknown_effect", 0.5, "unknown_effect"),
+        ("partly_explained", 0.9, "partly_explained"),
+        ("partly_explained", 0.5, "partly_explained"),
     ],
 )
 def test_the_verdicts_on_drivetrain_and_contact_become_one(drive: str, lateral: float, verdict: str) -> None:

@@ -14,8 +14,8 @@ from tactile_cube.identification.contact.identification import (
     ContactIdentification,
     contact_effects,
     identify_contact,
-    stated_model,
 )
+from tactile_cube.identification.model_files import stated_model
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording

@@ -10,10 +10,8 @@ from tactile_cube.identification.search import search as module
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, p_value
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.screening import Score
+from tactile_cube.identification.search.screening import Score, of_each, with_groups
 from tactile_cube.identification.search.search import Search, pursued
-from tactile_cube.identification.search.shortlist import of_each, with_groups
-from tactile_cube.measurement.replay.model import Model
 from tests.identification.test_verdict import explanation, findings, judged
 
 FIT = SimpleNamespace(cost=0.0, model=None)  # stands for a fit: the choice goes by order alone
@@ -42,7 +40,7 @@ def test_the_simplest_of_equals_is_pursued_beside_the_best() -> None:
 
 def score(name: str, joint: str, gain: float) -> Score:
     effect = find_effect(name)
-    return Score(Candidate(effect, (joint,), forms(effect)[0]), Model({}, (), {}), gain, 1.0)
+    return Score(Candidate(effect, (joint,), forms(effect)[0]), gain, 1.0)
 
 
 def test_where_a_first_look_promises_next_to_nothing_nothing_is_refitted() -> None:

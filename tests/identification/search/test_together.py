@@ -1,4 +1,4 @@
-"""The search from everything at once, with fits and held-out costs that are made up."""
+"""The search from everything at once, with fits and held-out costs that are made up; the standard model."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,10 +10,10 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.search.candidates import Candidate, forms
 from tactile_cube.identification.search.evidence import Judgement, all_of
-from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.screening import Score
-from tactile_cube.identification.search.subsets import Columns, best_subsets, possible
-from tactile_cube.identification.search.together import Proposal, Together
+from tactile_cube.identification.search.explanation import Explanation, Proposal
+from tactile_cube.identification.search.residual_shape import Missing
+from tactile_cube.identification.search.screening import Columns, Score, best_subsets, possible
+from tactile_cube.identification.search.together import Together, regressed
 from tactile_cube.measurement.replay.model import Model, Term
 from tests.identification.test_verdict import FIT, MODEL, judged
 
@@ -24,7 +24,7 @@ def candidate(name: str) -> Candidate:
 
 
 def columns(names: list[str], gradient: list[float], gram: list[list[float]]) -> Columns:
-    scores = [Score(candidate(name), MODEL, 0.0, 1.0) for name in names]
+    scores = [Score(candidate(name), 0.0, 1.0) for name in names]
     return Columns(scores, np.array(gradient), np.array(gram))
 
 
@@ -34,16 +34,16 @@ def test_two_effects_that_help_only_together_are_the_best_pair() -> None:
     first, second, third = np.array([1.0, 0.0, 0.0]), np.array([-0.98, 0.2, 0.0]), np.array([0.0, 0.3, 1.0])
     residual, stacked = np.array([0.02, 0.2, 0.0]), np.stack([first, second, third])
     looked_at = columns(names, list(stacked @ residual), (stacked @ stacked.T).tolist())
-    single, pair = best_subsets(looked_at, 1)[0], best_subsets(looked_at, 2)[0]
-    assert single.gain < 0.5 * pair.gain
-    assert {one.effect.name for one in pair.candidates} == {"viscous_friction", "reflected_inertia"}
-    assert pair.gain == pytest.approx(float(residual @ residual), rel=1e-6)
+    (single, _), (together, pair) = best_subsets(looked_at, 1)[0], best_subsets(looked_at, 2)[0]
+    assert single < 0.5 * together
+    assert {one.effect.name for one in pair} == {"viscous_friction", "reflected_inertia"}
+    assert together == pytest.approx(float(residual @ residual), rel=1e-6)
 
 
 def test_a_friction_that_would_have_to_drive_the_joint_is_in_no_set() -> None:
     names = ["coulomb_friction", "torque_gain"]
     found = best_subsets(columns(names, [-3.0, -2.0], [[10.0, 0.0], [0.0, 10.0]]), 1)
-    assert [one.candidates[0].effect.name for one in found] == ["torque_gain"]
+    assert [one.effect.name for _, (one,) in found] == ["torque_gain"]
     assert not possible(candidate("coulomb_friction"), -0.5)
     assert possible(candidate("torque_gain"), -0.5)
 
@@ -59,6 +59,8 @@ ERRORS = {
 
 class MadeUp:
     """A division of the trials in which the error follows from the names of a model's effects."""
+
+    offsets: dict[int, np.ndarray] = {}  # noqa: RUF012
 
     def __init__(self, seed: int = 0, chance: bool = False) -> None:
         self.seed, self.chance, self.candidates = seed, chance, []
@@ -77,9 +79,6 @@ class MadeUp:
 
     def settled(self, model: Model) -> tuple[object, Judgement]:
         return self.refitted(model), self.judged(model)
-
-    def with_known_offsets(self, model: Model) -> Model:
-        return model
 
     def fit_base(self) -> Explanation:
         return Explanation((), replace(FIT, cost=400.0), self.judged(MODEL), 1.0, 0.0)
@@ -135,3 +134,19 @@ def test_a_set_in_the_price_of_which_each_number_counts() -> None:
     assert one.price(STANDARD) == pytest.approx(100.0 / 0.96)
     two = Proposal((plain, rich), SimpleNamespace(cost=97.0))  # type: ignore[arg-type]
     assert two.price(STANDARD) > one.price(STANDARD)
+
+
+RNG = np.random.default_rng(0)
+
+
+def test_friction_by_direction_offset_and_gain_come_back_from_the_missing_torque() -> None:
+    speed, drive = RNG.normal(size=5000), 30.0 * RNG.normal(size=5000)
+    torque = -20.4 * np.sign(speed) - np.where(speed > 0, 167.0, 240.0) * speed - 3.2 + 0.05 * drive
+    signals = {"velocity of slide [rad/s]": speed, "torque of slide [N m]": drive}
+    blocks = np.zeros(5000, dtype=np.int64)
+    found = regressed(Missing("slide", torque + RNG.normal(size=5000), signals, blocks, blocks))
+    assert found["coulomb_friction"]["friction"] == pytest.approx(20.4, rel=0.01)
+    assert found["viscous_friction"]["damping"] == pytest.approx(0.5 * (167.0 + 240.0), rel=0.01)
+    assert found["viscous_friction"]["difference"] == pytest.approx(167.0 - 240.0, rel=0.02)
+    assert found["torque_bias"]["bias"] == pytest.approx(-3.2, rel=0.05)
+    assert found["torque_gain"]["error"] == pytest.approx(0.05, rel=0.05)

@@ -126,9 +126,9 @@ class Effect:
     state_size: ClassVar[Any] = 0
     """How many numbers the law keeps between steps, zero after a reset; a class method of the step [s] if it counts."""
     weighs: ClassVar[bool] = False
+    """Whether the law reads WEIGHT, which makes a step several per cent slower."""
     chosen_starts: ClassVar[int] = 0
     """Numbers of a state that no log shows, so that a fit chooses them where a trial begins."""
-    """Whether the law reads WEIGHT, which makes a step several per cent slower."""
     constant_reading: ClassVar[str] = ""
     """The parameter that adds a constant to the measured position, as the joint offset of an initialisation does."""
     from_residual: ClassVar[tuple[str, ...]] = ("harmonic", "torque_0")

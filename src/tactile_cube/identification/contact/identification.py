@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.fit import ContactFit, fit_contact, shown_by
 from tactile_cube.identification.contact.trial import ContactTrial, open_grasps
@@ -19,7 +17,6 @@ from tactile_cube.measurement.comparing.error import ErrorSummary, summarise_err
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.hand_replay import ContactModel
-from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue, is_contact_effect
 
 
@@ -44,12 +41,16 @@ class ContactIdentification:
         effects = model.with_effects(self.effects())
         if not alone:
             return model.model_copy(update={"effects": effects})
-        overall = {key: summary.overall for key, summary in self.stages.items()}
         joints = {key: summary.joints for key, summary in self.stages.items()}
-        errors = ModelErrors(**overall, noise_floor=self.noise_floor, joints=joints)
+        errors = ModelErrors(**self.errors, joints=joints)
         fitted = [name for name in model.provenance.trials if name not in self.held_out]
         provenance = model.provenance.model_copy(update={"trials": fitted, "held_out": self.held_out})
         return model.model_copy(update={"effects": effects, "errors": errors, "provenance": provenance})
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """The error of each stage, and the noise floor [rad]."""
+        return {key: one.overall for key, one in self.stages.items()} | {"noise_floor": self.noise_floor}
 
     def effects(self) -> list[EffectEstimate]:
         """As the model file states them."""
@@ -62,7 +63,7 @@ class ContactIdentification:
         """Plain numbers, errors in rad."""
         return {
             "effects": [one.model_dump() for one in self.effects()],
-            "error": {key: one.overall for key, one in self.stages.items()} | {"noise_floor": self.noise_floor},
+            "error": self.errors,
             "joints": {key: one.joints for key, one in self.stages.items()},
             "held_out": self.held_out,
             "initialisations": {
@@ -94,27 +95,6 @@ def contact_effects(names: Sequence[str], recording: Recording) -> list[type[Con
     return [contact_catalogue()[name] for name in dict.fromkeys(chosen)]
 
 
-def stated_model(recording: Recording, command: str, seed: int) -> ModelFile:
-    """What recording.yaml says of the drivetrain, as a model without intervals; it is silent where the recording is."""
-    every = nominal_model(recording).constants
-    constants = {key: row for key, row in every.items() if key in (*CONTROLLER, *recording.nominal)}
-    values = {
-        key: {
-            joint: Estimate(value=v, low=v, high=v) for joint, v in zip(recording.joints, map(float, row), strict=True)
-        }
-        for key, row in constants.items()
-    }
-    provenance = Provenance(
-        recording=str(recording.folder),
-        command=command,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        version=version("tactile-cube"),
-        seed=seed,
-        trials=[trial.name for trial in recording.trials],
-    )
-    return ModelFile(rig=recording.name, joints=list(recording.joints), values=values, provenance=provenance)
-
-
 def identify_contact(
     recording: Recording,
     effects: Sequence[type[ContactEffect]],
@@ -138,13 +118,11 @@ def identify_contact(
         say("simulating the held-out trials")
         validation = list(dict.fromkeys(one for effect in effects for one in shown_by(grasps.held_out, effect)))
         stages = {"nominal": grasps.start, "with_effects": fit.contact}
-        errors = {key: contact_error(validation, contact, grasps.joints) for key, contact in stages.items()}
+        errors = {key: _error(validation, contact, grasps.joints) for key, contact in stages.items()}
     return ContactIdentification(fit, errors, grasps.noise_floor, [one.trial.name for one in validation])
 
 
-def contact_error(trials: Sequence[ContactTrial], contact: ContactModel, joints: Sequence[str]) -> ErrorSummary:
+def _error(trials: Sequence[ContactTrial], contact: ContactModel, joints: Sequence[str]) -> ErrorSummary:
     """RMS error [rad], offsets and the box's place fitted in each trial."""
-    residuals = []
-    for one in trials:
-        residuals.append(np.where(one.trial.valid[:, None], one.residual(contact), np.nan))
+    residuals = [np.where(one.trial.valid[:, None], one.residual(contact), np.nan) for one in trials]
     return summarise_errors(residuals, tuple(joints))

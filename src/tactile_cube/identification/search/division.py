@@ -86,10 +86,6 @@ class Division:
         sizes = self.shooting.sizes
         return (*base_unknowns(self.fitted, self.start.constants, sizes), *model_unknowns(model, sizes))
 
-    def with_known_offsets(self, model: Model) -> Model:
-        """The model with joint offsets for the initialisations that it has not seen."""
-        return Model(model.constants, model.terms, {**self.offsets, **model.offsets})
-
     def frozen(self, fitted: Fit) -> Fit:
         """A fit with its residual and columns taken anew on this problem, to build on."""
         self.problem.linearise_starts(fitted.model)
@@ -118,7 +114,7 @@ class Division:
 
     def judged(self, model: Model) -> Judgement:
         """How a model does on the held-out trials."""
-        found = self.with_known_offsets(model)
+        found = model.with_offsets(self.offsets)
         self.validation.linearise_starts(found)
         return judge(self.validation, self.held_out, found)
 

@@ -12,6 +12,7 @@ from scipy.stats import wilcoxon
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import fit
+from tactile_cube.identification.fitting.intervals import NORMAL_95
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.measurement.comparing.error import CORRELATED
 from tactile_cube.measurement.recordings.recording import Recording
@@ -22,7 +23,6 @@ TRIALS = 1_000_000  # more than any part has: tells those of several parts apart
 FEWEST_BLOCKS = 5  # that a signed-rank test needs to come below 5 %
 SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
 FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,16 @@
-"""A set of effects that may be what is missing, fitted and judged."""
+"""A set of effects that may be what is missing: when it earns its place, and which of several is the simplest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
+import numpy as np
+
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate
-from tactile_cube.identification.search.evidence import Judgement
-from tactile_cube.measurement.replay.model import Model
-
-NEARLY = 1.5  # the same of a fit before everything is free
+from tactile_cube.identification.search.evidence import Judgement, gain, worse
 
 
 @dataclass(frozen=True)
@@ -61,24 +61,124 @@ class Explanation:
         return (base.error**2 - self.error**2) / max(base.error**2 - 1.0, 1e-9)
 
 
-def first_term(model: Model, effects: Sequence[Candidate], place: int) -> int:
-    """Which of a model's terms, the last of which are those of `effects`, is the first one of an effect."""
-    known = len(model.terms) - sum(len(candidate.joints) for candidate in effects)
-    return known + sum(len(candidate.joints) for candidate in effects[:place])
+def simplest(found: Sequence[Explanation], criteria: Criteria = STANDARD) -> Explanation:
+    """The explanation with the fewest effects, then numbers, among those that are as good as the best."""
+    best = min(found, key=lambda e: e.judgement.costs.sum())
+    equal = [e for e in found if not worse(e.judgement, best.judgement, criteria)]
+    equal += [e for e in found if any(_but_for_a_detail(e, richer, criteria) for richer in equal)]
+    return min(equal, key=lambda e: (len(named(e)), e.size, e.judgement.costs.sum()))
 
 
-def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Model:
-    """A fitted model, whose last terms are those of `effects`, without one of them."""
-    first = first_term(model, effects, place)
-    return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))
+def _but_for_a_detail(simple: Explanation, richer: Explanation, criteria: Criteria) -> bool:
+    """Whether the last effect is a special case of the richer one's, which explains next to nothing more.
+
+    Over many samples the least deviation of anything else in the model is significant.
+    """
+    if not contains(richer, simple):
+        return False
+    small = richer.gain - simple.gain < criteria.detail * richer.gain
+    return small and gain(simple.judgement, richer.judgement) < criteria.least_gain
 
 
-def fewer_joints(
-    model: Model, effects: Sequence[Candidate], place: int
-) -> Iterator[tuple[tuple[Candidate, ...], Model]]:
-    """Where one of `effects` acts at several joints: the effects and the fitted model without it at one of them."""
-    candidate, first = effects[place], first_term(model, effects, place)
-    for k, joint in enumerate(candidate.joints if len(candidate.joints) > 1 else ()):
-        left = replace(candidate, joints=tuple(other for other in candidate.joints if other != joint))
-        terms = (*model.terms[: first + k], *model.terms[first + k + 1 :])
-        yield (*effects[:place], left, *effects[place + 1 :]), replace(model, terms=terms)
+def contains(richer: Explanation, simple: Explanation) -> bool:
+    """Whether two explanations differ in the last effect alone, and one's is a special case of the other's."""
+    if not simple.effects or named_by(simple.effects[:-1]) != named_by(richer.effects[:-1]):
+        return False
+    last, special = richer.effects[-1], simple.effects[-1]
+    return special.effect.name in last.effect.contains and special.joints == last.joints
+
+
+def named(explanation: Explanation) -> frozenset[tuple[str, str]]:
+    """The (effect, joint) pairs of an explanation, whatever their form."""
+    return named_by(explanation.effects)
+
+
+def named_by(effects: Sequence[Candidate]) -> frozenset[tuple[str, str]]:
+    """The same of single effects."""
+    return frozenset((c.effect.name, joint) for c in effects for joint in c.joints)
+
+
+def worthwhile(
+    explanation: Explanation,
+    parent: Explanation,
+    base: Explanation,
+    joints: Sequence[str],
+    criteria: Criteria = STANDARD,
+) -> bool:
+    """Whether an effect earns its place.
+
+    Significantly, and by more than a few per cent; a further effect has to complete the explanation, or that of the
+    joints where it acts, or to do most of what is left while that is a real part of the whole, or nearly all of it,
+    where that leaves nothing or was too much for a detail of the effect before.
+    What is next to nothing beside the whole is a detail too, where there is little left anyway.
+    """
+    if explanation.gain < criteria.least_gain or not proven(explanation, parent, criteria):
+        return False
+    if not parent.effects:
+        return True
+    if (
+        parent.error < criteria.adequate
+        and parent.error**2 - explanation.error**2 < criteria.small_part * base.error**2
+    ):
+        return False
+    if explanation.largest_error <= criteria.floor or completes_its_joints(explanation, parent, joints, criteria):
+        return True
+    share = explanation.explained(parent)
+    if parent.explained(base) < criteria.nearly_whole:
+        return share > criteria.completing
+    return share > criteria.most and (parent.error > criteria.far or explanation.error <= criteria.adequate)
+
+
+def proven(explanation: Explanation, parent: Explanation, criteria: Criteria = STANDARD) -> bool:
+    """Whether held-out segments tell what the last effect explains from chance; the more it is, the less it takes."""
+    enough = criteria.significant
+    if explanation.gain > criteria.large_gain:
+        enough = criteria.significant_if_large
+    if explanation.gain > criteria.most_gain:
+        enough = criteria.significant_if_most
+    if explanation.largest_error <= criteria.floor and not parent.effects:
+        enough = criteria.significant_if_most
+    return explanation.p_value <= enough
+
+
+def unproven(explanation: Explanation, parent: Explanation, criteria: Criteria = STANDARD) -> bool:
+    """Whether an effect explains much, and there are too few held-out segments to tell that from chance."""
+    few = np.count_nonzero(explanation.judgement.samples) < criteria.few_segments
+    return bool(few and explanation.gain > criteria.large_gain and not proven(explanation, parent, criteria))
+
+
+def least_gain(parent: Explanation, base: Explanation, criteria: Criteria = STANDARD) -> float:
+    """Share of the squared error that a further effect has to explain at least to earn its place."""
+    if not parent.effects or parent.explained(base) < criteria.nearly_whole or parent.error > criteria.far:
+        return criteria.least_gain
+    squares = parent.judgement.joint_errors**2
+    poor = squares[squares > criteria.adequate**2]
+    nearly_all = max(1.0 - (criteria.adequate / parent.error) ** 2, criteria.most * (1.0 - parent.error**-2))
+    completing = [1.0 - (criteria.floor / parent.error) ** 2, nearly_all, *(poor - criteria.floor**2) / squares.sum()]
+    return max(criteria.least_gain, float(min(completing)))
+
+
+def completes_its_joints(
+    explanation: Explanation, parent: Explanation, joints: Sequence[str], criteria: Criteria = STANDARD
+) -> bool:
+    """Whether the last effect takes the error of the joints where it acts down to the floor."""
+    places = [joints.index(joint) for joint in explanation.effects[-1].joints]
+    before, after = (one.judgement.joint_errors[places] for one in (parent, explanation))
+    return bool(before.max() > criteria.adequate and after.max() <= criteria.floor)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A set of effects and how it fits; no held-out trial has been asked.
+
+    Attributes:
+        effects: in the order in which they came.
+        fit: of everything together.
+    """
+
+    effects: tuple[Candidate, ...]
+    fit: Fit = field(repr=False)
+
+    def price(self, criteria: Criteria) -> float:
+        """Squared error, with as much for each number as an effect has to explain at least."""
+        return float(self.fit.cost / (1.0 - criteria.least_gain) ** sum(one.size for one in self.effects))

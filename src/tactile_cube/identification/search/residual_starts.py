@@ -1,17 +1,233 @@
-"""Candidates whose starts have to be read from what is missing: harmonics and profiles over the position."""
+"""Candidates whose starts are read from what a fit leaves: harmonics, profiles over the position, simpler laws."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from tactile_cube.drivetrain.effects.effect import Effect
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects.effect import Effect, Stage
+from tactile_cube.drivetrain.effects.scales import FINGER, Scales
+from tactile_cube.drivetrain.signals import ANGLE, JOINT_TORQUE, ROWS
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.search.candidates import Candidate
-from tactile_cube.identification.search.periodicity import periodic_candidates
-from tactile_cube.identification.search.position_profile import profile_candidates
-from tactile_cube.identification.search.residual_shape import missing_torques
+from tactile_cube.identification.search.candidates import Candidate, Sizes, forms
+from tactile_cube.identification.search.residual_shape import Missing, missing_torques
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term
+
+Array = NDArray[np.float64]
+HARMONIC = "harmonic"  # parameter [1/rad] by which an effect says that it repeats with the position
+LOWEST, HIGHEST = 2.5, 160.0  # [1/rad] of a finger
+RESOLUTION = 0.8  # grid step times the range of motion: finer than half a peak
+NARROWEST = 0.05  # [rad] range that is told apart by harmonics at all
+PEAKS = 2
+MOST_SAMPLES = 8000
+
+
+def periodic_candidates(
+    missing_torques: Sequence[Missing],
+    recording: Recording,
+    model: Model,
+    effects: Sequence[type[Effect]],
+    sizes: Sizes,
+) -> list[Candidate]:
+    """Candidates at the strongest harmonics of what is missing, for every effect that has one."""
+    periodic = [effect for effect in effects if any(HARMONIC in form for form in forms(effect))]
+    found = []
+    for missing in missing_torques:
+        damping = float(model.constants["kd"][recording.joints.index(missing.joint)])
+        scales = sizes[missing.joint]
+        for effect in periodic:
+            moving = effect.stage is Stage.POSITION_SENSOR
+            found += [
+                Candidate(effect, (missing.joint,), start, sizes)
+                for form in effect.forms_at(scales)
+                if HARMONIC in form
+                for start in _starts(missing, form, damping if moving else None, scales.of("1/rad"))
+            ]
+    return found
+
+
+def waves_of(form: Mapping[str, float]) -> tuple[str, str]:
+    """The parameters of a periodic form that multiply its sine and its cosine: the first two beside the harmonic."""
+    first, second = [name for name in form if name != HARMONIC][:2]
+    return first, second
+
+
+def _starts(
+    missing: Missing, form: Mapping[str, float], damping: float | None, size: float
+) -> list[Mapping[str, float]]:
+    """The form at each strong harmonic, with the phase that the missing torque has there.
+
+    A torque that repeats with the position is seen as it is; an error of the position sensor through its slope over
+    time, which the controller damps.
+    """
+    if damping == 0.0:  # commanded torques: no controller takes the sensor's error for motion
+        return []
+    position = missing.signals[f"position of {missing.joint} [rad]"]
+    speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
+    weight = np.ones_like(position) if damping is None else speed
+    starts: list[Mapping[str, float]] = []
+    first, second = waves_of(form)
+    for harmonic, sine, cosine in peaks(position, missing.torque, weight, missing.initialisation, size):
+        if damping is not None:  # damping * d/dt (a sin + b cos) = damping * n v (a cos - b sin)
+            sine, cosine = cosine / (damping * harmonic), -sine / (damping * harmonic)
+        known = max(np.hypot(sine, cosine), 0.1 * abs(form[first]))
+        angle = np.arctan2(cosine, sine)
+        starts.append({**form, first: known * np.cos(angle), second: known * np.sin(angle), HARMONIC: harmonic})
+    return starts
+
+
+def peaks(
+    position: Array, torque: Array, weight: Array, initialisation: NDArray[np.int64], size: float = 1.0
+) -> list[tuple[float, float, float]]:
+    """Strongest harmonics of the torque over the position: (harmonic, sine part, cosine part), strongest first.
+
+    Each robot initialisation brings joint offsets that are not known well, so phases are compared within one only.
+    Harmonics go up to `size` times a finger's.
+    """
+    every = max(1, len(position) // MOST_SAMPLES)
+    q, t, w, group = position[::every], torque[::every], weight[::every], initialisation[::every]
+    slow = np.vander((q - q.mean()) / max(np.ptp(q), 1e-9 / size), 4)
+    t = t - slow @ np.linalg.lstsq(slow, t, rcond=None)[0]
+    grid = np.arange(LOWEST * size, HIGHEST * size, RESOLUTION / max(np.ptp(q), NARROWEST / size))
+    parts = [group == k for k in np.unique(group)]
+    spectrum = np.array([[np.dot((w * t)[part], np.exp(1j * n * q[part])) for part in parts] for n in grid])
+    power = np.sum(np.abs(spectrum) ** 2, axis=1)
+    inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])) + 1
+    strongest = inner[np.argsort(-power[inner])][:PEAKS]
+    found = []
+    for k in strongest:
+        waves = np.column_stack([w * np.sin(grid[k] * q), w * np.cos(grid[k] * q), slow])
+        sine, cosine = np.linalg.lstsq(waves, t, rcond=None)[0][:2]
+        found.append((float(grid[k]), float(sine), float(cosine)))
+    return found
+
+
+PROFILE = "torque_0"  # first of the control torques by which an effect says that it is a profile over the position
+BINS = 120
+SMOOTH = 1e-3  # weight of the squared third differences of the control torques, which bins without samples need
+
+
+def profile_candidates(
+    missing_torques: Sequence[Missing], sizes: Sizes, effects: Sequence[type[Effect]]
+) -> list[Candidate]:
+    """A candidate at every joint for every effect with a profile, started at the mean torque that is missing there."""
+    return [
+        Candidate(effect, (missing.joint,), start_of(effect, form, missing, sizes[missing.joint]), sizes)
+        for effect in effects
+        for missing in missing_torques
+        for form in effect.forms_at(sizes[missing.joint])
+        if PROFILE in form
+    ]
+
+
+def start_of(effect: type[Effect], form: Mapping[str, float], missing: Missing, scales: Scales) -> Mapping[str, float]:
+    """Control torques [N m] whose profile is nearest to the missing torque's mean over the position."""
+    low, high = scales.low, scales.high
+    position = missing.signals[f"position of {missing.joint} [rad]"]
+    edges = np.linspace(low, high, BINS + 1)
+    place = np.clip(np.searchsorted(edges, position) - 1, 0, BINS - 1)
+    count = np.bincount(place, minlength=BINS)
+    mean = np.bincount(place, missing.torque, minlength=BINS) / np.maximum(count, 1)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    basis = np.array([profile_of(effect, effect.placed_at(scales) | {name: 1.0}, middles) for name in form]).T
+    weight = count / max(count.sum(), 1)
+    bend = np.diff(np.eye(len(form)), n=3, axis=0)
+    normal = basis.T @ (weight[:, None] * basis) + SMOOTH / len(form) * bend.T @ bend
+    found = np.linalg.lstsq(normal, basis.T @ (weight * mean), rcond=None)[0]
+    return {name: float(value) for name, value in zip(form, found, strict=True)}
+
+
+def profile_of(effect: type[Effect], values: Mapping[str, float], angles: Array) -> Array:
+    """Torque (N,) of an effect with these values, all others neutral, at each angle [N m]."""
+    known = np.array([values.get(p.name, p.neutral) for p in effect.parameters])
+    x = np.zeros((ROWS, 1))
+    torques = []
+    for angle in angles:
+        x[ANGLE, 0], x[JOINT_TORQUE, 0] = angle, 0.0
+        torques.append(effect.law(x, 0, known, np.zeros(0), 1.0))
+    return np.array(torques)
+
+
+POINTS = 120  # of the profile that are compared
+FINEST = 0.8  # highest harmonic in units of what the control torques can carry
+EXPLAINED = 0.7  # share of the profile that a simpler law has to explain to be tried
+
+
+def special_candidates(candidate: Candidate, term: Term, effects: Sequence[type[Effect]]) -> list[Candidate]:
+    """Simpler effects whose torque over the position is like a fitted profile.
+
+    Args:
+        candidate: the profile at one joint.
+        term: its fitted values.
+        effects: classes to try.
+    """
+    if PROFILE not in candidate.form or len(candidate.joints) != 1:
+        return []
+    angles = np.linspace(term.values["first"], term.values["last"], POINTS)
+    torques = profile_of(term.effect, term.values, angles)
+    spacing = (angles[-1] - angles[0]) / (len(candidate.form) - 1)
+    found = []
+    for effect in effects:
+        for form in effect.forms_at(candidate.sizes.get(candidate.joints[0], FINGER)):
+            if HARMONIC in form and effect.stage is not Stage.POSITION_SENSOR:
+                starts = _ripples(angles, torques, form, FINEST * np.pi / spacing)
+            elif "stiffness" in form and ("upper" in form or "lower" in form):
+                starts = _stops(angles, torques, form, "upper" if "upper" in form else "lower")
+            elif tuple(form) == ("bias",):
+                starts = _levels(torques)
+            else:
+                continue
+            found += [Candidate(effect, candidate.joints, start, candidate.sizes) for start in starts]
+    return found
+
+
+def _ripples(angles: Array, torques: Array, form: Mapping[str, float], finest: float) -> list[Mapping[str, float]]:
+    """The form at the harmonic that explains the profile best, besides a constant and a slope."""
+    slow = np.vander(angles - angles.mean(), 2)
+    first, second = waves_of(form)
+    trials = []
+    for harmonic in np.arange(LOWEST, finest, 0.2 / (angles[-1] - angles[0])):
+        waves = np.column_stack([np.sin(harmonic * angles), np.cos(harmonic * angles), slow])
+        numbers, share = _explained(waves, torques, slow)
+        trials.append((share, {**form, first: numbers[0], second: numbers[1], HARMONIC: float(harmonic)}))
+    return _best(trials)
+
+
+def _stops(angles: Array, torques: Array, form: Mapping[str, float], side: str) -> list[Mapping[str, float]]:
+    """The form with the edge that explains the profile best, besides a constant."""
+    level = np.ones((len(angles), 1))
+    sign = 1.0 if side == "upper" else -1.0
+    trials = []
+    for edge in angles[2:-2]:
+        push = -sign * np.maximum(sign * (angles - edge), 0.0)
+        numbers, share = _explained(np.column_stack([push, level]), torques, level)
+        if numbers[0] > 0.0:
+            trials.append((share, {**form, side: float(edge), "stiffness": numbers[0]}))
+    return _best(trials)
+
+
+def _levels(torques: Array) -> list[Mapping[str, float]]:
+    """A torque that is the same everywhere."""
+    share = 1.0 - float(np.var(torques)) / max(float(np.mean(torques**2)), 1e-15)
+    return _best([(share, {"bias": float(torques.mean())})])
+
+
+def _explained(columns: Array, torques: Array, plain: Array) -> tuple[list[float], float]:
+    """Factors of the columns, and the share of the squares that the plain columns leave which they explain."""
+    factors = np.linalg.lstsq(columns, torques, rcond=None)[0]
+    left = torques - columns @ factors
+    before = torques - plain @ np.linalg.lstsq(plain, torques, rcond=None)[0]
+    share = 1.0 - float(left @ left) / max(float(before @ before), 1e-15)
+    return [float(x) for x in factors], share
+
+
+def _best(trials: list[tuple[float, dict[str, float]]]) -> list[Mapping[str, float]]:
+    share, start = max(trials, key=lambda pair: pair[0], default=(0.0, {}))
+    return [start] if share > EXPLAINED else []
 
 
 def residual_candidates(

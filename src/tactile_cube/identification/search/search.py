@@ -1,9 +1,9 @@
-"""The search for what is missing: screen, refit, judge on held-out trials, add, until the floor is reached."""
+"""Effects added one at a time: screen, refit, judge on held-out trials, add, until the floor is reached."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -17,22 +17,27 @@ from tactile_cube.identification.fitting.error_growth import steady_rows
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.resolution import step_error
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.candidates import Candidate, candidates
+from tactile_cube.identification.search.candidates import (
+    Candidate,
+    candidates,
+    fewer_joints,
+    other_starts,
+    special_cases,
+    with_details,
+    without_effect,
+)
 from tactile_cube.identification.search.division import BRIEF, LONG, SEGMENTS, Division, some
-from tactile_cube.identification.search.evidence import Judgement, gain, p_value, worse
-from tactile_cube.identification.search.explanation import NEARLY, Explanation, fewer_joints, without_effect
-from tactile_cube.identification.search.other_starts import other_starts
-from tactile_cube.identification.search.relatives import special_cases, with_details
-from tactile_cube.identification.search.residual_starts import residual_candidates
-from tactile_cube.identification.search.screening import Score, screen
-from tactile_cube.identification.search.shared_offset import shared_offset
-from tactile_cube.identification.search.shortlist import of_each, with_groups
-from tactile_cube.identification.search.simplicity import named, simplest
-from tactile_cube.identification.search.special_laws import special_candidates
-from tactile_cube.identification.search.standard_model import standard_explanation
-from tactile_cube.identification.search.together import Proposal, Together
-from tactile_cube.identification.search.twins import twins
-from tactile_cube.identification.search.worth import least_gain, unproven, worthwhile
+from tactile_cube.identification.search.evidence import gain, p_value, worse
+from tactile_cube.identification.search.explanation import (
+    Explanation,
+    Proposal,
+    least_gain,
+    simplest,
+    unproven,
+    worthwhile,
+)
+from tactile_cube.identification.search.residual_starts import residual_candidates, special_candidates
+from tactile_cube.identification.search.screening import Score, of_each, screen, with_groups
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model
@@ -47,31 +52,9 @@ DEEPEST = 3  # effects in combination
 BEAM, CLOSE = 2, 1.5  # alternatives that are pursued at each depth, and their squared error over the best one's
 Divided = tuple[Recording, Recording]
 """Trials to fit and trials to judge by."""
-
-
-@dataclass(frozen=True)
-class Findings:
-    """Everything that a search has tried.
-
-    Attributes:
-        base: the refitted base model.
-        nominal: the model before any fit, judged on the held-out trials.
-        levels: explanations with 1, 2, ... effects, best first; or the sets that were found together alone.
-        scores: screening of the first level, best first.
-        unproven: where the search ended, what would explain much and may be chance, best first.
-        surpassed: what was found one by one and is clearly worse than the sets that were found together.
-    """
-
-    base: Explanation
-    nominal: Judgement
-    levels: tuple[tuple[Explanation, ...], ...]
-    scores: tuple[Score, ...]
-    unproven: tuple[Explanation, ...] = ()
-    surpassed: tuple[Explanation, ...] = ()
-
-
 ENOUGH = 24  # held-out segments at least
 FEWEST_ROWS = 8
+NEARLY = 1.5  # error over the noise of a fit with little free that explains nearly everything
 
 
 def enough_rows(held_out: Recording) -> int:
@@ -132,35 +115,6 @@ class Search(Division):
         """Refitted constants alone."""
         return self.fit_base()
 
-    def run(self) -> Findings:
-        """The whole search."""
-        base = self.base
-        self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
-        nominal = self.judged(self.start)
-        standard = standard_explanation(self, base) if base.error > self.criteria.far else None
-        levels, scores, doubtful = self.one_by_one(base, standard)
-        found = [e for level in levels for e in level]
-        best = min(found, key=lambda e: e.error, default=base)
-        surpassed: list[Explanation] = []
-        if self.sets and not standard and best.error > self.criteria.far and not self.hidden_by_steps(best):
-            folds = [
-                Division(self.shooting, *one, self.noise, self.segment, self.known, self.segments) for one in self.folds
-            ]
-            if sets := Together(self, base, folds).run(self.leaders, best):
-                levels, surpassed, doubtful = [sets], found, []
-        while found := [e for level in levels for e in level]:
-            chosen = simplest(found, self.criteria)
-            if chosen.explained(base) <= self.criteria.most or not (others := twins(self, chosen, base, found)):
-                break
-            levels[-1] = (*levels[-1], *others)
-            if len(named(simplest([*found, *others], self.criteria))) >= len(named(chosen)):
-                break  # else fewer do as well, which may have others in their place too
-        if not levels and base.largest_error <= self.criteria.floor:
-            shared = shared_offset(base, self.fitted, self.effects, self.shooting.sizes)
-            levels = [(shared,)] if shared else []
-        unproven = tuple(sorted(doubtful, key=lambda e: e.error))
-        return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed))
-
     def hidden_by_steps(self, one: Explanation) -> bool:
         """Whether what an explanation leaves may be the error of its steps of simulation."""
         if self.finer_steps == 1:
@@ -168,12 +122,12 @@ class Search(Division):
         steps = step_error(self.fitted, self.shooting, one.fit.model, self.noise, self.finer_steps)
         return bool(one.error < np.hypot(1.0, HIDING * steps))
 
-    def among(self, known: Sequence[Explanation]) -> Findings:
-        """The same of explanations that are known, and no others."""
-        base = self.base
-        self.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
-        refitted = [self.explanation(base, one.effects, one.fit.model, len(known)) for one in known]
-        return Findings(base, self.judged(self.start), (tuple(self.pruned(one) for one in refitted),), ())
+    def fold_divisions(self) -> list[Division]:
+        """The same trials divided in the other ways."""
+        return [
+            Division(self.shooting, fitted, held_out, self.noise, self.segment, self.known, self.segments)
+            for fitted, held_out in self.folds
+        ]
 
     def one_by_one(
         self, base: Explanation, standard: Explanation | None = None

@@ -1,47 +1,27 @@
-"""A search from everything at once: sets of effects proposed by their fit alone, pruned, judged on trials held out."""
+"""Effects from everything at once: the field's standard model, and sets that are proposed by their fit alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
-from tactile_cube.identification.criteria import Criteria
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.search.candidates import Candidate
+import numpy as np
+
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
+from tactile_cube.identification.search.candidates import Candidate, special_cases, with_effects, without_effect
 from tactile_cube.identification.search.division import BRIEF, Division
 from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
-from tactile_cube.identification.search.explanation import Explanation, without_effect
-from tactile_cube.identification.search.relatives import special_cases
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
+from tactile_cube.identification.search.residual_shape import Missing, missing_torques
 from tactile_cube.identification.search.residual_starts import residual_candidates
-from tactile_cube.identification.search.simplicity import named_by
-from tactile_cube.identification.search.subsets import best_subsets, candidate_columns
+from tactile_cube.identification.search.screening import best_subsets, candidate_columns
+from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.replay.model import Model
-
-if TYPE_CHECKING:
-    from tactile_cube.identification.search.search import Search
 
 MOST = 4  # effects in a set; one more than are looked for one by one, for pruning takes back what was too much
 REFITTED = 6  # sets of each size that are refitted briefly, of which the best ones go on
 KEPT = 2  # sets that are grown further
 JUDGED = 4  # sets that the held-out trials are asked about
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """A set of effects and how it fits; no held-out trial has been asked.
-
-    Attributes:
-        effects: in the order in which they came.
-        fit: of everything together.
-    """
-
-    effects: tuple[Candidate, ...]
-    fit: Fit = field(repr=False)
-
-    def price(self, criteria: Criteria) -> float:
-        """Squared error, with as much for each number as an effect has to explain at least."""
-        return float(self.fit.cost / (1.0 - criteria.least_gain) ** sum(one.size for one in self.effects))
 
 
 class Together:
@@ -114,10 +94,10 @@ class Together:
         wanted = [*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)]
         wanted = [one for one in search.new(wanted) if there.isdisjoint(named_by([one]))]
         columns, brief = candidate_columns(problem, frozen, wanted), []
-        for chosen in (one for size in sizes for one in best_subsets(columns, size)[:REFITTED]):
-            model = with_effects(frozen.model, chosen.candidates)
+        for _, chosen in (one for size in sizes for one in best_subsets(columns, size)[:REFITTED]):
+            model = with_effects(frozen.model, chosen)
             own = search.unknowns(model)[len(frozen.unknowns) :]
-            brief.append(Proposal((*parent.effects, *chosen.candidates), fit(problem, model, own, BRIEF, frozen)))
+            brief.append(Proposal((*parent.effects, *chosen), fit(problem, model, own, BRIEF, frozen)))
         leading = self.best(brief)[:KEPT]
         full = [replace(one, fit=search.refitted(one.fit.model)) for one in leading]
         for one in full:
@@ -126,7 +106,7 @@ class Together:
 
     def evidence(self, model: Model) -> Judgement:
         """How a model does on the held-out trials of all divisions, refitted in each."""
-        folds = [fold.settled(fold.with_known_offsets(model))[1] for fold in self.folds]
+        folds = [fold.settled(model.with_offsets(fold.offsets))[1] for fold in self.folds]
         return all_of([self.search.settled(model)[1], *folds])
 
     def pruned(self, proposal: Proposal, evidence: Judgement) -> tuple[Proposal, Judgement]:
@@ -168,8 +148,75 @@ class Together:
         return found
 
 
-def with_effects(model: Model, candidates: Sequence[Candidate]) -> Model:
-    """The model with all of them at their starts."""
-    for candidate in candidates:
-        model, _ = candidate.added_to(model)
-    return model
+ITERATIONS = 12
+MOVES = 0.05  # of a joint's speed: slower samples say little of its friction
+
+
+def standard_explanation(search: Search, base: Explanation) -> Explanation | None:
+    """Return what of the standard model the recording's owner states wrongly, or None where that is no explanation.
+
+    All laws are regressed on the torque that the base model lacks, then fitted at all joints at once. Those stay that
+    the fit needs for its error, then those that the trials to judge by ask for.
+
+    Source: Gautier, Dynamic identification of robots with power model, ICRA 1997; viscous friction by direction as in
+    Janot, Gautier, Brunot, EMPS benchmark, 2019.
+    """
+    frozen = search.frozen(base.fit)
+    missing = missing_torques(search.problem, search.fitted, frozen.model, frozen.residual)
+    known = {effect.name: effect for effect in search.effects}
+    wanted = [
+        Candidate(known[name], (one.joint,), form, search.shooting.sizes)
+        for one in missing
+        for name, form in regressed(one).items()
+        if name in known
+    ]
+    needed = _needed(search, frozen, search.new(wanted))
+    if not needed:
+        return None
+    search.say(f"standard model: {' & '.join(one.label for one in needed)}")
+    fitted = search.refitted(with_effects(base.fit.model, needed))
+    found = search.pruned(search.explanation(base, tuple(needed), fitted.model, 1))
+    enough = found.explained(base) > search.criteria.most and search.worthwhile(found, base, base)
+    return found if enough else None
+
+
+def regressed(missing: Missing) -> dict[str, dict[str, float]]:
+    """Return effect -> parameters of the laws that are linear in the missing torque, by least squares.
+
+    Torque (samples,) [N m] = -Fc sgn v - b v - d / 2 |v| + bias + g tau, of samples that move.
+    """
+    speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
+    drive = missing.signals[f"torque of {missing.joint} [N m]"]
+    moving = np.abs(speed) > MOVES * np.abs(speed).max()
+    v = speed[moving]
+    columns = np.stack([-np.sign(v), -v, -0.5 * np.abs(v), np.ones_like(v), drive[moving]], axis=1)
+    sizes = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    friction, damping, difference, bias, gain = (
+        np.linalg.lstsq(columns / sizes, missing.torque[moving], rcond=1e-6)[0] / sizes
+    ).tolist()
+    return {
+        "coulomb_friction": {"friction": max(friction, 0.0)},
+        "viscous_friction": {"damping": max(damping, 0.5 * abs(difference)), "difference": difference},
+        "torque_bias": {"bias": bias},
+        "torque_gain": {"error": float(np.clip(gain, -0.7, 0.7))},
+    }
+
+
+def _needed(search: Search, frozen: Fit, wanted: list[Candidate]) -> list[Candidate]:
+    """Those of the laws, fitted together, without which the fit's squared error grows by a large part of itself."""
+    left = list(wanted)
+    while left:
+        model = with_effects(frozen.model, left)
+        fitted = fit(search.problem, model, search.unknowns(model)[len(frozen.unknowns) :], ITERATIONS, frozen)
+        inverse = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)))
+        least = search.criteria.large_gain * fitted.cost
+        worth, first = [], len(frozen.unknowns)
+        for one in left:
+            own = slice(first, first := first + one.size)
+            values = np.array([u.of(fitted.model) / u.scale for u in fitted.unknowns[own]])
+            worth.append(float(values @ np.linalg.solve(inverse[own, own], values)))
+        kept = [one for one, cost in zip(left, worth, strict=True) if cost >= least]
+        if len(kept) == len(left) or not kept:
+            return kept
+        left = kept
+    return left

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,3 +74,7 @@ class Model:
     constants: Mapping[str, Array]
     terms: tuple[Term, ...]
     offsets: Mapping[int, Array]
+
+    def with_offsets(self, known: Mapping[int, Array]) -> Model:
+        """The model with these joint offsets [rad] in initialisations of which it has none."""
+        return replace(self, offsets={**known, **self.offsets})

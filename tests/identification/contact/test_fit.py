@@ -1,14 +1,15 @@
 import numpy as np
 import pytest
 
-from tactile_cube.identification.contact.fit import fit_contact, summarise_fit
-from tactile_cube.identification.contact.search import (
+from tactile_cube.identification.contact.fit import (
     NARROWINGS,
     GroupEstimate,
     contact_unknowns,
     first_value,
+    fit_contact,
     group_estimate,
     narrowed,
+    summarise_fit,
 )
 from tactile_cube.measurement.replay.hand_replay import ContactModel
 from tactile_cube.simulation.contact_effects import (

@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.identification.search.findings import twins
 from tactile_cube.identification.search.search import Search
-from tactile_cube.identification.search.twins import twins
 from tactile_cube.measurement.split import held_out_split
 from tests.identification.rigs_of_any_size import NOISE, Size, simulated
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
-from tactile_cube.identification.drift import changed, drifts
+from tactile_cube.identification.model_files import changed, drifts
 
 
 def estimate(value: float, half: float) -> Estimate:

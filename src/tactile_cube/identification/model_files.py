@@ -1,0 +1,151 @@
+"""What was identified, as a model file, and what has changed between two of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+import numpy as np
+from scipy import stats
+
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelErrors, ModelFile, Provenance
+from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, bounds
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term
+from tactile_cube.measurement.replay.nominal import CONTROLLER, nominal_model
+
+UNITS = {
+    "kp": "N m/rad",
+    "kd": "N m s/rad",
+    "torque_limit": "N m",
+    "stiffness": "N m/rad",
+    "static_friction": "N m",
+    "reflected_inertia": "kg m^2",
+    "friction_creep": "rad/s per N m",
+    "reading_delay": "s",
+}
+Known = Mapping[tuple[str, str, int, int], tuple[float, float, float]]
+
+
+def model_file(
+    recording: Recording, fitted: Fitted, errors: ModelErrors, held_out: list[str], command: str, seed: int
+) -> ModelFile:
+    """Everything that was identified on a recording."""
+    known = bounds(fitted)
+    joints = list(recording.joints)
+    return ModelFile(
+        rig=recording.name,
+        joints=joints,
+        values={key: _constants(fitted.model, key, joints, known) for key in UNITS},
+        effects=[effect_estimate(term, place, known) for place, term in enumerate(fitted.model.terms)],
+        offsets={joint: _offset(fitted.model, j) for j, joint in enumerate(joints)},
+        provenance=_provenance(recording, held_out, command, seed),
+        errors=errors,
+    )
+
+
+def stated_model(recording: Recording, command: str, seed: int) -> ModelFile:
+    """What recording.yaml says of the drivetrain, as a model without intervals; it is silent where the recording is."""
+    every = nominal_model(recording).constants
+    values = {
+        key: {joint: _estimate(float(v), None, "") for joint, v in zip(recording.joints, row, strict=True)}
+        for key, row in every.items()
+        if key in (*CONTROLLER, *recording.nominal)
+    }
+    provenance = _provenance(recording, [], command, seed)
+    return ModelFile(rig=recording.name, joints=list(recording.joints), values=values, provenance=provenance)
+
+
+def _provenance(recording: Recording, held_out: list[str], command: str, seed: int) -> Provenance:
+    return Provenance(
+        recording=str(recording.folder),
+        command=command,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        version=version("tactile-cube"),
+        seed=seed,
+        trials=[trial.name for trial in recording.trials if trial.name not in held_out],
+        held_out=held_out,
+    )
+
+
+def effect_estimate(term: Term, place: int, known: Known) -> EffectEstimate:
+    """An effect with every parameter; those that were not fitted have no width."""
+    units = {p.name: p.unit for p in term.effect.parameters}
+    parameters = {
+        key: _estimate(value, known.get(("effect", key, place, 0)), units[key]) for key, value in term.values.items()
+    }
+    return EffectEstimate(effect=term.label, parameters=parameters)
+
+
+def _constants(model: Model, key: str, joints: list[str], known: Known) -> dict[str, Estimate]:
+    values = model.constants[key]
+    return {
+        joint: _estimate(float(values[j]), known.get(("constant", key, j, 0)), UNITS[key])
+        for j, joint in enumerate(joints)
+    }
+
+
+def _estimate(value: float, interval: tuple[float, float, float] | None, unit: str) -> Estimate:
+    low, high = interval[1:] if interval else (value, value)
+    return Estimate(value=value, low=low, high=high, unit=unit)
+
+
+def _offset(model: Model, joint: int) -> Estimate:
+    """Joint offset (measured minus true angle), its interval spanning the initialisations."""
+    offsets = [-float(one[joint]) for one in model.offsets.values()]
+    return Estimate(value=float(np.mean(offsets)), low=min(offsets), high=max(offsets), unit="rad")
+
+
+@dataclass(frozen=True)
+class Drift:
+    """One number of a model, before and now.
+
+    Attributes:
+        name: `PARAMETER@JOINT`, or `EFFECT@JOINT: PARAMETER`.
+        before: of the reference.
+        now: of the newest recording.
+    """
+
+    name: str
+    before: Estimate
+    now: Estimate
+
+    @property
+    def difference(self) -> float:
+        """Now less before, in the parameter's unit."""
+        return self.now.value - self.before.value
+
+    @property
+    def half_width(self) -> float:
+        """Of the 95 % interval of the difference: two recordings err independently."""
+        halves = [0.5 * (one.high - one.low) for one in (self.before, self.now)]
+        return float(np.hypot(halves[0], halves[1]))
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a difference as large if nothing has changed."""
+        return float(2.0 * stats.norm.sf(NORMAL_95 * abs(self.difference) / self.half_width))
+
+
+def drifts(before: ModelFile, now: ModelFile) -> list[Drift]:
+    """Every number with an interval in both models, the least probable difference first.
+
+    Joint offsets are left out: they are others after each initialisation of a robot.
+    """
+    known = dict(_estimates(before))
+    pairs = [Drift(name, known[name], one) for name, one in _estimates(now) if name in known]
+    return sorted((one for one in pairs if one.half_width > 0.0), key=lambda one: one.p_value)
+
+
+def changed(found: list[Drift], significance: float) -> list[Drift]:
+    """Those that are no chance; `significance` holds for all of them together (Bonferroni)."""
+    return [one for one in found if one.p_value * len(found) < significance]
+
+
+def _estimates(model: ModelFile) -> Iterator[tuple[str, Estimate]]:
+    for key, joints in model.values.items():
+        yield from ((f"{key}@{joint}", one) for joint, one in joints.items() if one.high > one.low)
+    for effect in model.drive_effects:
+        yield from ((f"{effect.effect}: {key}", one) for key, one in effect.parameters.items() if one.high > one.low)
