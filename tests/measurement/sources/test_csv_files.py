@@ -240,3 +240,17 @@ def test_a_geared_motor_is_counted_at_its_joint_by_the_sensor_on_the_link(
     assert trial.feedforward is not None
     assert trial.link_position[:, 0] == pytest.approx(columns["a.position"] + 0.1, abs=1e-5)
     assert trial.feedforward[:, 0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("names", "changes"), [(("goal_ticks", "present_ticks"), {}), (("goal", "pos"), {"angle_unit": 4096})]
+)
+def test_ticks_of_an_encoder_are_angles_about_the_middle_of_its_turn(
+    names: tuple[str, str], changes: dict[str, object], tmp_path: Path
+) -> None:
+    columns = table(0)
+    ticks = [np.round(columns[f"a.{one}"] / (2 * np.pi) * 4096) + 2048 for one in ("command", "position")]
+    logged = {"time": columns["time"], **dict(zip(names, ticks, strict=True))}
+    trial = imported(tmp_path, {"log.csv": logged}, ONE_JOINT, **changes).trials[0]
+    assert trial.position[:, 0] == pytest.approx(columns["a.position"], abs=8e-4)
+    assert trial.command[:, 0] == pytest.approx(columns["a.command"], abs=8e-4)

@@ -41,7 +41,7 @@ class CsvFiles:
     nominal: Mapping[str, float | None] = field(default_factory=dict)
     gravity: Iterable[float] = (0.0, 0.0, -9.81)
     rate: float | None = None
-    angle_unit: str | None = None
+    angle_unit: str | int | None = None
     length_unit: str | None = None
     time_unit: str | None = None
     torque_unit: str | None = None
@@ -117,7 +117,7 @@ class CsvFiles:
             if all(has) or (any(has) and signal in OF_SOME):
                 lacking = np.full(len(next(iter(table.values()))), OF_SOME.get(signal, 0.0))
                 one = [
-                    _column(table, c[signal], path) * units[joint][signal].size if signal in c else lacking
+                    units[joint][signal].of(_column(table, c[signal], path)) if signal in c else lacking
                     for joint, c in columns.joints.items()
                 ]
                 values[signal] = np.stack(one, axis=1)

@@ -28,6 +28,7 @@ TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
 FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 SAID = ("its name", "source.angle_unit", "source.length_unit")
 """What tells a unit for certain."""
+TICKS, FEWEST_TICKS = frozenset({"tick", "ticks", "count", "counts", "raw"}), 4096
 GEARED = 1.5  # turns of a motor a turn of its link, from which on there is a gear between them
 SLOWEST = 0.1  # [s] between samples of a log that shows a drive
 NOT_ALIKE = 0.05  # range of a position over that of its command, below which they are in different units
@@ -59,14 +60,19 @@ def _unit_of(name: str, allowed: Mapping[str, float]) -> str | None:
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit: its name, its size in SI units, and what told it."""
+    """A unit: its name, its size in SI units, what told it, and the reading that is zero."""
 
     name: str
     size: float
     source: str
+    zero: float = 0.0
+
+    def of(self, values: Array) -> Array:
+        """Values in SI units."""
+        return (values - self.zero) * self.size
 
 
-def chosen_unit(said: str | None, name: str, units: Mapping[str, float], key: str) -> Unit | None:
+def chosen_unit(said: str | int | None, name: str, units: Mapping[str, float], key: str) -> Unit | None:
     """The unit that the user or else the column's name says.
 
     Raises:
@@ -75,7 +81,7 @@ def chosen_unit(said: str | None, name: str, units: Mapping[str, float], key: st
     if said is not None:
         if said not in units:
             raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}")
-        return Unit(said, units[said], f"source.{key}")
+        return Unit(str(said), units[str(said)], f"source.{key}")
     found = _unit_of(name, units)
     return None if found is None else Unit(found, units[found], "its name")
 
@@ -90,8 +96,16 @@ def time_unit(said: str | None, name: str, time: Array) -> Unit:
     return Unit(unit, TIME_UNITS[unit], f"steps of {step:g}")
 
 
-def position_unit(said: str | None, name: str, values: Array, joint: RigJoint) -> Unit:
-    """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits."""
+def position_unit(said: str | int | None, name: str, values: Array, joint: RigJoint) -> Unit:
+    """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits.
+
+    `said` may be the ticks of an encoder's turn.
+    """
+    if not joint.prismatic and said is not None and str(said).isdecimal():
+        return _ticks(int(said), values, joint, "source.angle_unit")
+    if not joint.prismatic and said is None and TICKS & set(words(name)) and not (values % 1.0).any():
+        turn = max(FEWEST_TICKS, 1 << int(np.abs(values).max()).bit_length())
+        return _ticks(turn, values, joint, f"whole numbers up to {values.max():g}; else source.angle_unit=TICKS_A_TURN")
     units = LENGTH_UNITS if joint.prismatic else ANGLE_UNITS
     chosen = chosen_unit(said, name, units, "length_unit" if joint.prismatic else "angle_unit")
     if chosen is not None:
@@ -101,6 +115,15 @@ def position_unit(said: str | None, name: str, values: Array, joint: RigJoint) -
             return Unit(unit, units[unit], f"values {values.min():.3g} .. {values.max():.3g} and the joint's limits")
     first = next(iter(units))
     return Unit(first, 1.0, "assumed: no unit fits the joint's limits")
+
+
+def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
+    """Ticks of an encoder, which are zero in the middle of the turn where else the joint would leave its limits."""
+    if turn < FEWEST_TICKS // 64:
+        raise InputError(f"source.angle_unit={turn}: a turn has more ticks; for instance 4096")
+    size = 2 * np.pi / turn
+    zero = 0.0 if joint.reaches(values * size) else turn / 2
+    return Unit(f"tick, {turn} a turn, {zero:g} is zero", size, source, zero)
 
 
 def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapping[str, str]) -> dict[str, Unit]:
