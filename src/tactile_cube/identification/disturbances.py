@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects.controller import IntegralAction
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.problem import Problem
@@ -18,7 +19,7 @@ from tactile_cube.measurement.comparing.noise_floor import noise_with_links, rep
 from tactile_cube.measurement.recordings.description import MOST_LATE
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.model import Model, Term
 from tactile_cube.measurement.replay.nominal import nominal_model
 
 Array = NDArray[np.float64]
@@ -170,7 +171,7 @@ def in_time(
         if further > error:
             break
         rows, error, reading = rows + 1, further, later
-    if not rows:
+    if not rows or _integrating(recording, effects, known) < error:
         return recording
     stated = recording.description.sensors.commands_late
     say(
@@ -186,6 +187,21 @@ def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelF
     shooting, noise = Shooting(recording, effects), noise_with_links(recording)
     base = Division(shooting, recording, recording, noise, known=known, segments=SEGMENTS).fit_base()
     return base.error, float(base.fit.model.constants["reading_delay"].max() / recording.step)
+
+
+def _integrating(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> float:
+    """Error of the base model whose controllers integrate, as one that seems to know its commands early may do."""
+    shooting, noise = Shooting(recording, effects), noise_with_links(recording)
+    division = Division(shooting, recording, recording, noise, known=known, segments=SEGMENTS)
+    base, errors = division.fit_base().fit.model, []
+    starts = [IntegralAction.starts_at(shooting.sizes[joint]) for joint in recording.joints]
+    for form in (0, -1):  # of a PID and of a cascade
+        terms = [
+            Term(IntegralAction, joint, IntegralAction(joint, **values[form]).values, tuple(values[form]))
+            for joint, values in zip(recording.joints, starts, strict=True)
+        ]
+        errors.append(division.settled(replace(base, terms=(*base.terms, *terms)))[1].error)
+    return min(errors)
 
 
 def _earlier(recording: Recording, rows: int) -> Recording:
