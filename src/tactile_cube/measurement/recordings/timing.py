@@ -17,8 +17,6 @@ LONGEST_GAP = 0.25  # [s] beyond this the command in between is anybody's guess
 JITTER = 0.1  # share of a period that is worth a warning
 TINY = 1e-12  # share of a period below which no rate fits
 ON_GRID = 0.02  # share of a period below which samples are taken as they are
-
-
 Signals = TypeVar("Signals")
 
 
@@ -92,13 +90,10 @@ def _require_rate(gaps: Array, rate: float, path: Path) -> None:
     typical = float(np.median(gaps))
     if 0.75 < typical < 1.35:
         return
+    remedy = f"set rate_hz to {rate / typical:.4g}" if typical > TINY else "time is in seconds"
     for factor, unit in UNITS.items():
         if 0.75 < typical / factor < 1.35:
-            raise InputError(
-                f"{path}: column 'time', row 1: steps of {typical / rate:g} at rate_hz {rate:g}: this looks like "
-                f"{unit}; time is in seconds"
-            )
-    remedy = f"set rate_hz to {rate / typical:.4g}" if typical > TINY else "time is in seconds"
+            remedy = f"this looks like {unit}; time is in seconds"
     raise InputError(
         f"{path}: column 'time', row 1: steps of {typical / rate * 1e3:.3g} ms, but rate_hz {rate:g} in recording.yaml "
         f"means {1e3 / rate:.3g} ms; {remedy}"
