@@ -15,10 +15,6 @@ MakeTask = Callable[..., RotationEnv]
 VARIED = Randomization(start_angles=Uniform(-0.1, 0.1))
 
 
-def test_specs_hold(rotation_task: MakeTask) -> None:
-    check_env_specs(WorldsEnv([rotation_task() for _ in range(3)]))
-
-
 def test_partial_reset_leaves_the_other_worlds_alone(rotation_task: MakeTask) -> None:
     env = WorldsEnv([rotation_task() for _ in range(3)])
     data = env.step(env.reset().set("action", torch.zeros(3, 12)))

@@ -13,28 +13,8 @@ from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.errors import InputError
 from tactile_cube.randomization import Learnability, Uniform
 from tactile_cube.training.build import FROZEN
-from tactile_cube.training.loop import barrier_seed
-from tactile_cube.training.run import Run
 from tests.training.tiny_env import tiny_environment
-from tests.training.tiny_run import tiny_run
-
-
-def finish(run: Run) -> torch.Tensor:
-    """Train to the end; all weights of the agent in one vector."""
-    run.train()
-    run.close()
-    return weights(run)
-
-
-def weights(run: Run) -> torch.Tensor:
-    return torch.cat(
-        [v.flatten().double() for v in run.learner.agent.state_dict()["loss"].values() if v.dtype.is_floating_point]
-    )
-
-
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> torch.Tensor:
-    return finish(tiny_run(tmp_path_factory.mktemp("reference")))
+from tests.training.tiny_run import finish, tiny_run
 
 
 def test_same_seed_gives_the_same_weights_bit_for_bit(tmp_path: Path, reference: torch.Tensor) -> None:
@@ -61,13 +41,6 @@ def test_resumed_run_equals_an_uninterrupted_one(tmp_path: Path, agent_settings:
         tmp_path / "parts/metrics.csv"
     ).read_text().count("\n")
     assert whole.learner.episodes.summary() == resumed.learner.episodes.summary()
-
-
-def test_resumed_worker_processes_equal_an_uninterrupted_run(tmp_path: Path) -> None:
-    collector = {"kind": "multi_sync", "processes": 2}
-    expected = finish(tiny_run(tmp_path / "whole", collector=collector))
-    finish(tiny_run(tmp_path / "parts", collector=collector, steps=80))
-    assert torch.equal(finish(tiny_run(tmp_path / "parts", collector=collector)), expected)
 
 
 @pytest.mark.parametrize(("at", "number"), [(0, signal.SIGINT), (6, signal.SIGINT), (6, signal.SIGTERM)])
@@ -147,27 +120,18 @@ def test_warm_start_takes_networks_from_checkpoint_and_policy(tmp_path: Path) ->
             assert torch.equal(mine, theirs)
 
 
-def test_a_frozen_actor_waits_for_its_critics(tmp_path: Path) -> None:
+def test_an_actor_without_its_critics_waits_for_fresh_ones_unless_told_otherwise(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path / "first", steps=80))
-    policy = str(tmp_path / "first" / "policy.safetensors")
-    given = [
-        parameter.clone()
-        for parameter in tiny_run(tmp_path / "x", init_from=policy).learner.agent.policy().parameters()
-    ]
+    policy, checkpoint = (str(tmp_path / "first" / file) for file in ("policy.safetensors", "checkpoint.pt"))
+    new = tiny_run(tmp_path / "policy", init_from=policy)
+    given = list(new.learner.agent.policy().parameters())
+    assert new.learner.settings.actor_frozen == FROZEN
+    assert tiny_run(tmp_path / "checkpoint", init_from=checkpoint).learner.settings.actor_frozen is None
     for updates, still in ((1000, True), (3, False)):
         run = tiny_run(tmp_path / f"next-{updates}", init_from=policy, actor_frozen=updates)
         finish(run)
         after = run.learner.agent.policy().parameters()
         assert all(torch.equal(a, b) for a, b in zip(after, given, strict=True)) == still
-
-
-def test_an_actor_without_its_critics_waits_unless_told_otherwise(tmp_path: Path) -> None:
-    finish(tiny_run(tmp_path / "first", steps=80))
-    frozen = {
-        file: tiny_run(tmp_path / file, init_from=str(tmp_path / "first" / file)).learner.settings.actor_frozen
-        for file in ("policy.safetensors", "checkpoint.pt")
-    }
-    assert frozen == {"policy.safetensors": FROZEN, "checkpoint.pt": None}
 
 
 def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(
@@ -212,12 +176,6 @@ def test_faulty_transitions_never_reach_the_replay(tmp_path: Path) -> None:
     assert run.learner.episodes.faulty > 0
     assert torch.isfinite(run.learner.replay.rows).all()
     assert run.learner.replay.buffer.write_count + run.learner.episodes.faulty == run.learner.steps
-
-
-def test_barriers_have_seeds_of_their_own() -> None:
-    seeds = {barrier_seed(seed, k) for seed in range(20) for k in range(0, 500, 25)}
-    assert len(seeds) == 400
-    assert max(seeds) < 2**31
 
 
 def test_workers_are_told_the_odds_of_the_worlds_where_they_are_steered(tmp_path: Path) -> None:

@@ -13,9 +13,8 @@ import torch
 from tactile_cube.training.collection import CollectionError
 from tactile_cube.training.recovery import train_on
 from tactile_cube.training.run import Run
-from tests.training.test_loop import finish, weights
 from tests.training.tiny_env import TinyEnv, tiny_environment
-from tests.training.tiny_run import tiny_run
+from tests.training.tiny_run import finish, tiny_run, weights
 
 COLLECTOR = {"kind": "multi_sync", "processes": 2, "timeout": 15.0}
 

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from tactile_cube.agent.sac import Sac
 from tactile_cube.training.build import build_run
 from tactile_cube.training.environment import Environment
@@ -43,4 +45,17 @@ def tiny_run(
         TrainingSettings(**(SCHEDULE | training)),
         {"csv": CsvLogger},
         {"seed": seed, "agent": {k: str(v) for k, v in settings.items()}, "training": SCHEDULE | training},
+    )
+
+
+def finish(run: Run) -> torch.Tensor:
+    """Train to the end; all weights of the agent in one vector."""
+    run.train()
+    run.close()
+    return weights(run)
+
+
+def weights(run: Run) -> torch.Tensor:
+    return torch.cat(
+        [v.flatten().double() for v in run.learner.agent.state_dict()["loss"].values() if v.dtype.is_floating_point]
     )

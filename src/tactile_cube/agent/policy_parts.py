@@ -137,11 +137,8 @@ def _require_known(part: Mapping[str, Any], place: str, label: str) -> None:
     takes = inspect.signature(getattr(import_module(package), name)).parameters
     for key in part.keys() & takes.keys():
         kinds = str(takes[key].annotation).split(" | ")
-        if KINDS.keys() >= set(kinds) and not _is_one_of(part[key], kinds):
-            raise InputError(f"{label}: {place}.{key} is {str(part[key])[:60]!r}; give {' or '.join(kinds)}")
-
-
-def _is_one_of(value: Any, kinds: Collection[str]) -> bool:
-    """Whether a value is of a kind; True and False are no numbers."""
-    known = "bool" in kinds if isinstance(value, bool) else True
-    return known and any(isinstance(value, KINDS[kind]) for kind in kinds)
+        value = part[key]
+        kinds_known = KINDS.keys() >= set(kinds)
+        wrong_flag = isinstance(value, bool) and "bool" not in kinds  # True and False are no numbers
+        if kinds_known and (wrong_flag or not any(isinstance(value, KINDS[kind]) for kind in kinds)):
+            raise InputError(f"{label}: {place}.{key} is {str(value)[:60]!r}; give {' or '.join(kinds)}")

@@ -18,10 +18,9 @@ from tactile_cube.env.task import FAULTY, OUTCOMES, Conditions, Curriculum
 class WorldsEnv(EnvBase):  # type: ignore[misc]
     """Rotation tasks side by side, batch size `[worlds]`.
 
-    Keys, for a hand with 12 joints: "joint_position" (12), "control_error" (12), "object_state" (25), "theta" (1),
-    "reward_terms" (8, or 13, see Reward.terms), "episode_step" (1), "outcome" (1, index into OUTCOMES), "faulty" (1),
-    "action" (12), "reward" (1), "done", "terminated", "truncated" (1); where constants are steered also "places", see
-    RotationEnv. Transitions whose "faulty" is true come from broken physics and must not be learned from.
+    Keys are those of TimeStep, besides "episode_step", "faulty", "action" (joints), "done", "terminated", "truncated",
+    and where constants are steered "places", see RotationEnv. Transitions whose "faulty" is true come from broken
+    physics and must not be learned from.
 
     Example:
         >>> env = WorldsEnv([RotationEnv(...), RotationEnv(...)])
@@ -100,13 +99,10 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         return self._batch(with_reward=True)
 
     def _batch(self, with_reward: bool) -> TensorDictBase:
-        """All worlds' moments as one tensordict."""
-        moments, n = self._time_steps, len(self.tasks)
-        data: dict[str, torch.Tensor] = {
-            "joint_position": _rows([m.joint_position for m in moments]),
-            "control_error": _rows([m.control_error for m in moments]),
-            "object_state": _rows([m.object_state for m in moments]),
-            "reward_terms": _rows([m.reward_terms for m in moments]),
+        moments = self._time_steps
+        whole = ("joint_position", "control_error", "object_state", "reward_terms")
+        data: dict[str, torch.Tensor] = {key: _rows([getattr(m, key) for m in moments]) for key in whole}
+        data |= {
             "theta": _rows([[m.theta] for m in moments]),
             "episode_step": torch.tensor([[m.step] for m in moments]),
             "outcome": torch.tensor([[m.outcome] for m in moments]),
@@ -119,7 +115,7 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         data["done"] = data["terminated"] | data["truncated"]
         if with_reward:
             data["reward"] = _rows([[m.reward] for m in moments])
-        return TensorDict(data, batch_size=[n])
+        return TensorDict(data, batch_size=self.batch_size)
 
 
 def _rows(rows: Sequence[Any]) -> torch.Tensor:

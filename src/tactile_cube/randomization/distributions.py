@@ -114,12 +114,9 @@ class LogUniform:
 
 @dataclass(frozen=True)
 class EffectRange:
-    """One effect at one joint; each episode draws its parameters.
+    """One effect at one joint, e.g. `ring_q2`; each episode draws its parameters, in SI units.
 
-    Attributes:
-        effect: class of the effect; not one that changes the mechanism, whose bodies are built once.
-        joint: as the world names it, e.g. `ring_q2`.
-        parameters: distribution of each parameter, in SI units.
+    Not for effects that change the mechanism, whose bodies are built once.
     """
 
     effect: type[Effect]

@@ -33,9 +33,9 @@ def identified(
 
     Args:
         model: what `identify` or `diagnose` wrote.
-        constants: nominal constants of what the model does not mention.
-        randomization: ranges of what the model does not mention.
-        joints: the hand's joints, in the order of the constants' vectors (12,).
+        constants: nominal, of what the model does not mention.
+        randomization: ranges of the same.
+        joints: the hand's joints, in the order of the constants' vectors.
 
     Raises:
         InputError: joints, effects or limits that the hand does not have.
@@ -62,7 +62,7 @@ def identified(
         factors=factors,
         shifts=shifts,
         effects=[
-            _range(effect, joint, one.parameters)
+            EffectRange(effect, joint, {key: _interval(estimate) for key, estimate in one.parameters.items()})
             for one, effect, joint in placed
             if effect.stage is not Stage.MECHANISM
         ],
@@ -107,9 +107,8 @@ def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequen
     return low, value, high
 
 
-def _range(effect: type[Effect], joint: str, parameters: Mapping[str, Estimate]) -> EffectRange:
-    drawn = {key: Uniform(e.low, e.high) if e.high > e.low else Constant(e.value) for key, e in parameters.items()}
-    return EffectRange(effect, joint, drawn)
+def _interval(estimate: Estimate) -> Distribution:
+    return Uniform(estimate.low, estimate.high) if estimate.high > estimate.low else Constant(estimate.value)
 
 
 def _offsets(model: ModelFile, default: Distribution, joints: Sequence[str]) -> Distribution:

@@ -14,9 +14,7 @@ def train_on(build: Callable[[], Run]) -> tuple[Run, str]:
     """Train to the end through faults of the workers; gives the closed run and the reason it ended.
 
     All since the barrier is done again from the same state, so that its numbers are those of a run without faults.
-
-    Args:
-        build: makes the run, fresh or from its last checkpoint.
+    `build` makes the run, fresh or from its last checkpoint.
 
     Raises:
         CollectionError: workers failed `ATTEMPTS` times without a barrier reached in between.

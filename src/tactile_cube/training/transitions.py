@@ -51,13 +51,12 @@ class TransitionAssembler:
 
 def _fields(block: TensorDictBase) -> TensorDict:
     following = block["next"]
-    never = torch.zeros_like(following["terminated"])
-    keys = ("observation", "privileged", "reward_terms", "terminated", "done", "faulty")
-    current = {
+    fields = {
         "observation": block["observation"],
         "privileged": block["privileged"],
         # both are missing where no extra exploration is configured
         "action": following.get("action_taken", block["action"]),
-        "demonstrated": following.get("demonstrated", never),
+        "demonstrated": following.get("demonstrated", torch.zeros_like(following["terminated"])),
+        "next": following.select("observation", "privileged", "reward_terms", "terminated", "done", "faulty"),
     }
-    return TensorDict({**current, "next": following.select(*keys)}, block.batch_size)
+    return TensorDict(fields, block.batch_size)
