@@ -62,10 +62,11 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
 
 def run_view(job: Job, say: Say) -> ViewResult:
     """See what a job names."""
-    from tactile_cube.visualization.viewer import require_viewer, show_files
+    from tactile_cube.visualization.viewer import VIEWERS, show_files
 
     config = job.config
-    require_viewer(config.viewer)
+    if config.viewer not in VIEWERS:
+        raise InputError(f"viewer={config.viewer}: choose one of {', '.join(VIEWERS)}")
     if not isinstance(config.episodes, int) or config.episodes < 2:
         raise InputError(f"episodes={config.episodes}: give at least 2, of which the best and the worst are shown")
     there = recordings_in(Path(config.run))
