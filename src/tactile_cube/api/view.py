@@ -13,7 +13,7 @@ from tactile_cube.evaluation.policy_path import BASELINES, policy_path
 from tactile_cube.evaluation.training_curve import Curve, read_curve
 from tactile_cube.evaluation.verdict import EpisodeResult
 from tactile_cube.visualization.episode_recording import description, write_pair
-from tactile_cube.visualization.viewer import require_viewer, show_files
+from tactile_cube.visualization.viewer import VIEWERS, show_files
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,8 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
 def run_view(job: Job, say: Say) -> ViewResult:
     """See what a job names."""
     config, run = job.config, Path(job.config.run)
-    require_viewer(config.viewer)
+    if config.viewer not in VIEWERS:
+        raise InputError(f"viewer={config.viewer}: choose one of {', '.join(VIEWERS)}")
     if not isinstance(config.episodes, int) or config.episodes < 2:
         raise InputError(f"episodes={config.episodes}: give at least 2, of which the best and the worst are shown")
     trained = (run / "policy.safetensors").is_file()

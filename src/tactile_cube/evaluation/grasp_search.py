@@ -132,14 +132,9 @@ def _held(
     tilt = np.arccos(np.clip(Rotation.from_quat(after[3:]).as_matrix()[2, 2], -1.0, 1.0))
     still = np.linalg.norm(after[:3] - before[:3]) < CREEP and turned < TURN
     central = np.linalg.norm(after[:3]) < SHIFTED and tilt < TILTED
-    if not (still and central and _tips_only(world)):
+    pressing = [contact for contact in world.contacts() if contact.force > 0.0]
+    tips = {finger.name: finger.links[-1] for finger in world.hand.fingers}
+    tips_only = all(one.other == "cube" and one.link == tips[one.finger] for one in pressing)
+    if not (still and central and tips_only and len({one.finger for one in pressing}) >= TOUCHING):
         return None
     return np.array(world.q), target, after[:3], after[3:]
-
-
-def _tips_only(world: World) -> bool:
-    """Whether `TOUCHING` fingertips bear the object, and no other link or finger does."""
-    pressing = [contact for contact in world.contacts() if contact.force > 0.0]
-    tip_links = {finger.name: world.hand.fingers[k].links[-1] for k, finger in enumerate(world.hand.fingers)}
-    proper = all(one.other == "cube" and one.link == tip_links[one.finger] for one in pressing)
-    return proper and len({one.finger for one in pressing}) >= TOUCHING

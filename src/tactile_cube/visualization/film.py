@@ -40,9 +40,7 @@ def showcase(evaluation: Evaluation, variants: list[VariantResult], folder: Path
 
 
 def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand = DLR_HAND2) -> None:
-    """Write an animated GIF: the hand from the side and from below, at most 3 MB.
-
-    It runs in real time up to 40 s; longer episodes run faster.
+    """Write an animated GIF: the hand from the side and from below, at most 3 MB, faster than real time beyond 40 s.
 
     Args:
         record: the episode.

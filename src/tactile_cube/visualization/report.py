@@ -7,23 +7,17 @@ from pathlib import Path
 from typing import Literal
 
 from jinja2 import Environment
-from markupsafe import Markup
 
 Tone = Literal["good", "warn", "plain"]
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawing (SVG text, put into the page as it is) and the sentence that says what to see in it."""
+    """A drawing (SVG text of our own, which the page takes as it is) and what to see in it."""
 
     svg: str
     caption: str
     kind: Literal["figure"] = "figure"
-
-    @property
-    def drawing(self) -> Markup:
-        """The SVG as the template takes it."""
-        return Markup(self.svg)
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from tactile_cube.errors import InputError
-
 VIEWERS = ("auto", "window", "none")
-
-
-def require_viewer(wanted: str) -> None:
-    """Refuse what is no viewer.
-
-    Raises:
-        InputError: it is none of `VIEWERS`.
-    """
-    if wanted not in VIEWERS:
-        raise InputError(f"viewer={wanted}: choose one of {', '.join(VIEWERS)}")
 
 
 def show_files(files: Sequence[Path], wanted: str) -> str:
