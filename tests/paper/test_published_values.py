@@ -13,6 +13,7 @@ from hydra.utils import instantiate
 
 from tactile_cube import composition
 from tactile_cube.hand import DLR_HAND2
+from tactile_cube.hand.dlr_hand2 import LINKS
 from tactile_cube.randomization import Constant, LogUniform, Uniform
 
 Row = tuple[str, Any, str]
@@ -196,7 +197,7 @@ def test_joint_limits_are_the_published_ones(name: str, degrees: tuple[float, ..
 
 
 def test_links_have_the_published_lengths() -> None:
-    assert [link.length for link in DLR_HAND2.links] == [0.0, 0.075, 0.040, 0.045]  # W [m]
+    assert [length for length, _, _ in LINKS.values()] == [0.0, 0.075, 0.040, 0.045]  # W [m]
 
 
 def test_table_1_is_swept_in_six_settings_of_four_runs() -> None:

@@ -12,12 +12,6 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, 
 needs_compiler = pytest.mark.skipif(bullet_loop.find_compiler() is None, reason="no C compiler here")
 
 
-@pytest.fixture
-def empty_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr(bullet_loop, "cache_directory", lambda: tmp_path)
-    return tmp_path
-
-
 def episode(loop: type, trace: bool) -> list[np.ndarray]:
     world = World(options=SimulationOptions(trace=trace))
     assert isinstance(world._engine._loop, loop)  # type: ignore[attr-defined]
@@ -37,9 +31,10 @@ def episode(loop: type, trace: bool) -> list[np.ndarray]:
 @pytest.mark.parametrize("trace", [False, True])
 @pytest.mark.parametrize("compiler", [None, "/bin/false"])
 def test_without_a_compiler_the_loop_in_python_gives_the_same_bits(
-    trace: bool, compiler: str | None, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+    trace: bool, compiler: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compiled = episode(bullet_loop.NativeLoop, trace)
+    monkeypatch.setattr(bullet_loop, "cache_directory", lambda: tmp_path)
     monkeypatch.setattr(bullet_loop, "find_compiler", lambda: compiler)
     monkeypatch.setattr(bullet_loop, "load_native", bullet_loop.native_library.__wrapped__)
     for one, other in zip(compiled, episode(bullet_loop.PythonLoop, trace), strict=True):
@@ -47,11 +42,12 @@ def test_without_a_compiler_the_loop_in_python_gives_the_same_bits(
 
 
 @needs_compiler
-def test_several_processes_may_compile_at_once(empty_cache: Path) -> None:
+def test_several_processes_may_compile_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bullet_loop, "cache_directory", lambda: tmp_path)
     with ThreadPoolExecutor(4) as pool:
         built = list(pool.map(lambda _: bullet_loop.native_library.__wrapped__(), range(4)))
     assert len(set(built)) == 1
-    assert [file.name for file in empty_cache.iterdir()] == [built[0].name]
+    assert [file.name for file in tmp_path.iterdir()] == [built[0].name]
 
 
 def test_importing_the_simulation_prints_nothing() -> None:

@@ -36,7 +36,7 @@ _LIMITS = np.radians([(-30.0, 30.0), (-20.0, 86.0), (-10.0, 105.0), (-10.0, 105.
 # capsule from 16.5 mm to 33 mm, continued towards q4. All begin where their middle is the centre of mass: Bullet then
 # needs no compound shape around them, which is faster. The middle link is slimmer than the tip: with 15 mm an upright
 # finger would press on the cube's upper edge with its smooth middle link instead of its tip.
-_LINKS = {  # length to the next joint's axis [m], mass [kg], centre of mass along z [m]
+LINKS = {  # length to the next joint's axis [m], mass [kg], centre of mass along z [m]
     "knuckle": (0.0, 0.040, 0.0),
     "proximal": (0.075, 0.110, 0.0366),
     "middle": (0.040, 0.055, 0.0177),
@@ -59,20 +59,20 @@ def _finger(
     Its root is the frame of q1, which turns about z. Every further link's z axis points along the link and its joint
     turns about y; q4 follows q3.
     """
-    proximal, middle = _LINKS["proximal"][0], _LINKS["middle"][0]
+    proximal, middle = LINKS["proximal"][0], LINKS["middle"][0]
     return Finger(
         name=name,
         position=np.array(position),
         rotation=Rotation.from_rotvec(rotation_vector).as_matrix(),
         face=np.array(face),
         joints=("q1", "q2", "q3", "q4"),
-        links=tuple(_LINKS),
+        links=tuple(LINKS),
         limits=_LIMITS,
         origins=(_ACROSS, *(origin_element(np.array([0.0, 0.0, length])) for length in (proximal, middle))),
-        mass=np.array([mass for _, mass, _ in _LINKS.values()]),
-        com=np.array([[0.0, 0.0, along] for _, _, along in _LINKS.values()]),
-        inertia=np.array([_moments(link) for link in _LINKS]),
-        shapes=tuple((_capsule(*_CAPSULES[link]),) if link in _CAPSULES else () for link in _LINKS),
+        mass=np.array([mass for _, mass, _ in LINKS.values()]),
+        com=np.array([[0.0, 0.0, along] for _, _, along in LINKS.values()]),
+        inertia=np.array([_moments(link) for link in LINKS]),
+        shapes=tuple((_capsule(*_CAPSULES[link]),) if link in _CAPSULES else () for link in LINKS),
         chain=PlanarChain((proximal, middle, _CAPSULES["distal"][2])),
         prefix=f"{name}_",
     )
@@ -80,7 +80,7 @@ def _finger(
 
 def _moments(link: str) -> tuple[float, float, float]:
     """Moments about the centre of mass, of a solid cylinder in the capsule's place (x, y, z) [kg m^2]."""
-    length, mass, _ = _LINKS[link]
+    length, mass, _ = LINKS[link]
     radius, length = (_CAPSULES[link][0], length) if link in _CAPSULES else (0.012, 0.02)
     across = mass * (3.0 * radius**2 + length**2) / 12.0
     return across, across, 0.5 * mass * radius**2
