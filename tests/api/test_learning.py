@@ -7,6 +7,7 @@ import pytest
 
 import tactile_cube
 from tactile_cube import InputError
+from tactile_cube.api.job import called_job
 
 SHORT = [
     "+experiment=smoke",
@@ -27,6 +28,12 @@ def test_train_evaluate_load_and_export(tmp_path: Path) -> None:
     action = tactile_cube.load_policy(result.policy)(np.zeros((3, 120), dtype=np.float32))
     assert action.shape == (3, 12)
     assert tactile_cube.export(result.policy, tmp_path / "policy.npz").is_file()
+
+
+def test_a_call_without_a_folder_goes_where_the_command_would() -> None:
+    job = called_job("train", ["+experiment=smoke", "seed=4"])
+    assert str(job.folder) == "outputs/train/smoke-seed4"
+    assert job.command == "python -m tactile_cube.train +experiment=smoke seed=4"
 
 
 def test_an_environment_is_made_of_the_settings_of_train() -> None:

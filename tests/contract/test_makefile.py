@@ -22,7 +22,7 @@ SAID = "taking that of pip's own index"
 def index(kind: str) -> Iterator[str]:
     """URL of a package index that answers, that refuses connections, or that takes them and stays silent."""
     if kind == "answers":
-        with http.server.HTTPServer(("127.0.0.1", 0), http.server.SimpleHTTPRequestHandler) as server:
+        with http.server.HTTPServer(("127.0.0.1", 0), Answers) as server:
             threading.Thread(target=server.serve_forever, daemon=True).start()
             yield f"http://127.0.0.1:{server.server_port}"
             server.shutdown()
@@ -32,6 +32,17 @@ def index(kind: str) -> Iterator[str]:
         if kind == "silent":
             quiet.listen()
         yield f"http://127.0.0.1:{quiet.getsockname()[1]}"
+
+
+class Answers(http.server.BaseHTTPRequestHandler):
+    """Gives an empty page."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")

@@ -89,10 +89,11 @@ def called_job(command: str, settings: Sequence[str], folder: PathLike | None = 
             named = value if isinstance(value, list) else _name(value)
             OmegaConf.update(config, key, named)
             words.append(f"{key}={named}")
+    hydra, place = config.hydra, config.hydra.run.dir if folder is None else folder
     OmegaConf.set_struct(config, False)
-    hydra = config.pop("hydra")
+    del config["hydra"]
     OmegaConf.set_struct(config, True)
-    return _job(config, hydra, command, words, hydra.run.dir if folder is None else folder)
+    return _job(config, hydra, command, words, place)
 
 
 def _name(thing: Any) -> str:

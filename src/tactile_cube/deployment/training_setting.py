@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from hydra.utils import instantiate
 
 from tactile_cube.agent.policy_parts import making, require_parts
 from tactile_cube.env import Task
@@ -63,7 +64,8 @@ def training_setting(
     if hand is not None:
         _require_trained(hand, info["config"]["env"].get("hand") or {})
     with making(label):
-        hand = hand or _hand(env.get("hand"))
+        if hand is None:
+            hand = instantiate(env["hand"], _convert_="all") if env.get("hand") is not None else DLR_HAND2
         constants = {"object": object} | _values(env, "constants", CONSTANTS, label)
         task = _values(env, "task", {field.name for field in fields(Task)}, label)
         made = constants_of(hand, **constants)
@@ -94,13 +96,6 @@ def _require_drives(trained: EpisodeConstants, own: EpisodeConstants, label: str
                 f"{label}: env.constants.{key} is {stated.max():g}, the hand's is {known.max():g}; describe a hand "
                 "with such drives and name it: hand=..."
             )
-
-
-def _hand(named: Mapping[str, Any] | None) -> Hand:
-    from hydra.utils import instantiate
-
-    hand: Hand = DLR_HAND2 if named is None else instantiate(named, _convert_="all")
-    return hand
 
 
 def _values(env: Mapping[str, Any], part: str, known: set[str], label: str) -> dict[str, Any]:
