@@ -34,7 +34,6 @@ from tactile_cube.workbench.state import Stage, Value, Workbench
 from tactile_cube.workbench.widgets import NONE, RED, YELLOW, ImportForm, button, column_of, listed, row_of, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
-TWIN = " (these trials do not tell it from the one above)"
 SAVE_CSV = """
 const link = document.createElement("a");
 link.href = URL.createObjectURL(new Blob([text.text], {type: "text/csv"}));
@@ -280,11 +279,11 @@ class Page:
         self.ranked.tags = tag
         self.scores = [score for group in groups or [] for score in group]
         names = [effect_path(score.candidate.effect) for score in self.scores]
-        twins = [place > 0 for group in groups or [] for place in range(len(group))]
+        leaders = [effect_path(group[0].candidate.effect) for group in groups or [] for _ in group]
         self.ranked.active = None
         self.ranked.labels = [
-            f"{100 * bench.share(score):.0f} %  {name}{TWIN if twin else ''}"
-            for name, score, twin in zip(names, self.scores, twins, strict=True)
+            f"{100 * bench.share(score):.0f} %  {name}" + (f" (looks like {leader})" if name != leader else "")
+            for name, leader, score in zip(names, leaders, self.scores, strict=True)
         ]
         if groups is None:
             self.desk.look(joint)

@@ -56,7 +56,8 @@ class ImportForm:
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
-        self.waiting, self.columns, self.table = text_of(), Column(), text_of()
+        self.waiting, self.columns = text_of(), Column()
+        self.table = text_of(styles={"overflow-x": "auto"})
         self.seen: tuple[list[str], list[str]] | None = None  # columns and joints: as long as they stay, choices do
         self.gains = {name: TextInput(title=title, width=150) for name, title in GAINS.items()}
         self.nominal = {name: TextInput(title=title, width=150) for name, title in NOMINAL.items()}
