@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tactile_cube.measurement.recordings.recording import Recording
@@ -34,7 +35,7 @@ def test_two_windows_that_look_do_not_drive_each_other_away(desk: Desk) -> None:
     for _ in range(3):
         desk.look("a")
     done(desk)
-    assert desk.scores["a"][0].candidate.effect.name == "stribeck_friction"
+    assert desk.scores["a"][0][0].candidate.effect.name == "stribeck_friction"
 
 
 def test_a_change_is_made_before_the_look_that_it_outdates_is_finished(desk: Desk) -> None:
@@ -43,7 +44,7 @@ def test_a_change_is_made_before_the_look_that_it_outdates_is_finished(desk: Des
     done(desk)
     assert desk.bench is not None
     assert desk.bench.effects == [STRIBECK]
-    assert desk.bench.share(desk.scores["a"][0]) < 0.1
+    assert desk.bench.share(desk.scores["a"][0][0]) < 0.1
 
 
 def test_what_is_refused_is_shown_and_changes_nothing(desk: Desk) -> None:
@@ -68,19 +69,27 @@ def test_a_recording_takes_the_place_of_another_one(desk: Desk, measured: Record
     assert "no recording's folder" in desk.problem
 
 
-def test_what_came_back_is_added_to_the_logs_before(measured: Recording, tmp_path: Path) -> None:
+def test_what_came_back_is_added_to_the_recording_that_is_open(measured: Recording, tmp_path: Path) -> None:
     desk = Desk(tmp_path)
-    gains = {"kp": "4.0", "kd": "0.2", "torque_limit": "4.0", "mode": "position"}
     files = sorted(measured.folder.glob("*.parquet"))
-    desk.open(str(measured.folder / "rig.urdf"))
-    for dropped, together, trials in ((files[:2], True, 2), (files[2:], True, 4), (files[:3], False, 3)):
-        desk.take([one.name for one in dropped], [one.read_bytes() for one in dropped])
+
+    def imported(count: int, gains: dict[str, str], together: bool) -> Recording:
+        desk.take([one.name for one in files[:count]], [one.read_bytes() for one in files[:count]])
         done(desk)
-        desk.import_waiting(gains, {}, {}, {}, together)
+        desk.import_waiting({"mode": "position", **gains}, {}, {}, {}, together)
         done(desk)
         assert desk.problem == ""
         assert desk.bench is not None
-        assert len(desk.bench.opened.trials) == trials
+        return desk.bench.opened
+
+    desk.open(str(measured.folder))
+    more = imported(1, {"kp": "3.5"}, True)
+    assert [trial.initialisation for trial in more.trials] == [0, 0, 0, 0, 1]
+    assert more.trials[-1].kind == measured.trials[0].kind, "the same command"
+    assert [float(trial.gains.kp[0]) for trial in more.trials] == [4.0, 4.0, 4.0, 4.0, 3.5]
+    assert float(more.trials[-1].gains.kd[0]) == 0.2
+    assert np.allclose(more.trials[2].position, measured.trials[2].position, atol=1e-6)
+    stated = {"kp": "4.0", "kd": "0.2", "torque_limit": "4.0"}
+    assert len(imported(3, stated, False).trials) == 3
     desk.open(str(measured.folder / "rig.urdf"))
-    done(desk)
-    assert desk.imported == [], "another rig"
+    assert len(imported(2, stated, True).trials) == 2, "another rig"

@@ -56,6 +56,8 @@ def test_of_a_dropped_files_name_only_the_last_part_counts(tmp_path: Path) -> No
 def test_other_files_and_large_ones_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match=r"effect.py: neither a log \(.csv, .txt, .parquet, .npz\) nor a mechanism"):
         kept(tmp_path, "effect.py", b"")
+    with pytest.raises(InputError, match=r"run.mcap: a ROS bag; .*record source=mcap 'source.files=\[run.mcap\]'"):
+        kept(tmp_path, "run.mcap", b"")
     monkeypatch.setattr(importing, "LARGEST", 10)
     with pytest.raises(InputError, match=r"large.csv: .* name its path instead"):
         kept(tmp_path, "large.csv", b"0" * 11)

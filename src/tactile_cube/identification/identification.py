@@ -6,8 +6,6 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from tactile_cube.did_you_mean import suggestion
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
@@ -92,7 +90,9 @@ def identify_effects(
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
     current, judgement = base.fit, base.judgement
     for effect, joint, parameters in wanted:
-        current = with_effect(search, current, effect, joint, parameters)
+        added = with_effect(search, search.frozen(current), effect, joint, parameters).model
+        search.problem.linearise_starts(added)
+        current = fit(search.problem, added, search.unknowns(added), iterations=4)
         label = current.model.terms[-1].label
         judgement = search.judged(current.model)
         stages[f"+ {label}"] = judgement.model
@@ -153,12 +153,12 @@ def _check_parameters(effect: type[Effect], joint: str, parameters: Sequence[str
             )
 
 
-def with_effect(search: Search, current: Fit, effect: type[Effect], joint: str, parameters: Sequence[str] = ()) -> Fit:
-    """Return the fit with one more effect, in whichever of its forms and from whichever start it does best.
+def with_effect(search: Search, frozen: Fit, effect: type[Effect], joint: str, parameters: Sequence[str] = ()) -> Fit:
+    """Return a frozen fit with one more effect, in whichever of its forms and from whichever start it does best.
 
+    Everything else stays frozen: the model that it returns is where a fit of everything begins.
     With `parameters`, those of a form are fitted that has them, or beside a form's own.
     """
-    frozen = search.frozen(current)
     every = candidates(search.shooting.sizes, [effect])
     every += residual_candidates(search.problem, search.fitted, frozen, [effect])
     options = [c for c in every if c.joints == (joint,)]
@@ -166,6 +166,4 @@ def with_effect(search: Search, current: Fit, effect: type[Effect], joint: str, 
         neutral = {p.name: p.neutral for p in effect.parameters if p.name in parameters}
         having = [replace(c, form={**neutral, **c.form}) for c in options]
     refitted = [search.refit(frozen, option)[1] for option in (having if parameters else options)]
-    best = refitted[int(np.argmin([one.cost for one in refitted]))]
-    search.problem.linearise_starts(best.model)
-    return fit(search.problem, best.model, search.unknowns(best.model), iterations=4)
+    return min(refitted, key=lambda one: one.cost)

@@ -6,7 +6,7 @@ import multiprocessing
 from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
@@ -19,14 +19,10 @@ class Found(NamedTuple):
     Attributes:
         text: in plain words.
         effects: what is missing, NAME@JOINT; of sets that do as well the first.
-        rivals: the other sets.
-        folder: of its report, model and next experiment.
     """
 
     text: str
     effects: list[str]
-    rivals: list[list[str]]
-    folder: Path
 
 
 class Diagnosing:
@@ -97,8 +93,7 @@ def _diagnose(
     try:
         found = diagnose(recording, f"seed={seed}", "engine=fast", effects=effects, model=model, say=say)
         found.write(folder)
-        data: dict[str, Any] = found.data
-        chosen, *rivals = data["sets"] or [found.effects]
-        sender.send(Found(found.text, list(dict.fromkeys(chosen)), rivals, folder))
+        chosen = (found.data["sets"] or [found.effects])[0]
+        sender.send(Found(found.text, list(dict.fromkeys(chosen))))
     except InputError as error:
         sender.send(error)

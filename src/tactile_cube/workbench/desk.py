@@ -17,8 +17,9 @@ from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.workbench.background import Diagnosing, Found
-from tactile_cube.workbench.importing import RIGS, Preview, import_logs, kept, preview
+from tactile_cube.workbench.importing import RIGS, Preview, import_logs, kept, preview, require_known
 from tactile_cube.workbench.state import Workbench
 
 PROGRESS = 12  # lines of a diagnosis that are kept
@@ -33,8 +34,7 @@ class Desk:
         busy: what is being done, in words.
         problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
         logs: files that wait to be imported; `urdf`: of their rig; `preview`: what is in the first.
-        imported: those of the recording that is loaded, to which what came back from an experiment may be added.
-        scores: a first look at the candidates, joint -> best first, of this version.
+        scores: a first look at the candidates, joint -> best first, twins together, of this version.
         explainable: joint -> part of the missing torque that any law could explain, of this version.
         signature: the torque that the candidate looked at would supply.
         progress: of the diagnosis that runs or ran last; `found`: its answer.
@@ -48,7 +48,6 @@ class Desk:
         self.busy = self.problem = self.commands = ""
         self.notes: list[str] = []
         self.logs: list[Path] = []
-        self.imported: list[Path] = []
         self.urdf: Path | None = None
         self.preview: Preview | None = None
         self.diagnosing: Diagnosing | None = None
@@ -57,7 +56,7 @@ class Desk:
         self._forget()
 
     def _forget(self) -> None:
-        self.scores: dict[str, list[Score]] = {}
+        self.scores: dict[str, list[list[Score]]] = {}
         self.explainable: dict[str, float] = {}
         self.signature: Missing | None = None
         self.signature_of: str = ""
@@ -142,11 +141,17 @@ class Desk:
         self.do(f"reading {', '.join(names)}", run)
 
     def _wait_for_import(self, files: Sequence[Path]) -> None:
+        for file in files:
+            require_known(file)
         rigs = [file for file in files if file.suffix.lower() in RIGS]
-        if rigs:
-            self.urdf, self.imported = rigs[-1], []
+        self.urdf = rigs[-1] if rigs else self.urdf
         self.logs = [file for file in files if file not in rigs] or self.logs
         self.preview = preview(self.logs[0], self.urdf) if self.logs and self.urdf else None
+
+    @property
+    def same_rig(self) -> Recording | None:
+        """The recording that is loaded, unless another rig's URDF was named since: what came back is added to it."""
+        return self.bench.opened if self.bench is not None and self.bench.opened.rig.path == self.urdf else None
 
     def import_waiting(
         self,
@@ -163,10 +168,9 @@ class Desk:
             nominal: as typed: stiffness, static_friction, reflected_inertia, as far as known.
             columns: as `source.columns`.
             settings: others of `record source=csv`, as typed.
-            together: with the logs of the recording that is loaded.
+            together: with the trials of the recording that is loaded, if the URDF is its own.
         """
-        before = [one for one in self.imported if together and one not in self.logs]
-        logs, urdf = [*before, *self.logs], self.urdf
+        logs, urdf, before = self.logs, self.urdf, self.same_rig if together else None
 
         def run() -> None:
             given = {key: text if key == "mode" else _number(key, text) for key, text in controller.items()}
@@ -175,9 +179,11 @@ class Desk:
             if not logs or urdf is None:
                 raise InputError("drop a log and the URDF of its rig first")
             out = self.folder / f"recording_{self.version}_{len(list(self.folder.glob('recording_*')))}"
-            recording, understood = import_logs(out, logs, urdf, given, nominal=believed, columns=columns, **more)
+            recording, understood = import_logs(
+                out, logs, urdf, given, before, nominal=believed, columns=columns, **more
+            )
             self._load(recording.folder)
-            self.imported, self.notes = logs, [*understood, *self.notes]
+            self.notes = [*understood, *self.notes]
 
         self.do("importing", run)
 
@@ -186,7 +192,7 @@ class Desk:
         bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
         self._renewed(bench)
         self.notes = [f"warning: {line}" for line in bench.opened.warnings]
-        self.logs, self.imported, self.preview = [], [], None
+        self.logs, self.preview, self.urdf = [], None, bench.opened.rig.path
 
     def look(self, joint: str) -> None:
         """Take a first look at the candidates of a joint, unless it was taken."""

@@ -4,68 +4,43 @@ from __future__ import annotations
 
 import base64
 import functools
-from collections.abc import Callable, Iterable
 from html import escape
 from typing import Any
 
 from bokeh.document import Document
 from bokeh.models import (
     Button,
-    Column,
     CustomJS,
     Div,
     FileInput,
     LayoutDOM,
     PrintfTickFormatter,
     RadioGroup,
-    Row,
     Select,
     Slider,
     TextInput,
 )
 from tornado.ioloop import IOLoop
 
+from tactile_cube.identification.search.screening import Score
 from tactile_cube.measurement.comparing.error import FailingInterval
 from tactile_cube.measurement.replay.model import effect_path
-from tactile_cube.measurement.sources.units import ANGLE_UNITS, TIME_UNITS, TORQUE_UNITS
 from tactile_cube.measurement.units import milli
 from tactile_cube.visualization.charts import FLOOR, SIMULATED
 from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, signals
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import RIGS, TABLES
 from tactile_cube.workbench.state import Stage, Value, Workbench
+from tactile_cube.workbench.widgets import NONE, RED, YELLOW, ImportForm, button, column_of, listed, row_of, text_of
 
-RANKED = 8
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
-GAINS = {"kp": "K_P [N m/rad]", "kd": "K_D [N m s/rad]", "torque_limit": "torque limit [N m]"}
-NOMINAL = {
-    "stiffness": "stiffness, if known",
-    "static_friction": "friction [N m]",
-    "reflected_inertia": "rotor inertia [kg m^2]",
-}
-AUTO, NONE = "by name and values", "-"
-TOGETHER, ALONE = "together with these", "left out"
 SAVE_CSV = """
 const link = document.createElement("a");
 link.href = URL.createObjectURL(new Blob([text.text], {type: "text/csv"}));
 link.download = "next_experiment.csv";
 link.click();
 """
-WRAP = {"flex-wrap": "wrap"}
 LINE = {"border-top": "1px solid #d0d7de"}
-YELLOW, RED = "background:#fff4ce;padding:4px 8px", "background:#ffe3dc;padding:4px 8px;border-left:5px solid #d55e00"
-
-
-def _row(*parts: LayoutDOM, **more: Any) -> Row:
-    return Row(*parts, sizing_mode="stretch_width", styles=WRAP, **more)
-
-
-def _text(**more: Any) -> Div:
-    return Div(sizing_mode="stretch_width", disable_math=True, **more)
-
-
-def _list(lines: Iterable[str], style: str = "") -> str:
-    return "".join(f'<div style="{style}">{escape(line)}</div>' for line in lines)
 
 
 def _choose(select: Select, options: list[Any], keep: str = "") -> None:
@@ -84,16 +59,11 @@ class Page:
         self.document, self.desk = document, desk
         self.version = -1
         self.showing = False  # while the desk's state is put into widgets, their callbacks are ours
+        self.form = ImportForm(desk)
         self.time, self.missing, self.experiment = TimeChart(), MissingChart(), ExperimentChart()
-        for name, part in (
-            ("open", self._open_part()),
-            ("status", self._status_part()),
-            ("importing", self._import_part()),
-        ):
-            part.name = name
-            document.add_root(part)
+        self.status = text_of(name="status")
         self.parts = [self._section(*one) for one in self._sections()]
-        for part in self.parts:
+        for part in (self._open_part(), self.status, self.form.whole, *self.parts):
             document.add_root(part)
         self._pending, self._loop, listener = False, IOLoop.current(), self._soon
         desk.listeners.append(listener)
@@ -115,8 +85,8 @@ class Page:
         ]
 
     def _section(self, name: str, title: str, part: LayoutDOM) -> LayoutDOM:
-        head = _text(text=f'<h2 style="font-size:16px;margin:8px 0 0">{title}</h2>', styles=LINE)
-        return Column(head, part, name=name, sizing_mode="stretch_width", visible=False)
+        head = text_of(text=f'<h2 style="font-size:16px;margin:8px 0 0">{title}</h2>', styles=LINE)
+        return column_of(head, part, name=name, visible=False)
 
     def _open_part(self) -> LayoutDOM:
         self.path = TextInput(title="Folder of a recording, logs (*.csv), URDF or model.yaml", width=460)
@@ -124,29 +94,7 @@ class Page:
         # names come after contents
         take = functools.partial(self._take, files)
         files.on_change("value", lambda attr, old, new: self.document.add_next_tick_callback(take))
-        return _row(self.path, self._button("Open", lambda: self.desk.open(self.path.value)), files)
-
-    def _status_part(self) -> LayoutDOM:
-        self.status = _text(text="")
-        return self.status
-
-    def _import_part(self) -> LayoutDOM:
-        self.waiting, self.columns, self.table = _text(), Column(), _text()
-        self.gains = {name: TextInput(title=title, width=150) for name, title in GAINS.items()}
-        self.nominal = {name: TextInput(title=title, width=150) for name, title in NOMINAL.items()}
-        self.mode = Select(title="commands are", options=["position", "torque"], value="position", width=110)
-        self.length = TextInput(title="cut into trials of [s]", width=150)
-        self.units = {
-            f"{name}_unit": Select(title=f"{name} in", options=[AUTO, *units], value=AUTO, width=150)
-            for name, units in (("time", TIME_UNITS), ("angle", ANGLE_UNITS), ("torque", TORQUE_UNITS))
-        }
-        words = (*self.gains.values(), self.mode, *self.nominal.values(), self.length, *self.units.values())
-        self.before = Select(title="logs imported before", options=[TOGETHER, ALONE], value=TOGETHER, width=200)
-        button = _row(self._button("Import", self._import, "primary"), self.before)
-        self.importing = Column(
-            self.waiting, self.table, self.columns, _row(*words), button, visible=False, sizing_mode="stretch_width"
-        )
-        return self.importing
+        return row_of(self.path, button("Open", lambda: self.desk.open(self.path.value)), files, name="open")
 
     def _compare_part(self) -> LayoutDOM:
         self.trial = Select(title="trial", width=190)
@@ -156,59 +104,53 @@ class Page:
         for select in (self.trial, self.joint, self.other):
             select.on_change("value", lambda attr, old, new: self._again())
         self.where.on_change("value", lambda attr, old, new: self._zoom())
-        self.sentences = _text()
-        chart = Column(self.time.angle, self.time.error, sizing_mode="stretch_width")
-        return Column(
-            _row(self.trial, self.joint, self.other, self.where), chart, self.sentences, sizing_mode="stretch_width"
-        )
+        self.sentences = text_of()
+        choices = row_of(self.trial, self.joint, self.other, self.where)
+        return column_of(choices, self.time.angle, self.time.error, self.sentences)
 
     def _missing_part(self) -> LayoutDOM:
         self.signal = Select(title="over", width=300)
         self.signal.on_change("value", lambda attr, old, new: self._again())
-        return Column(self.signal, self.missing.figure, sizing_mode="stretch_width")
+        return column_of(self.signal, self.missing.figure)
 
     def _stages_part(self) -> LayoutDOM:
-        self.stairs = _text()
-        undo = self._button("Undo", lambda: self.desk.change("undo", lambda bench: bench.undo()))
-        return Column(self.stairs, _row(undo), sizing_mode="stretch_width")
+        self.stairs = text_of()
+        undo = button("Undo", lambda: self.desk.change("undo", lambda bench: bench.undo()))
+        return column_of(self.stairs, row_of(undo))
 
     def _candidates_part(self) -> LayoutDOM:
+        self.scores: list[Score] = []
         self.ranked = RadioGroup(labels=[], sizing_mode="stretch_width")
         self.ranked.on_change("active", lambda attr, old, new: self._look_closer())
         self.another = Select(title="another effect", width=260)
         self.another.on_change("value", lambda attr, old, new: self._another())
-        self.unseen = _text()
-        add = self._button("Add and refit", self._add, "primary")
-        return Column(self.ranked, _row(self.another, add), self.unseen, sizing_mode="stretch_width")
+        self.unseen = text_of()
+        add = button("Add and refit", self._add, "primary")
+        return column_of(self.ranked, row_of(self.another, add), self.unseen)
 
     def _diagnosis_part(self) -> LayoutDOM:
-        self.start = self._button("Diagnose", self._start_or_stop)
-        self.accept = self._button("Add what it found", self._accept, "primary")
-        self.progress = _text()
-        return Column(_row(self.start, self.accept), self.progress, sizing_mode="stretch_width")
+        self.start = button("Diagnose", self._start_or_stop)
+        self.accept = button("Add what it found", self._accept, "primary")
+        self.progress = text_of()
+        return column_of(row_of(self.start, self.accept), self.progress)
 
     def _values_part(self) -> LayoutDOM:
-        self.sliders = Column(sizing_mode="stretch_width")
+        self.sliders = column_of()
         self.present = Select(title="effects of the model", width=260)
-        self.remove = self._button("Remove and refit", self._remove)
-        return Column(self.sliders, _row(self.present, self.remove), sizing_mode="stretch_width")
+        self.remove = button("Remove and refit", self._remove)
+        return column_of(self.sliders, row_of(self.present, self.remove))
 
     def _next_part(self) -> LayoutDOM:
-        self.csv, self.proposal = Div(visible=False), _text()
+        self.csv, self.proposal = Div(visible=False), text_of()
         self.download = Button(label="Download CSV", width=140)
         self.download.js_on_event("button_click", CustomJS(args={"text": self.csv}, code=SAVE_CSV))
         self.experiment.figure.visible = False
-        buttons = _row(self._button("Propose", self.desk.propose), self.download, self.csv)
-        return Column(buttons, self.proposal, self.experiment.figure, sizing_mode="stretch_width")
+        buttons = row_of(button("Propose", self.desk.propose), self.download, self.csv)
+        return column_of(buttons, self.proposal, self.experiment.figure)
 
     def _save_part(self) -> LayoutDOM:
         self.folder = TextInput(title="folder", value=str(self.desk.folder / "model"), width=300)
-        return _row(self.folder, self._button("Save", lambda: self.desk.save(self.folder.value)))
-
-    def _button(self, label: str, work: Callable[[], object], kind: str = "default") -> Button:
-        button = Button(label=label, button_type=kind, width=150, align="end")
-        button.on_click(lambda: work())
-        return button
+        return row_of(self.folder, button("Save", lambda: self.desk.save(self.folder.value)))
 
     # What is clicked
 
@@ -216,23 +158,6 @@ class Page:
         names, values = files.filename, files.value
         if names and values:
             self.desk.take(list(names), [base64.b64decode(value) for value in values])
-
-    def _import(self) -> None:
-        units = {name: select.value for name, select in self.units.items() if select.value != AUTO}
-        length = {"length": self.length.value} if self.length.value.strip() else {}
-        columns: dict[str, Any] = {}
-        for row in self.columns.children:
-            entry = {select.title: select.value for select in row.children[1:] if select.value != NONE}
-            if row.name == "time":
-                columns |= entry
-            elif entry:
-                columns[row.name] = entry
-        gains, nominal = (
-            {name: text.value.strip() for name, text in texts.items() if text.value.strip()}
-            for texts in (self.gains, self.nominal)
-        )
-        gains["mode"] = self.mode.value
-        self.desk.import_waiting(gains, nominal, columns, units | length, self.before.value == TOGETHER)
 
     def _again(self) -> None:
         if not self.showing:
@@ -243,15 +168,12 @@ class Page:
             _, start, end = self.where.value.split("|")
             self.time.zoom(float(start), float(end))
 
-    def _scored(self) -> list[Any]:
-        return self.desk.scores.get(self.joint.value, [])[:RANKED]
-
     def _look_closer(self) -> None:
         if self.showing or self.ranked.active is None:
             return
-        score = self._scored()[self.ranked.active]
+        score = self.scores[self.ranked.active]
         self.another.value = NONE
-        self.desk.draw(score, f"{self.names[self.ranked.active]}@{self.joint.value}", self.joint.value)
+        self.desk.draw(score, f"{effect_path(score.candidate.effect)}@{self.joint.value}", self.joint.value)
 
     def _another(self) -> None:
         if not self.showing and self.another.value != NONE:
@@ -260,7 +182,7 @@ class Page:
     def _add(self) -> None:
         name = self.another.value
         if self.ranked.active is not None:
-            name = self.names[self.ranked.active]
+            name = effect_path(self.scores[self.ranked.active].candidate.effect)
         if name not in (NONE, ""):
             label = f"{name}@{self.joint.value}"
             self.desk.change(f"adding {label}", lambda bench: bench.add(label))
@@ -310,12 +232,12 @@ class Page:
     def _show(self) -> None:
         desk, bench = self.desk, self.desk.bench
         self._show_status()
-        self._show_import()
+        self.form.show()
         self.start.label = "Diagnose" if desk.diagnosing is None else "Stop"
         known = bench.effects if bench else []
         self.accept.disabled = not (desk.found and set(desk.found.effects) - set(known))
         answer = f'<pre style="white-space:pre-wrap">{escape(desk.found.text)}</pre>' if desk.found else ""
-        self.progress.text = answer or _list(desk.progress)
+        self.progress.text = answer or listed(desk.progress)
         if bench is None:
             return
         for part in self.parts:
@@ -331,41 +253,11 @@ class Page:
     def _show_status(self) -> None:
         desk = self.desk
         busy = f'<div style="color:{SIMULATED}">&#9679; {escape(desk.busy)} ...</div>' if desk.busy else ""
-        problem = _list([desk.problem], RED) if desk.problem else ""
+        problem = listed([desk.problem], RED) if desk.problem else ""
         doubts = [one for one in desk.notes if one.startswith(("warning: ", "guess: "))]
-        notes = _list(doubts, YELLOW) + _list(one for one in desk.notes if one not in doubts)
+        notes = listed(doubts, YELLOW) + listed(one for one in desk.notes if one not in doubts)
         hint = "" if desk.bench or desk.logs else "Open a recording, or drop logs and the URDF of their rig."
         self.status.text = f'<div role="status" aria-live="polite">{busy}{problem}{notes}{hint}</div>'
-
-    def _show_import(self) -> None:
-        desk, seen = self.desk, self.desk.preview
-        self.importing.visible = bool(desk.logs) or (desk.urdf is not None and desk.bench is None)
-        self.before.visible = bool(desk.imported)
-        names = [path.name for path in desk.logs]
-        lacks = [what for what, there in (("a log", names), ("the URDF of the rig", desk.urdf)) if not there]
-        text = f"To be imported: {', '.join(names)} with {desk.urdf.name if desk.urdf else '?'}"
-        self.waiting.text = _list([text]) + _list([f"still needed: {' and '.join(lacks)}"] if lacks else [], YELLOW)
-        if seen is None:
-            self.table.text, self.columns.children, self.columns.tags = "", [], []
-            return
-        if self.columns.tags == [seen.columns, seen.joints]:
-            return
-        self.columns.tags = [seen.columns, seen.joints]
-        cells = ["".join(f"<td>{value:.6g}</td>" for value in row) for row in seen.rows]
-        head = "".join(f"<th>{escape(name)}</th>" for name in seen.columns)
-        doubt = _list([seen.doubt] if seen.doubt else [], YELLOW)
-        self.table.text = f'{doubt}<table cellpadding="4"><tr>{head}</tr><tr>{"</tr><tr>".join(cells)}</tr></table>'
-        known = seen.guess.joints if seen.guess else {}
-        time = (seen.guess.time if seen.guess else None) or NONE
-        rows = [Row(Div(text="", width=80), self._column(seen.columns, "time", time), name="time")]
-        for joint in seen.joints:
-            entry = known.get(joint, {})
-            selects = [self._column(seen.columns, s, entry.get(s, NONE)) for s in ("command", "position", "torque")]
-            rows.append(Row(Div(text=escape(joint), width=80), *selects, name=joint))
-        self.columns.children = rows
-
-    def _column(self, columns: list[str], title: str, value: str) -> Select:
-        return Select(title=title, options=[NONE, *columns], value=value, width=170)
 
     def _show_model(self, bench: Workbench) -> None:
         recording = bench.recording
@@ -380,22 +272,25 @@ class Page:
 
     def _show_candidates(self, bench: Workbench) -> None:
         joint = self.joint.value
-        scores = self.desk.scores.get(joint)
-        tag = [self.desk.version, joint, scores is not None]
+        groups = self.desk.scores.get(joint)
+        tag = [self.desk.version, joint, groups is not None]
         if self.ranked.tags == tag:
             return
         self.ranked.tags = tag
-        self.names = [effect_path(score.candidate.effect) for score in self._scored()]
+        self.scores = [score for group in groups or [] for score in group]
+        names = [effect_path(score.candidate.effect) for score in self.scores]
+        leaders = [effect_path(group[0].candidate.effect) for group in groups or [] for _ in group]
         self.ranked.active = None
         self.ranked.labels = [
-            f"{100 * bench.share(score):.0f} %  {name}" for name, score in zip(self.names, self._scored(), strict=True)
+            f"{100 * bench.share(score):.0f} %  {name}" + (f" (looks like {leader})" if name != leader else "")
+            for name, leader, score in zip(names, leaders, self.scores, strict=True)
         ]
-        if scores is None:
+        if groups is None:
             self.desk.look(joint)
         unseen = bench.unseen(joint)
         hidden = {one.effect for one in unseen}
-        every = sorted(bench.effect_names())
-        _choose(self.another, [NONE, *(name for name in every if name not in hidden and name not in self.names)], NONE)
+        every = sorted(effect_path(effect) for effect in bench.search.effects)
+        _choose(self.another, [NONE, *(name for name in every if name not in hidden and name not in names)], NONE)
         lines = "".join(f"<div>{escape(one.effect)}: {escape(one.why)}</div>" for one in unseen)
         reach = self.desk.explainable.get(joint)
         bound = (
@@ -420,7 +315,7 @@ class Page:
         safety = "keeps to the limits" if proposed.safety.safe else "would LEAVE the limits, do not play it"
         worth = f"evidence expected: {proposed.told:.3g} times what decides" if proposed.decides else "decides nothing"
         pair = " and ".join(proposed.predictions) or "the models"
-        self.proposal.text = _list(
+        self.proposal.text = listed(
             [f"{proposed.name}, {proposed.time[-1]:.1f} s, to tell {pair} apart: {worth}; {safety} (dashed)"]
         )
         if self.experiment.figure.tags != [self.desk.version, id(proposed)]:
@@ -464,7 +359,7 @@ class Page:
         self.where.value = NONE
         self.where.options = [NONE, *(_interval(one, unit) for one in failing[:20])]
         error = f"{joint} in this trial: {milli(compared.raw[0].joints[joint], unit)} RMS of the free run"
-        self.sentences.text = _list([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))])
+        self.sentences.text = listed([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))])
 
     def _show_sliders(self, bench: Workbench, joint: str) -> None:
         values = bench.values(joint)

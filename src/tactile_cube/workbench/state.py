@@ -28,7 +28,7 @@ from tactile_cube.identification.next_experiment import Experiment, next_experim
 from tactile_cube.identification.search.division import BRIEF
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques
-from tactile_cube.identification.search.screening import Score, resized, screen
+from tactile_cube.identification.search.screening import Score, Screen, resized, screen
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error, raw_residuals, summarise_errors
@@ -42,6 +42,8 @@ from tactile_cube.workbench.background import Diagnosing
 Array = NDArray[np.float64]
 BY_HAND = "by hand"
 AT_ONCE = 24  # candidates of a first look
+RANKED = 8  # of them that are shown
+ALIKE = 0.95  # correlation of two signatures, beside all constants, from which on these trials do not tell them apart
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
 COMMAND = "python -m tactile_cube.workbench recording={}"
@@ -79,7 +81,7 @@ class Value:
         value: in the model in force.
         interval: its 95 % interval within the bounds; None where it was set by hand or not fitted.
         unit: SI unit.
-        unknown: its bounds, and where it stands in the model.
+        unknown: its bounds; `put` gives a model, which `simulate` takes, with another value.
     """
 
     key: str
@@ -100,7 +102,7 @@ class Workbench:
 
     Example:
         >>> bench = Workbench("my_recording")
-        >>> print(bench.candidates("q3")[0].candidate.label)
+        >>> print([score.candidate.label for score in bench.candidates("q3")[0]])
         >>> bench.add("stribeck_friction@q3")
         >>> print([(stage.label, stage.errors.overall) for stage in bench.stages], bench.floor.overall)
         >>> bench.save("outputs/my_model")
@@ -140,6 +142,7 @@ class Workbench:
         stated = replace(base.fit, model=self.search.start)
         first: tuple[Stage, ...] = (self._stage("stated", stated, fitted=False), self._stage("refitted", base.fit))
         self.history = [first]
+        self._kept: tuple[Fit, Fit] | None = None
 
     @property
     def stages(self) -> tuple[Stage, ...]:
@@ -155,10 +158,6 @@ class Workbench:
     def effects(self) -> list[str]:
         """Effects of the model in force, NAME@JOINT."""
         return [term.label for term in self.stage.model.terms]
-
-    def effect_names(self) -> list[str]:
-        """Return every effect that may be added, the user's own ones included."""
-        return [effect_path(effect) for effect in self.search.effects]
 
     @property
     def never_fitted(self) -> list[str]:
@@ -186,18 +185,19 @@ class Workbench:
     def signature(self, score: Score, joint: str) -> Missing:
         """Return the torque that a candidate supplies after a brief refit of its own numbers; see `missing`."""
         search, problem = self.search, self.search.validation
-        _, fitted = search.refit(search.frozen(self.stage.fit), resized(score), BRIEF)
+        _, fitted = search.refit(self._frozen(self.stage.fit), resized(score), BRIEF)
         added = fitted.model.with_offsets(search.offsets)
         before, after = problem.predictions([replace(added, terms=added.terms[:-1]), added])
         return self._as_torque(joint, problem.limited(after - before) * problem.weight)
 
-    def candidates(self, joint: str, stop: Callable[[], bool] = lambda: False) -> list[Score] | None:
+    def candidates(self, joint: str, stop: Callable[[], bool] = lambda: False) -> list[list[Score]] | None:
         """Return a first look at what could be missing at a joint: the best form of each effect, best first.
 
+        Effects whose signatures cannot be told apart in these trials stand together in a list of their own.
         `share` says what a score takes away. The first look is linear; `diagnose` refits and judges what it promises.
         None: `stop`, which is called every second or so, said so.
         """
-        frozen = self.search.frozen(self.stage.fit)
+        frozen = self._frozen(self.stage.fit)
         wanted = [one for one in self.search.wanted(frozen) if one.joints == (joint,)]
         best: dict[str, Score] = {}
         for first in range(0, len(wanted), AT_ONCE):
@@ -206,7 +206,18 @@ class Workbench:
             for score in screen(self.search.problem, frozen, wanted[first : first + AT_ONCE]):
                 name = effect_path(score.candidate.effect)
                 best[name] = max(score, best.get(name, score), key=lambda one: one.gain)
-        return sorted((one for one in best.values() if one.gain > 0.0), key=lambda one: -one.gain)
+        ranked = sorted((one for one in best.values() if one.gain > 0.0), key=lambda one: -one.gain)[:RANKED]
+        return self._together(ranked, Screen(self.search.problem, frozen)) if ranked else []
+
+    def _together(self, ranked: Sequence[Score], view: Screen) -> list[list[Score]]:
+        columns = [column for _, column in view.columns([score.candidate for score in ranked])]
+        _, products = view.products(np.stack(columns, axis=-1))
+        size = np.sqrt(np.diag(products))
+        alike = np.abs(products) >= ALIKE * np.outer(size, size)
+        leaders: dict[int, list[Score]] = {}
+        for place, score in enumerate(ranked):
+            leaders.setdefault(next((k for k in leaders if alike[k, place]), place), []).append(score)
+        return list(leaders.values())
 
     def share(self, score: Score) -> float:
         """Return the part of the squared error on the fitted trials that a candidate would take away."""
@@ -237,8 +248,8 @@ class Workbench:
                 if effect not in self.search.effects:
                     raise InputError(f"{label}: name it when the workbench starts, own_effects=[{effect_path(effect)}]")
                 self.say(f"refitting with {label}")
-                fitted = with_effect(self.search, stages[-1].fit, effect, joint)
-                stages = (*stages, self._stage(f"+ {label}", fitted))
+                added = with_effect(self.search, self._frozen(stages[-1].fit), effect, joint)
+                stages = (*stages, self._stage(f"+ {label}", self.search.quickly_refitted(added.model)))
         return self._push(stages)
 
     def remove(self, label: str) -> Stage:
@@ -278,17 +289,16 @@ class Workbench:
             found.append(Value(key, value, interval, of_joint(unit, units), unknown))
         return found
 
-    def with_value(self, key: str, value: float) -> Model:
-        """Return the model in force with another number, which `simulate` takes; nothing changes.
+    def set_parameter(self, key: str, value: float) -> Stage:
+        """Set a number by hand; nothing is refitted. Several in a row are one stage, each undone alone.
 
         Raises:
             InputError: no such number.
         """
-        return self._unknown(key).put(self.stage.model, value)
-
-    def set_parameter(self, key: str, value: float) -> Stage:
-        """Set a number by hand; nothing is refitted. Several in a row are one stage, each undone alone."""
-        model = self._unknown(key).put(self.stage.fit.model, value)
+        known = {one.key: one.unknown for joint in self.recording.joints for one in self.values(joint)}
+        if key not in known:
+            raise InputError(f"{key}: no number of the model; it has {', '.join(known)}")
+        model = known[key].put(self.stage.fit.model, value)
         stage = self._stage(BY_HAND, replace(self.stage.fit, model=model), fitted=False)
         stages = self.stages[:-1] if self.stage.label == BY_HAND else self.stages
         return self._push((*stages, stage))
@@ -361,6 +371,14 @@ class Workbench:
         fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and taken anew by whoever builds on it
         return Stage(label, fit, model, judgement, *self._errors(model), NORMAL_95 * errors * scales)
 
+    def _frozen(self, fit: Fit) -> Fit:
+        """A fit with its derivatives, which the first look, a candidate's torque and a refit take alike."""
+        if self._kept is not None and self._kept[0] is fit:
+            self.search.problem.linearise_starts(fit.model)
+        else:
+            self._kept = fit, self.search.frozen(fit)
+        return self._kept[1]
+
     def _errors(self, model: Model) -> tuple[ErrorSummary, ErrorSummary]:
         held_out = self.search.held_out
         simulated = free_run(held_out, model, "fast", USUAL_STEP)
@@ -371,12 +389,6 @@ class Workbench:
         search = self.search
         found = missing_torques(search.validation, search.held_out, self.stage.judgement.model, residual)
         return found[self.recording.joints.index(joint)]
-
-    def _unknown(self, key: str) -> Unknown:
-        known = {one.key: one.unknown for joint in self.recording.joints for one in self.values(joint)}
-        if key not in known:
-            raise InputError(f"{key}: no number of the model; it has {', '.join(known)}")
-        return known[key]
 
     def _push(self, stages: tuple[Stage, ...]) -> Stage:
         self.history = [*self.history[-MOST:], stages]

@@ -57,7 +57,7 @@ def fit(
     Args:
         problem: the windows to fit.
         model: where to start.
-        unknowns: what to fit; with `frozen`, beside its unknowns.
+        unknowns: what to fit; with `frozen`, beside its unknowns; none beside them is the chord method.
         iterations: most steps that are taken.
         frozen: a fit whose columns are kept as they are, which spares simulating them; they change little.
         converged: relative gain of a step below which the fit ends.
@@ -68,7 +68,7 @@ def fit(
     for _ in range(iterations):
         weight = noise_inflation(problem, best.cost)
         for _ in range(SHORTER):
-            tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
+            tried, prediction = _evaluated(problem, best, _stepped(problem, best, weight, damping))
             if tried.cost + weight * tried.prior_penalty < best.cost + weight * best.prior_penalty:
                 break
             damping *= 10.0
@@ -79,7 +79,8 @@ def fit(
         best = tried
         if gain < converged:
             break
-        best = _linearised(problem, best.model, unknowns, everything, frozen)
+        if unknowns:
+            best = _linearised(problem, best.model, unknowns, everything, frozen, prediction)
     return best
 
 
@@ -90,10 +91,15 @@ def full_step(problem: Problem, model: Model, unknowns: Sequence[Unknown]) -> Ar
 
 
 def _linearised(
-    problem: Problem, model: Model, unknowns: Sequence[Unknown], everything: tuple[Unknown, ...], frozen: Fit | None
+    problem: Problem,
+    model: Model,
+    unknowns: Sequence[Unknown],
+    everything: tuple[Unknown, ...],
+    frozen: Fit | None,
+    prediction: Array | None = None,
 ) -> Fit:
-    """A model with its derivatives: one simulation for each unknown."""
-    prediction, fresh = problem.columns(model, unknowns)
+    """A model with its derivatives: one simulation for each unknown, and one where its prediction is not known."""
+    prediction, fresh = problem.columns(model, unknowns, prediction)
     residual = problem.residual(prediction)
     columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
     cost = float(problem.cost(residual).sum())
@@ -102,11 +108,12 @@ def _linearised(
     )
 
 
-def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
-    """A model with the derivatives of one close to it: one simulation."""
-    residual = problem.residual(problem.predictions([model])[0])
-    cost = float(problem.cost(residual).sum())
-    return replace(near, model=model, cost=cost, prior_penalty=prior_penalty(model, near.unknowns), residual=residual)
+def _evaluated(problem: Problem, near: Fit, model: Model) -> tuple[Fit, Array]:
+    """A model with the derivatives of one close to it, and its prediction: one simulation."""
+    prediction = problem.predictions([model])[0]
+    residual = problem.residual(prediction)
+    cost, penalty = float(problem.cost(residual).sum()), prior_penalty(model, near.unknowns)
+    return replace(near, model=model, cost=cost, prior_penalty=penalty, residual=residual), prediction
 
 
 def noise_inflation(problem: Problem, cost: float) -> float:

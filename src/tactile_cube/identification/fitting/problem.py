@@ -112,14 +112,18 @@ class Problem:
         """Marginal squared error of each segment (G,), in units of the sensor's variance."""
         return np.asarray(np.sum(residual * self.free(residual), axis=1))
 
-    def columns(self, model: Model, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
-        """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
+    def columns(self, model: Model, unknowns: Sequence[Unknown], base: Array | None = None) -> tuple[Array, Array]:
+        """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale.
+
+        `base` is the prediction where it is known already, which spares a simulation.
+        """
         moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
-        all_predictions = self.predictions([model, *(one for one, _ in moved)])
-        base = all_predictions[0]
+        models = [model] if base is None else []
+        predictions = list(self.predictions([*models, *(one for one, _ in moved)]))
+        base = predictions.pop(0) if base is None else base
         found = {
             _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / step * self.weight)
-            for unknown, p, (_, step) in zip(_simulated(unknowns), all_predictions[1:], moved, strict=True)
+            for unknown, p, (_, step) in zip(_simulated(unknowns), predictions, moved, strict=True)
         }
         columns = [self._masked(found[_key(unknown)], unknown) for unknown in unknowns]
         return base, np.nan_to_num(np.stack(columns, axis=-1)) if columns else np.zeros((*base.shape, 0))

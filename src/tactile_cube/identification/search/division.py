@@ -108,6 +108,12 @@ class Division:
         self.problem.linearise_starts(model)
         return fit(self.problem, model, self.unknowns(model), LONG)
 
+    def quickly_refitted(self, model: Model) -> Fit:
+        """The same with derivatives taken once, where it starts: a third of the simulations (chord method)."""
+        self.problem.linearise_starts(model)
+        start = fit(self.problem, model, self.unknowns(model), iterations=0)
+        return fit(self.problem, model, (), LONG, start)
+
     def over_noise(self, fitted: Fit) -> float:
         """RMS error of a fit in units of the sensor noise."""
         return float(np.sqrt(fitted.cost / np.count_nonzero(self.problem.weight)))
