@@ -56,7 +56,7 @@ class ImportForm:
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
-        self.waiting, self.columns = text_of(), Column()
+        self.waiting, self.columns = text_of(), column_of()
         self.table = text_of(styles={"overflow-x": "auto"})
         self.seen: tuple[list[str], list[str]] | None = None  # columns and joints: as long as they stay, choices do
         self.gains = {name: TextInput(title=title, width=150) for name, title in GAINS.items()}
@@ -125,5 +125,5 @@ class ImportForm:
 
 def _columns_row(label: str, name: str, chosen: dict[str, str], columns: list[str]) -> Row:
     """A select of columns for each signal, with the column that is chosen."""
-    selects = [Select(title=k, options=[NONE, *columns], value=value, width=170) for k, value in chosen.items()]
-    return Row(Div(text=escape(label), width=80), *selects, name=name)
+    selects = [Select(title=k, options=[NONE, *columns], value=value, width=140) for k, value in chosen.items()]
+    return row_of(Div(text=escape(label), width=80), *selects, name=name)
