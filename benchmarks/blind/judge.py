@@ -4,7 +4,7 @@
 
 Every draw adds one line to verdicts.jsonl as soon as it is judged; the same command goes on where it stopped, and
 `--draws 0` only sums up what is there. identification.md, .json and .png (the confusion matrix) beside it sum the
-lines up. `--address` gives the draws to the cores of a Ray cluster. What counts as right stands in scoring.py. A round
+lines up. What counts as right stands in scoring.py. A round
 to be published runs on a clean commit, with seeds that no round before it used; its line in docs/results/rounds.md is
 printed at the end.
 """
@@ -209,7 +209,6 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=60)
     parser.add_argument("--out", type=Path, default=Path("outputs/blind"))
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--address", help="host:port of a Ray cluster whose nodes have this checkout, or `local`")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--seconds", type=float, help="length of every trial (default: drawn)")
     parser.add_argument("--engine", choices=("own", "mujoco"), default="own", help="what moves the measured rigs")
@@ -230,7 +229,7 @@ def main() -> None:
     command += f" --worlds {args.worlds}" * (args.worlds != "usual")
     command += f" --pushes {args.pushes}" * (args.pushes > 0)
     work = partial(judge, args.out, args.seconds, args.keep, args.engine, args.worlds, args.pushes)
-    for _, line in each(work, wanted, args.jobs, args.address):
+    for _, line in each(work, wanted, args.jobs):
         with (args.out / "verdicts.jsonl").open("a") as lines:
             lines.write(json.dumps(line) + "\n")
         print(f"{line['seed']}  {in_words(judged(line)['score'])}", flush=True)

@@ -1,4 +1,4 @@
-"""Many calls at once, in processes and on a Ray cluster."""
+"""Many calls at once."""
 
 import json
 import math
@@ -18,25 +18,16 @@ def refused(word: str) -> None:
     raise InputError(f"{word}: refused")
 
 
-def one_after_the_other(work: Callable, over: Sequence, jobs: int, address: str | None) -> Iterator[tuple]:
+def one_after_the_other(work: Callable, over: Sequence, jobs: int) -> Iterator[tuple]:
     """In place of `each`."""
     yield from ((one, work(one)) for one in over)
 
 
-@pytest.mark.parametrize("address", [None, "local"], ids=["processes", "Ray"])
-def test_each_is_done_once_and_an_error_comes_through(address: str | None) -> None:
-    if address:
-        pytest.importorskip("ray", reason="needs Ray: pip install '.[ray]'")
+def test_each_is_done_once_and_an_error_comes_through() -> None:
     numbers = [1.0, 4.0, 9.0, 16.0]
-    assert sorted(batch.each(math.sqrt, numbers, 2, address)) == [(x, math.sqrt(x)) for x in numbers]
+    assert sorted(batch.each(math.sqrt, numbers, 2)) == [(x, math.sqrt(x)) for x in numbers]
     with pytest.raises(InputError, match="this one: refused"):
-        list(batch.each(refused, ["this one"], 1, address))
-
-
-def test_an_address_that_is_none_is_refused() -> None:
-    pytest.importorskip("ray", reason="needs Ray: pip install '.[ray]'")
-    with pytest.raises(InputError, match=r"^address=nonsense: give host:port"):
-        list(batch.each(math.sqrt, [1.0], 1, "nonsense"))
+        list(batch.each(refused, ["this one"]))
 
 
 def test_recordings_are_diagnosed_into_folders_of_their_names_and_one_that_cannot_be_read_is_told(

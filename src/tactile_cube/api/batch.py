@@ -1,4 +1,4 @@
-"""Many calls at once: in processes of this machine, or on the cores of a Ray cluster."""
+"""Many calls at once, in processes of this machine."""
 
 from __future__ import annotations
 
@@ -19,37 +19,23 @@ from tactile_cube.whole_file import write_whole
 
 T = TypeVar("T")
 R = TypeVar("R")
-START = 120.0
-"""Longest wait [s] for a cluster of one's own: a node has 30 s, which a busy machine may not keep."""
 
 
-def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1, address: str | None = None) -> Iterator[tuple[T, R]]:
+def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1) -> Iterator[tuple[T, R]]:
     """What `work` makes of each, in the order in which it is done.
 
     Args:
-        work: runs in other processes, so it and what it takes and gives can be pickled. On a cluster it runs again
-            where its node is lost.
+        work: runs in other processes, so it and what it takes and gives can be pickled.
         over: what it is given, one each.
-        jobs: processes of this machine, or cores of a cluster of one's own.
-        address: host:port of a Ray cluster that this machine is a node of, `local` for one of one's own, which ends
-            with the call; None: processes of this machine.
+        jobs: processes.
 
     Raises:
-        InputError: no such cluster; what `work` raises.
+        InputError: what `work` raises.
     """
-    if address is None:
-        with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-            futures = {pool.submit(work, one): one for one in over}
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        return
-    from tactile_cube.training.ray_cluster import RayCluster
-
-    cluster = RayCluster(None if address == "local" else address, jobs, START, "address")
-    try:
-        yield from cluster.each(work, over)
-    finally:
-        cluster.close()
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        futures = {pool.submit(work, one): one for one in over}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
 
 
 class Answered(NamedTuple):
@@ -61,24 +47,21 @@ class Answered(NamedTuple):
 
 
 def diagnose_each(
-    recordings: Sequence[PathLike], *settings: str, out: PathLike, jobs: int = 1, address: str | None = None
+    recordings: Sequence[PathLike], *settings: str, out: PathLike, jobs: int = 1
 ) -> Iterator[tuple[Path, Answered | InputError]]:
     """Diagnose many recordings at once; the files of each go to a folder of its name in `out`.
-
-    Recordings are read and answers written here, so that the nodes of a cluster need neither.
 
     Args:
         recordings: folders, each with a name of its own.
         settings: of every diagnosis, as on the command line.
         out: folder of the answers.
         jobs: see `each`.
-        address: see `each`.
 
     Yields:
         Folder and answer, or what is wrong with the recording, in the order in which they are done.
 
     Raises:
-        InputError: two recordings with one name; no such cluster.
+        InputError: two recordings with one name.
 
     Example:
         >>> for folder, answer in tactile_cube.diagnose_each(["monday", "friday"], out="outputs/week", jobs=2):
@@ -93,7 +76,7 @@ def diagnose_each(
             sound.append((name, opened(folder)))
         except InputError as error:
             yield folder, error
-    for (name, _), found in each(partial(_diagnosed, settings, Path(out)), sound, jobs, address):
+    for (name, _), found in each(partial(_diagnosed, settings, Path(out)), sound, jobs):
         if isinstance(found, InputError):
             yield folders[name], found
             continue
