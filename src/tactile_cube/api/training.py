@@ -16,13 +16,13 @@ from hydra.utils import instantiate
 from omegaconf import OmegaConf
 
 from tactile_cube.agent.averaging import averaged, kept_policies
-from tactile_cube.agent.policy_file import read_policy, save_policy
+from tactile_cube.agent.policy_file import save_policy
 from tactile_cube.api.environment import grasps_of
 from tactile_cube.api.evaluation import evaluate
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.policy_path import networks_path, policy_path
+from tactile_cube.evaluation.policy_path import networks_path
 from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.hand.urdf_hand import urdf_file
 from tactile_cube.randomization import GraspStarts
@@ -125,10 +125,6 @@ def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> Training
 def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int) -> Run:
     """The run that a job describes: new, or where its checkpoint says."""
     config: Any = job.config
-    if teacher := config.exploration.get("teacher"):
-        file = policy_path(teacher, "exploration.teacher")
-        read_policy(file)  # a damaged one is the user's error here, a worker's later
-        config = OmegaConf.merge(config, {"exploration": {"teacher": str(file)}})
     run = build_run(
         folder=job.folder,
         seed=RunSettings(name=config.name, seed=config.seed).seed,
@@ -136,10 +132,7 @@ def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int) -> Ru
         make_agent=instantiate(config.agent, _partial_=True),
         collector=CollectorSettings(**plain["collector"]),
         training=TrainingSettings(**plain["training"] | {"init_from": networks_path(config.training.init_from)}),
-        loggers={
-            name: instantiate(entry, _partial_=True)
-            for name, entry in (*config.logger.items(), *config.visualization.items())
-        },
+        loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
         config=plain,
     )
     run.line.stage, run.line.later = stage, later
