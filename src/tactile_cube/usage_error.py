@@ -37,8 +37,10 @@ def usage_error(error: BaseException) -> str | None:
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
-    """An error and what it came of."""
-    while error is not None:
+    """An error and what it came of; Hydra's may come of each other in a circle."""
+    known = set[int]()
+    while error is not None and id(error) not in known:
+        known.add(id(error))
         yield error
         error = error.__cause__ or error.__context__
 
