@@ -185,6 +185,7 @@ class InAnySteps:
     effects: tuple[()] = ()
     known: None = None
     known_answer: tuple[Any, ...] = ()
+    finer: int = 1
 
     def say(self, line: str) -> None:
         """Take a line."""

@@ -143,7 +143,7 @@ def _flat(data: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_no_size, "recording.yaml: key 'object'.*size.*mass.*add size"),
+        (_no_size, r"recording.yaml: key 'object\.size': Field required"),
         (_no_object, "recording.yaml: .*trials.1.object.*add a key 'object'.*size .m. and mass .kg."),
         (_weightless, "recording.yaml: key 'object.mass'.*greater than 0, received 0.0"),
         (_flat, "recording.yaml: key 'object.size"),

@@ -104,14 +104,6 @@ def test_a_feed_forward_torque_acts_like_a_command_that_asks_for_it(tmp_path: Pa
     assert np.array_equal(*shown)
 
 
-def test_a_feed_forward_torque_needs_a_stiffness_to_act_through(tmp_path: Path) -> None:
-    def feed(columns: Table) -> None:
-        columns["b.feedforward"] = np.full(len(columns["time"]), 0.1)
-
-    with pytest.raises(InputError, match=r"first.parquet: column 'b.feedforward'.*controller.kp is 0"):
-        read_recording(write(tmp_path, lambda data: data["controller"].update(kp=[3.0, 0.0]), feed))
-
-
 def test_a_link_that_moves_by_another_unit_is_an_error_that_says_the_factor(tmp_path: Path) -> None:
     def degrees(columns: Table) -> None:
         columns["a.link_position"] = np.degrees(columns["a.position"])

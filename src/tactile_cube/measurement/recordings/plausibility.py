@@ -181,18 +181,3 @@ def check_links(columns: TrialColumns, joints: tuple[str, ...], path: Path) -> N
                 f"{path}: column '{joint}.link_position' moves {ratio:.4g} times as far as '{joint}.position'; both "
                 "are the joint's angle [rad]: divide a motor's by its gear ratio, and look at signs and units"
             )
-
-
-def check_feedforward(columns: TrialColumns, joints: tuple[str, ...], gains: Gains, path: Path) -> None:
-    """Refuse a torque beside a controller that has none of its own.
-
-    Raises:
-        InputError: a joint without stiffness has a feed-forward torque.
-    """
-    if columns.feedforward is None:
-        return
-    for j in np.flatnonzero((gains.kp == 0.0) & np.any(columns.feedforward != 0.0, axis=0)):
-        raise InputError(
-            f"{path}: column '{joints[j]}.feedforward' has torques, but controller.kp is 0; where torques alone moved "
-            "the joint, they are its command, with controller.mode: torque"
-        )

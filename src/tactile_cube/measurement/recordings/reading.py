@@ -21,7 +21,6 @@ from tactile_cube.measurement.recordings.consistency import (
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.plausibility import (
     check_assignment,
-    check_feedforward,
     check_links,
     check_roles,
     check_units,
@@ -100,8 +99,6 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         warnings += check_assignment(columns, ranges, path) if entry.object is None else []
         warnings += check_roles(columns, joints, path)
     check_links(columns, joints, path)
-    if description.controller.mode == "position":
-        check_feedforward(columns, joints, gains, path)
     columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, rate)
     stamps = (columns.time[outlying] - columns.time[0]) * rate
