@@ -278,7 +278,7 @@ def test_the_judge_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(judge, "run_command", commands)
     monkeypatch.setattr(judge, "write", written)
-    monkeypatch.setattr(judge, "each", lambda work, over, jobs, address: ((one, work(one)) for one in over))
+    monkeypatch.setattr(judge, "each", lambda work, over, jobs: ((one, work(one)) for one in over))
     for draws in (2, 3):
         monkeypatch.setattr(sys, "argv", ["judge.py", "--draws", str(draws), "--out", str(tmp_path)])
         judge.main()
