@@ -44,7 +44,7 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
     Args:
         run: folder of a training run, a policy file, or a policy that ships with the package; of a folder of `evaluate`
             or `compare`, the recordings in it are opened.
-        settings: values as on the command line, e.g. "episodes=4", "viewer=web".
+        settings: values as on the command line, e.g. "episodes=4", "viewer=none".
         folder: where the recording goes; None: outputs/view/...
         say: takes a line for each episode.
 
