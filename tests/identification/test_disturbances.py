@@ -99,6 +99,12 @@ def test_commands_logged_late_are_taken_earlier_and_said(tmp_path: Path) -> None
     assert f"{LATE} rows ({1e3 * LATE * STEP:.3g} ms) before its commands" in said[0]
 
 
+@pytest.mark.parametrize("lag", [0.02, 0.06])
+def test_a_controller_that_integrates_is_not_one_that_knows_its_commands_early(lag: float, tmp_path: Path) -> None:
+    recording = simulated(tmp_path, Size(), find_effect("integral_action"), {"ki": 100.0, "lag": lag})
+    assert in_time(recording, EFFECTS, lambda line: None) is recording
+
+
 def test_what_was_found_is_written_once_and_read_by_every_command(tmp_path: Path) -> None:
     clean = simulated(tmp_path, Size(), find_effect("viscous_friction"), {"damping": 0.01})
     file = tmp_path / "recording.yaml"

@@ -93,7 +93,10 @@ def test_the_place_of_a_hidden_link_at_the_start_is_found(recording: Recording, 
 
 def test_without_a_gap_every_trial_begins_where_its_sensors_say(recording: Recording) -> None:
     windows = cut(recording, NOISE)
-    assert with_initial_states(Shooting(recording, EFFECTS), nominal_model(recording), windows) is windows
+    shooting, plain = Shooting(recording, EFFECTS), nominal_model(recording)
+    assert with_initial_states(shooting, plain, windows) is windows
+    elsewhere = replace(windows, initial_state=np.full_like(windows.initial_state, 0.1))  # by a model with a gap
+    assert np.all(with_initial_states(shooting, plain, elsewhere).initial_state == 0.0)
 
 
 @pytest.mark.parametrize("models", [1, 2, 3])

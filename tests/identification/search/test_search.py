@@ -1,5 +1,6 @@
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -114,3 +115,13 @@ def test_the_noise_is_asked_of_each_joint(first_joint: float, levels: int) -> No
     search = OneOfThree(first_joint)
     assert search.base.error < STANDARD.floor
     assert len(search.one_by_one(search.base)[0]) == levels
+
+
+@pytest.mark.parametrize(("finer", "error", "hidden"), [(8, 4.1, True), (8, 9.0, False), (1, 4.1, False)])
+def test_an_error_of_the_size_of_the_steps_own_is_hidden_by_them(
+    monkeypatch: pytest.MonkeyPatch, finer: int, error: float, hidden: bool
+) -> None:
+    monkeypatch.setattr(module, "step_error", lambda recording, shooting, model, noise, times: 3.0)
+    asked: Any = SimpleNamespace(finer_steps=finer, fitted=None, shooting=None, noise=None)
+    one: Any = SimpleNamespace(error=error, fit=SimpleNamespace(model=None))
+    assert Search.hidden_by_steps(asked, one) is hidden

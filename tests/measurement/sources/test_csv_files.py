@@ -11,9 +11,11 @@ import pytest
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.rig import RigJoint
 from tactile_cube.measurement.recordings.writing import write_recordings
 from tactile_cube.measurement.sources import units
 from tactile_cube.measurement.sources.csv_files import CsvFiles
+from tactile_cube.measurement.sources.units import position_unit, same_unit
 from tests.measurement.small_rig import URDF, table
 
 DEGREE = 180 / np.pi
@@ -254,3 +256,39 @@ def test_ticks_of_an_encoder_are_angles_about_the_middle_of_its_turn(
     trial = imported(tmp_path, {"log.csv": logged}, ONE_JOINT, **changes).trials[0]
     assert trial.position[:, 0] == pytest.approx(columns["a.position"], abs=8e-4)
     assert trial.command[:, 0] == pytest.approx(columns["a.command"], abs=8e-4)
+
+
+def test_ticks_of_a_geared_motor_are_counted_at_its_joint_and_a_command_in_degrees_stays_one(tmp_path: Path) -> None:
+    columns = table(0)
+    logged = {
+        "time": columns["time"],
+        "goal_deg": columns["a.command"] * DEGREE,
+        "motor_pos_ticks": np.round(columns["a.position"] * 50.0 / (2 * np.pi) * 1024),
+        "link_pos_rad": columns["a.position"],
+    }
+    names = {
+        "time": "time",
+        "a": {"command": "goal_deg", "position": "motor_pos_ticks", "link_position": "link_pos_rad"},
+    }
+    with pytest.raises(InputError, match=r"'motor_pos_ticks': ticks from -?\d+ to \d+; of how many is a turn\?"):
+        imported(tmp_path, {"log.csv": logged}, ONE_JOINT, columns=names)
+    logged["motor_pos_ticks"] *= 0.2  # a gear of 10
+    logged["motor_pos_ticks"] = np.round(logged["motor_pos_ticks"]) + 2048
+    trial = imported(tmp_path, {"log.csv": logged}, ONE_JOINT, columns=names).trials[0]
+    moved = trial.position[:, 0] - trial.position[0, 0]
+    assert moved == pytest.approx(columns["a.position"] - columns["a.position"][0], abs=2e-3)
+    assert trial.command[:, 0] == pytest.approx(columns["a.command"], abs=1e-6)
+
+
+@pytest.mark.parametrize("ticks", [3, 0])
+def test_ticks_that_no_encoder_has_are_refused(ticks: int, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"source.angle_unit={ticks}: a turn has more ticks"):
+        imported(tmp_path, {"log.csv": log(NUMBERED)}, angle_unit=ticks)
+
+
+def test_a_command_and_a_position_in_ticks_have_one_zero() -> None:
+    joint = RigJoint("a", -1.0, 1.0, None)
+    within, beyond = np.array([300.0, 310.0]), np.array([300.0, 2100.0])
+    units = [position_unit(None, f"{name}_ticks", one, joint) for name, one in (("goal", within), ("pos", beyond))]
+    assert [one.zero for one in units] == [0.0, 2048.0]
+    assert [one.zero for one in same_unit(*units, ratio=180.0)] == [2048.0, 2048.0]

@@ -18,11 +18,13 @@ PLACES = 17  # within the gap: the time of landing depends on them
 def with_initial_states(shooting: Shooting, model: Model, windows: Windows) -> Windows:
     """The windows with the initial state of each trial that follows its first segment best, one joint after the other.
 
-    A link may stand anywhere within the gap, at rest or as fast as the motor. Without a gap nothing changes.
+    A link may stand anywhere within the gap, at rest or as fast as the motor. Without a gap it stands where its motor
+    says, whatever another model found.
     """
     gap = shooting.gaps(model)
     if not gap.any():
-        return windows
+        none = np.zeros_like(windows.initial_state)
+        return replace(windows, initial_state=none) if windows.initial_state.any() else windows
     at_start = np.flatnonzero(windows.time == 0.0)
     first = windows.take(at_start).first_segments()
     first = replace(first, initial_state=np.zeros_like(first.initial_state))

@@ -101,7 +101,7 @@ class CsvFiles:
                 else:
                     found[signal] = position_unit(said, column, values[signal], joint)
             spread = float(np.ptp(values["command"]))
-            if not torque_mode and said is None and spread > 0:
+            if not torque_mode and spread > 0:
                 ratio = float(np.ptp(values["position"])) / spread
                 found["command"], found["position"] = same_unit(found["command"], found["position"], ratio)
             if "link_position" in entry:

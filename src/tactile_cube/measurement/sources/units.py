@@ -26,9 +26,8 @@ LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
 FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
-SAID = ("its name", "source.angle_unit", "source.length_unit")
-"""What tells a unit for certain."""
-TICKS, FEWEST_TICKS = frozenset({"tick", "ticks", "count", "counts", "raw"}), 4096
+TICKS = frozenset({"tick", "ticks", "count", "counts", "raw"})
+USUAL_TICKS, FEWEST_TICKS = 4096, 16  # of a turn: of hobby servos, and of any encoder that tells an angle
 GEARED = 1.5  # turns of a motor a turn of its link, from which on there is a gear between them
 SLOWEST = 0.1  # [s] between samples of a log that shows a drive
 NOT_ALIKE = 0.05  # range of a position over that of its command, below which they are in different units
@@ -67,6 +66,11 @@ class Unit:
     source: str
     zero: float = 0.0
 
+    @property
+    def said(self) -> bool:
+        """Whether the user or the column's name says it, and not the values."""
+        return self.source.startswith(("its name", "source."))
+
     def of(self, values: Array) -> Array:
         """Values in SI units."""
         return (values - self.zero) * self.size
@@ -100,12 +104,19 @@ def position_unit(said: str | int | None, name: str, values: Array, joint: RigJo
     """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits.
 
     `said` may be the ticks of an encoder's turn.
+
+    Raises:
+        InputError: no such unit, or ticks of which nothing tells how many a turn has.
     """
     if not joint.prismatic and said is not None and str(said).isdecimal():
         return _ticks(int(said), values, joint, "source.angle_unit")
     if not joint.prismatic and said is None and TICKS & set(words(name)) and not (values % 1.0).any():
-        turn = max(FEWEST_TICKS, 1 << int(np.abs(values).max()).bit_length())
-        return _ticks(turn, values, joint, f"whole numbers up to {values.max():g}; else source.angle_unit=TICKS_A_TURN")
+        if not 0.0 <= values.min() <= values.max() < USUAL_TICKS:
+            raise InputError(
+                f"column '{name}': ticks from {values.min():g} to {values.max():g}; of how many is a turn? "
+                "source.angle_unit=TICKS, for instance 4096"
+            )
+        return _ticks(USUAL_TICKS, values, joint, f"its name; {USUAL_TICKS} a turn is assumed")
     units = LENGTH_UNITS if joint.prismatic else ANGLE_UNITS
     chosen = chosen_unit(said, name, units, "length_unit" if joint.prismatic else "angle_unit")
     if chosen is not None:
@@ -119,11 +130,11 @@ def position_unit(said: str | int | None, name: str, values: Array, joint: RigJo
 
 def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
     """Ticks of an encoder, which are zero in the middle of the turn where else the joint would leave its limits."""
-    if turn < FEWEST_TICKS // 64:
-        raise InputError(f"source.angle_unit={turn}: a turn has more ticks; for instance 4096")
+    if turn < FEWEST_TICKS:
+        raise InputError(f"source.angle_unit={turn}: a turn has more ticks; for instance {USUAL_TICKS}")
     size = 2 * np.pi / turn
     zero = 0.0 if joint.reaches(values * size) else turn / 2
-    return Unit(f"tick, {turn} a turn, {zero:g} is zero", size, source, zero)
+    return Unit(f"ticks, {zero:g} is zero", size, source, zero)
 
 
 def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapping[str, str]) -> dict[str, Unit]:
@@ -137,9 +148,9 @@ def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapp
         logged: what the columns have.
         columns: their names.
     """
-    angles = [signal for signal in units if units[signal].name in {*ANGLE_UNITS, *LENGTH_UNITS}]
+    angles = [signal for signal in units if units[signal].name not in {*TORQUE_UNITS, *FORCE_UNITS}]
     # no joint's limits tell the unit of a motor's angle; its link's is the best guess
-    told = {signal: units[signal if units[signal].source in SAID else "link_position"] for signal in angles}
+    told = {signal: units[signal if units[signal].said else "link_position"] for signal in angles}
     moved = {signal: (logged[signal] - logged[signal].mean()) * told[signal].size for signal in angles}
     link = moved["link_position"]
     gear = float(link @ moved["position"]) / max(float(link @ link), 1e-30)
@@ -152,16 +163,18 @@ def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapp
     for signal in {"position", *beside}:
         unit = told.get(signal, units[signal])
         size = unit.size / gear if signal in angles else unit.size * gear
-        found[signal] = Unit(f"{unit.name} of the motor", size, f"{gear:.5g} turns a turn of its link")
+        found[signal] = Unit(f"{unit.name} of the motor", size, f"{gear:.5g} turns a turn of its link", unit.zero)
     return found
 
 
 def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
-    """Units of a command and its position, one for both where values alone told them and the motions are alike.
+    """Units of a command and its position: one zero, and one unit where values alone told it and the motions are alike.
 
     `ratio` is the range of the position over that of the command, as logged.
     """
-    guessed = not {"its name"} & {command.source, position.source}
+    if command.size == position.size and command.zero != position.zero:
+        return (command, command) if command.zero > position.zero else (position, position)
+    guessed = not (command.said or position.said)
     if command.name == position.name or not guessed or not NOT_ALIKE < ratio < 1 / NOT_ALIKE:
         return command, position
     smaller = min(command, position, key=lambda unit: unit.size)
