@@ -99,10 +99,18 @@ def test_commands_logged_late_are_taken_earlier_and_said(tmp_path: Path) -> None
     assert f"{LATE} rows ({1e3 * LATE * STEP:.3g} ms) before its commands" in said[0]
 
 
-@pytest.mark.parametrize("lag", [0.02, 0.06])
-def test_a_controller_that_integrates_is_not_one_that_knows_its_commands_early(lag: float, tmp_path: Path) -> None:
-    recording = simulated(tmp_path, Size(), find_effect("integral_action"), {"ki": 100.0, "lag": lag})
-    assert in_time(recording, EFFECTS, lambda line: None) is recording
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("integral_action", {"ki": 75.0, "lag": 0.06}),
+        ("elasticity", {"compliance": 0.03}),
+    ],
+)
+def test_what_seems_to_know_its_commands_early_is_told_from_commands_that_were_logged_late(
+    effect: str, values: dict[str, float], tmp_path: Path
+) -> None:
+    recording = simulated(tmp_path, Size(), find_effect(effect), values)
+    assert in_time(recording, EVERY, lambda line: None) is recording
 
 
 def test_what_was_found_is_written_once_and_read_by_every_command(tmp_path: Path) -> None:

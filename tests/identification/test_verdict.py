@@ -35,8 +35,13 @@ JOINTS = ("q1", "q2")
 class Answers:
     """What simulations would say, made up."""
 
-    def __init__(self, repeats: bool = False, follows: bool = False, alike: bool = False) -> None:
-        self.repeats, self.follows, self.same = repeats, follows, alike
+    def __init__(
+        self, repeats: bool = False, follows: bool = False, alike: bool = False, elsewhere: bool = False
+    ) -> None:
+        self.repeats, self.follows, self.same, self.elsewhere = repeats, follows, alike, elsewhere
+
+    def leaves_elsewhere(self, one: Explanation) -> bool:
+        return self.elsewhere
 
     def as_repeats(self, one: Explanation) -> bool:
         return self.repeats
@@ -179,6 +184,11 @@ def test_an_effect_that_leaves_twice_the_noise_is_the_whole_only_if_it_explains_
 ) -> None:
     assert decide(findings(9.0, explanation("backlash", left, 9.0))).kind == kind
     assert decide(findings(90.0, explanation("backlash", left, 90.0))).kind == "missing_effect"
+
+
+def test_what_an_effect_leaves_at_other_joints_is_no_detail_of_its_law() -> None:
+    found = findings(90.0, explanation("backlash", 2.0, 90.0))
+    assert decide(found, Answers(elsewhere=True)).kind == "partly_explained"
 
 
 def test_of_two_effects_that_leave_twice_the_noise_one_may_follow_a_detail_of_the_other() -> None:
@@ -413,7 +423,7 @@ class Judges:
 def simulations(monkeypatch: pytest.MonkeyPatch, source: str = "repeats", off: float = 0.0) -> Simulations:
     monkeypatch.setattr(asked, "Problem", lambda *_: None)
     search = SimpleNamespace(shooting=None, all_windows=None, criteria=STANDARD, validation=Judges(off), held_out=None)
-    floor = SimpleNamespace(source=source, overall=2e-3)
+    floor = SimpleNamespace(source=source, joints={"q1": 2e-3, "q2": 1.0})
     return Simulations(search, explanation("backlash", 9.0), floor, "fast", 0.002)  # type: ignore[arg-type]
 
 
@@ -435,7 +445,7 @@ def test_a_free_run_is_compared_with_repeats_once(
 
     def error(held_out: object, simulated: object) -> object:
         runs.append(simulated)
-        return SimpleNamespace(overall=left)
+        return SimpleNamespace(joints={"q1": left, "q2": 0.0})  # q2 hardly repeats itself
 
     monkeypatch.setattr(ask, "final", lambda one: SimpleNamespace(model=one.judgement.model))
     monkeypatch.setattr(asked, "free_run", lambda *_: "run")
@@ -452,3 +462,16 @@ def test_what_is_left_follows_the_signals_where_a_black_box_explains_more_than_c
     ask = simulations(monkeypatch)
     monkeypatch.setattr(ask, "unexplained", lambda one: [Unexplained("q1", [], share) for share in left])
     assert ask.follows_signals(explanation("backlash", 2.0)) is answer
+
+
+@pytest.mark.parametrize(
+    ("name", "joint_errors", "elsewhere"),
+    [("backlash", (2.0, 1.0), False), ("backlash", (1.0, 2.0), True), ("payload", (1.0, 2.0), False)],
+)
+def test_an_effect_of_a_joint_leaves_something_elsewhere_and_one_of_the_mechanism_nowhere(
+    monkeypatch: pytest.MonkeyPatch, name: str, joint_errors: tuple[float, float], elsewhere: bool
+) -> None:
+    ask, one = simulations(monkeypatch), explanation(name, 2.0)
+    ask.search.fitted = SimpleNamespace(joints=JOINTS)  # type: ignore[assignment]
+    one = replace(one, judgement=replace(one.judgement, joint_errors=np.array(joint_errors)))
+    assert ask.leaves_elsewhere(one) is elsewhere

@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects.controller import IntegralAction
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.division import Division
 from tactile_cube.identification.search.evidence import judge, segment_errors
+from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links, repeats_of
 from tactile_cube.measurement.recordings.description import MOST_LATE
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.replay.model import Model, Term
+from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model
 
 Array = NDArray[np.float64]
@@ -171,7 +172,7 @@ def in_time(
         if further > error:
             break
         rows, error, reading = rows + 1, further, later
-    if not rows or _integrating(recording, effects, known) < error:
+    if not rows or (error > STANDARD.floor and not _late_beside_effects(recording, rows, effects, known)):
         return recording
     stated = recording.description.sensors.commands_late
     say(
@@ -189,19 +190,26 @@ def _fitted(recording: Recording, effects: Sequence[type[Effect]], known: ModelF
     return base.error, float(base.fit.model.constants["reading_delay"].max() / recording.step)
 
 
-def _integrating(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> float:
-    """Error of the base model whose controllers integrate, as one that seems to know its commands early may do."""
-    shooting, noise = Shooting(recording, effects), noise_with_links(recording)
-    division = Division(shooting, recording, recording, noise, known=known, segments=SEGMENTS)
-    base, errors = division.fit_base().fit.model, []
-    starts = [IntegralAction.starts_at(shooting.sizes[joint]) for joint in recording.joints]
-    for form in (0, -1):  # of a PID and of a cascade
-        terms = [
-            Term(IntegralAction, joint, IntegralAction(joint, **values[form]).values, tuple(values[form]))
-            for joint, values in zip(recording.joints, starts, strict=True)
-        ]
-        errors.append(division.settled(replace(base, terms=(*base.terms, *terms)))[1].error)
-    return min(errors)
+def _late_beside_effects(
+    recording: Recording, rows: int, effects: Sequence[type[Effect]], known: ModelFile | None
+) -> bool:
+    """Whether earlier commands explain much that no effect does.
+
+    A controller that integrates or knows its command's speed, and a spring, seem to know their commands early too.
+    """
+    as_logged = _beside_an_effect(recording, effects, known)
+    if as_logged <= STANDARD.adequate:
+        return False
+    earlier = _beside_an_effect(_earlier(recording, rows), effects, known)
+    return earlier**2 < (1.0 - STANDARD.large_gain) * as_logged**2
+
+
+def _beside_an_effect(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> float:
+    """Error of the base model with the one effect that explains most [sensor noise]."""
+    noise = noise_with_links(recording)
+    search = Search(recording, recording, noise, effects, lambda line: None, known, segments=SEGMENTS)
+    frozen, raced = search.raced(search.base, search.base)
+    return min(search.over_noise(fitted) for fitted in (frozen, *(fitted for _, fitted in raced)))
 
 
 def _earlier(recording: Recording, rows: int) -> Recording:

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from tactile_cube.drivetrain.effects.effect import Stage
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
@@ -81,7 +82,7 @@ def _explains(chosen: Explanation, base: Explanation, ask: Simulations, criteria
     """Whether an explanation is the whole of it.
 
     One effect may leave more than is tolerated: real laws differ in detail from those of the catalogue. Where several
-    leave it, the last of them may follow such a detail of the first.
+    leave it, the last of them may follow such a detail of the first. What is left at other joints is no detail of it.
     """
     share = chosen.explained(base)
     if chosen.error > criteria.adequate and share < criteria.most:
@@ -89,6 +90,7 @@ def _explains(chosen: Explanation, base: Explanation, ask: Simulations, criteria
     if chosen.error <= criteria.tolerated:
         return True
     detail = chosen.error < criteria.far and len({effect for effect, _ in named(chosen)}) == 1
+    detail = detail and not ask.leaves_elsewhere(chosen)
     return share > criteria.nearly_whole and (detail or ask.as_repeats(chosen))
 
 
@@ -180,16 +182,25 @@ class Simulations:
         self.search, self.base, self.floor, self.engine, self.step = search, base, floor, engine, step
         self.problem = Problem(search.shooting, search.all_windows)
         self._final: dict[str, Fitted] = {}
-        self._errors: dict[str, float] = {}
+        self._errors: dict[str, dict[str, float]] = {}
 
     def as_repeats(self, one: Explanation) -> bool:
         """Whether its free run is hardly further from the held-out trials than the machine is from itself in repeats.
 
-        Where a machine can tip over, a few segments are far off all the same; and one that does not repeat itself is
-        further from any model than its sensor's noise.
+        At every joint: one that hardly repeats itself says nothing of the others. Where a machine can tip over, a few
+        segments are far off all the same; and one that does not repeat itself is further from any model than its
+        sensor's noise.
         """
-        most = self.search.criteria.adequate * self.floor.overall
-        return self.floor.source == "repeats" and self.free_error(one) <= most
+        most = self.search.criteria.adequate
+        return self.floor.source == "repeats" and all(
+            error <= most * self.floor.joints[joint] for joint, error in self.free_errors(one).items()
+        )
+
+    def leaves_elsewhere(self, one: Explanation) -> bool:
+        """Whether much is left at joints where its last effect does not act; one of the mechanism acts at all."""
+        last, joints = one.effects[-1], self.search.fitted.joints
+        poor = set(unexplained_joints(one, joints, self.search.criteria))
+        return last.effect.stage is not Stage.MECHANISM and not poor <= set(last.joints)
 
     def follows_signals(self, one: Explanation) -> bool:
         """Whether what it leaves is a function of the logged signals, and so no noise: what was named is not all."""
@@ -208,12 +219,12 @@ class Simulations:
             self._final[one.label] = final_fit(self.problem, one.fit.model, self.search.unknowns(one.fit.model))
         return self._final[one.label]
 
-    def free_error(self, one: Explanation) -> float:
-        """Error of its free run on the held-out trials [rad]."""
+    def free_errors(self, one: Explanation) -> dict[str, float]:
+        """Error of its free run on the held-out trials, joint by joint [rad]."""
         if one.label not in self._errors:
             model, held_out = self.final(one).model.with_offsets(one.judgement.model.offsets), self.search.held_out
             simulated = free_run(held_out, model, self.engine, self.step)
-            self._errors[one.label] = free_run_error(held_out, simulated).overall
+            self._errors[one.label] = free_run_error(held_out, simulated).joints
         return self._errors[one.label]
 
     def unexplained(self, one: Explanation, beside_base: bool = False) -> list[Unexplained]:

@@ -179,7 +179,7 @@ class Stubbed(Search):
 
     def __init__(self, errors: dict[str, float]) -> None:
         self.errors, self.candidates, self.problem = errors, KNOWN, None  # type: ignore[assignment]
-        self.start = Model({}, (), {})
+        self.start, self.effects = Model({}, (), {}), tuple(catalogue().values())
         self.said: list[str] = []
         self.say = self.said.append
 
@@ -195,6 +195,25 @@ def test_of_two_laws_in_a_set_the_simpler_is_kept_if_it_does(error: float, kept:
     pruned = Stubbed({"torque_gain+command_dead_zone": error}).pruned(found)
     assert [one.effect.name for one in pruned.effects] == [kept, "command_dead_zone"]
     assert [term.effect.name for term in pruned.fit.model.terms] == [kept, "command_dead_zone"]
+
+
+def test_a_wave_takes_the_place_of_a_profile_that_is_one() -> None:
+    place = np.linspace(-0.2, 1.2, 17)
+    profile = Candidate(
+        find_effect("position_torque"),
+        ("q2",),
+        {f"torque_{k}": float(one) for k, one in enumerate(0.03 * np.sin(9.0 * place))},
+    )
+    (dead,), model = fitted("command_dead_zone")
+    model = profile.added_to(model)[0]
+    model = replace(
+        model,
+        terms=(replace(model.terms[1], values={**model.terms[1].values, "first": -0.2, "last": 1.2}), model.terms[0]),
+    )
+    found = Explanation((profile, dead), replace(FIT, model=model), judged(1.0), 1e-9, 0.5)
+    pruned = Stubbed({"cogging+command_dead_zone": 1.0}).pruned(found)
+    assert [one.effect.name for one in pruned.effects] == ["cogging", "command_dead_zone"]
+    assert pruned.effects[0].form["harmonic"] == pytest.approx(9.0, abs=0.5)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.criteria import STANDARD
-from tactile_cube.identification.search.candidates import Candidate, forms
+from tactile_cube.identification.search.candidates import Candidate, forms, special_cases
 from tactile_cube.identification.search.evidence import Judgement, all_of
 from tactile_cube.identification.search.explanation import Explanation, Proposal
 from tactile_cube.identification.search.residual_shape import Missing
@@ -66,7 +66,7 @@ class MadeUp:
         self.seed, self.chance, self.candidates = seed, chance, []
         self.criteria, self.said = STANDARD, []
         self.say = self.said.append
-        self.new = lambda candidates: candidates
+        self.special_cases = lambda model, effects, place: special_cases(model, effects, place, self.candidates)
         self.worthwhile = lambda one, *_: one.p_value < STANDARD.significant_if_large
 
     def refitted(self, model: Model) -> object:

@@ -99,11 +99,6 @@ class MountTilt(Effect):
     forms = ({"second": 0.1}, {"first": 0.1}, {"first": 0.1, "second": 0.1})
 
     @classmethod
-    def forms_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Return the forms that a joint can show: a single one never shows both angles."""
-        return super().forms_at(scales)[: 3 if scales.neighbours else 2]
-
-    @classmethod
     def can_act(cls, scales: Scales) -> bool:
         """Return whether it is the first joint: a tilt is one of the whole machine."""
         return scales.first

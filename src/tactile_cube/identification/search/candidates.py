@@ -202,15 +202,21 @@ def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Mo
     return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))
 
 
-def fewer_joints(
-    model: Model, effects: Sequence[Candidate], place: int
-) -> Iterator[tuple[tuple[Candidate, ...], Model]]:
-    """Where one of `effects` acts at several joints: the effects and the fitted model without it at one of them."""
-    candidate, first = effects[place], first_term(model, effects, place)
-    for k, joint in enumerate(candidate.joints if len(candidate.joints) > 1 else ()):
-        left = replace(candidate, joints=tuple(other for other in candidate.joints if other != joint))
-        terms = (*model.terms[: first + k], *model.terms[first + k + 1 :])
-        yield (*effects[:place], left, *effects[place + 1 :]), replace(model, terms=terms)
+def apart(effects: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The same effects, each at a single joint; a model's terms stay as they are."""
+    return tuple(replace(one, joints=(joint,), form=one.start(joint)) for one in effects for joint in one.joints)
+
+
+def joined(effects: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The same effects, neighbours of one law and form as one at all their joints."""
+    groups: list[Candidate] = []
+    for one in effects:
+        last = groups[-1] if groups else None
+        if last and last.effect == one.effect and last.form.keys() == one.form.keys():
+            groups[-1] = replace(last, joints=(*last.joints, *one.joints))
+        else:
+            groups.append(one)
+    return tuple(groups)
 
 
 def with_effects(model: Model, candidates: Sequence[Candidate]) -> Model:

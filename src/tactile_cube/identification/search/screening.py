@@ -87,7 +87,7 @@ def screen(problem: Problem, base: Fit, wanted: Sequence[Candidate]) -> list[Sco
 
 VARIANTS = 1  # further forms or places of these effects that come along
 RESIZED = (0.2, 6.0)  # factors of the first look that are believed
-UNDERRATED = 4.0  # times that a refit may explain more than the first look
+UNDERRATED = 8.0  # times that a refit may explain more than the first look
 AS_GOOD = 0.95  # share of the best first-order gain from which on a start of the same law looks as good
 PROMISING = 0.03  # share of the best first-order gain that a candidate needs to be refitted
 

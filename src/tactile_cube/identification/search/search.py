@@ -19,8 +19,10 @@ from tactile_cube.identification.fitting.resolution import step_error
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.candidates import (
     Candidate,
+    apart,
     candidates,
-    fewer_joints,
+    first_term,
+    joined,
     other_starts,
     special_cases,
     with_details,
@@ -80,6 +82,7 @@ class Search(Division):
         folds: Sequence[Divided] = (),
         longer: int = 1,
         finer: int = 1,
+        segments: int = SEGMENTS,
     ) -> None:
         """Prepare the problems.
 
@@ -95,14 +98,15 @@ class Search(Division):
             longer: times as long as usual that segments are, and as few, unless small errors grow in them; more than
                 once, no sets of effects are looked for, which takes minutes and has been done in the usual ones.
             finer: times as short are the steps of simulation that the sensors call for.
+            segments: how many of them to take, of either part.
         """
         start = nominal_model(fitted, known)
         effects = every_effect(effects, start)
         shooting = Shooting(fitted, effects)
         usual = shooting.cut(fitted, noise)
-        windows = some(usual if longer == 1 else shooting.cut(fitted, noise, segment=longer * usual.segment), SEGMENTS)
+        windows = some(usual if longer == 1 else shooting.cut(fitted, noise, segment=longer * usual.segment), segments)
         segment = min(steady_rows(shooting, start, windows), enough_rows(held_out))
-        segments = min(SEGMENTS, SEGMENTS * usual.segment // segment)
+        segments = min(segments, segments * usual.segment // segment)
         super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
         self.say, self.criteria, self.effects, self.folds = say, criteria, effects, folds
         self.sets, self.finer_steps = longer == 1, finer
@@ -158,15 +162,20 @@ class Search(Division):
 
     def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
         """The best ways to add one effect to an explanation."""
-        frozen = self.frozen(parent.fit)
-        self.last_scores = screen(self.problem, frozen, self.wanted(frozen))
-        chosen = with_groups(self.last_scores, least_gain(parent, base, self.criteria) * frozen.cost)[:REFITTED]
-        self.say(f"screened {len(self.last_scores)} candidates, refitting {len(chosen)}")
-        raced = of_each(self.race(frozen, self.brief(frozen, chosen)), FINALISTS)
+        frozen, raced = self.raced(parent, base)
+        raced = of_each(raced, FINALISTS)
         raced = [*(self.restarted(frozen, *pair) for pair in raced[:RESTARTED]), *raced[RESTARTED:]]
         special = [one for pair in raced for one in self.special(frozen, *pair)]
         judged = (*raced, *special)
         return [self.finish(parent, candidate, fitted, len(judged)) for candidate, fitted in judged]
+
+    def raced(self, parent: Explanation, base: Explanation) -> tuple[Fit, list[tuple[Candidate, Fit]]]:
+        """An explanation's fit, and what follows the data best beside it, best first."""
+        frozen = self.frozen(parent.fit)
+        self.last_scores = screen(self.problem, frozen, self.wanted(frozen))
+        chosen = with_groups(self.last_scores, least_gain(parent, base, self.criteria) * frozen.cost)[:REFITTED]
+        self.say(f"screened {len(self.last_scores)} candidates, refitting {len(chosen)}")
+        return frozen, self.race(frozen, self.brief(frozen, chosen))
 
     def wanted(self, frozen: Fit) -> list[Candidate]:
         """Return what may be added to a fit: at starts of its own, or read from what the fit leaves."""
@@ -257,24 +266,34 @@ class Search(Division):
 
         A later one may have done an earlier one's work, or what an earlier one's law was bent to.
         """
+        explanation = self.each_pruned(replace(explanation, effects=apart(explanation.effects)))
+        return replace(explanation, effects=joined(explanation.effects))
+
+    def each_pruned(self, explanation: Explanation) -> Explanation:
+        """The same where every effect is at a single joint."""
         for said, effects, model in self.simpler(explanation):
             fitted, judgement = self.settled(model)
             if not worse(judgement, explanation.judgement, self.criteria):
                 self.say(f"  {said}")
-                return self.pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement))
+                return self.each_pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement))
         return explanation
 
     def simpler(self, explanation: Explanation) -> Iterator[tuple[str, tuple[Candidate, ...], Model]]:
         """What may do for an explanation: in words, the effects, and the fitted model with them."""
         model, effects = explanation.fit.model, explanation.effects
         for place, effect in enumerate(effects):
-            for fewer, changed in fewer_joints(model, effects, place):
-                yield f"{fewer[place].label} does for {effect.label}", fewer, changed
             if len(effects) > 1:
                 left = effects[:place] + effects[place + 1 :]
                 yield f"{effect.label} is not needed", left, without_effect(model, effects, place)
-                for other, changed in special_cases(model, effects, place, self.new(self.candidates)):
+                for other, changed in self.special_cases(model, effects, place):
                     yield f"{other[place].label} does for {effect.label}", other, changed
+
+    def special_cases(
+        self, model: Model, effects: tuple[Candidate, ...], place: int
+    ) -> Iterator[tuple[tuple[Candidate, ...], Model]]:
+        """Sets, and their models, with a special case of an effect's law in its place, at its start."""
+        like_it = special_candidates(effects[place], model.terms[first_term(model, effects, place)], self.effects)
+        return special_cases(model, effects, place, self.new([*self.candidates, *like_it]))
 
 
 def pursued(better: Sequence[Explanation], criteria: Criteria = STANDARD) -> list[Explanation]:

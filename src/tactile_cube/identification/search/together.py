@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.search.candidates import Candidate, special_cases, with_effects, without_effect
+from tactile_cube.identification.search.candidates import Candidate, with_effects, without_effect
 from tactile_cube.identification.search.division import BRIEF, Division
 from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
@@ -132,11 +132,10 @@ class Together:
 
     def special(self, proposal: Proposal) -> list[Proposal]:
         """The set with one of its effects exchanged for one that its law contains, refitted."""
-        known = self.search.new(self.search.candidates)
         return [
             Proposal(effects, self.search.refitted(model))
             for place in range(len(proposal.effects))
-            for effects, model in special_cases(proposal.fit.model, proposal.effects, place, known)
+            for effects, model in self.search.special_cases(proposal.fit.model, proposal.effects, place)
         ]
 
     def explanation(self, one: Proposal, evidence: Judgement, judged: int) -> Explanation:
