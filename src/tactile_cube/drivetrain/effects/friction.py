@@ -41,7 +41,7 @@ class StribeckFriction(Effect):
     contains = ("coulomb_friction",)
     parameters = (
         Parameter("excess", "N m", 0.0, 0.0, 0.5, 0.04, "+10-50 % of the Coulomb friction"),
-        Parameter("velocity", "rad/s", 0.15, 0.01, 1.0, 0.15, "0.05-0.3 rad/s"),
+        Parameter("velocity", "rad/s", 0.15, 0.01, 3.0, 0.15, "0.05-0.3 rad/s"),
         Parameter("exponent", "1", 2.0, 0.3, 4.0, 2.0, "0.5-2", scale=0.5),
     )
 

@@ -34,11 +34,12 @@ from tactile_cube.identification.search.explanation import (
     Explanation,
     Proposal,
     least_gain,
+    proven,
     simplest,
     unproven,
     worthwhile,
 )
-from tactile_cube.identification.search.residual_starts import residual_candidates, special_candidates
+from tactile_cube.identification.search.residual_starts import PROFILE, residual_candidates, special_candidates
 from tactile_cube.identification.search.screening import Score, of_each, screen, with_groups
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
@@ -146,7 +147,7 @@ class Search(Division):
         while len(levels) < DEEPEST and not any(e.largest_error <= self.criteria.floor for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
             scores = scores or tuple(self.last_scores)
-            better = [e for parent, e in found if self.worthwhile(e, parent, base)]
+            better = [e for parent, e in found if self.worthwhile(e, parent, base)] or self.in_pairs(found, base)
             if not better:
                 return levels, scores, [e for parent, e in found if unproven(e, parent, self.criteria)]
             better.sort(key=lambda e: e.judgement.costs.sum())
@@ -155,6 +156,22 @@ class Search(Division):
             least = better[0].judgement.costs.sum()
             beam = tuple(e for e in pursued(better, self.criteria)[:BEAM] if e.judgement.costs.sum() < CLOSE * least)
         return levels, scores, []
+
+    def in_pairs(self, found: Sequence[tuple[Explanation, Explanation]], base: Explanation) -> list[Explanation]:
+        """Two effects more that earn their place together, where the first of them is proven and does not alone."""
+        first = [
+            (parent, one)
+            for parent, one in found
+            if parent.effects and one.gain > self.criteria.large_gain and proven(one, parent, self.criteria)
+        ]
+        pairs = []
+        for parent, one in sorted(first, key=lambda pair: pair[1].judgement.costs.sum())[:BEAM]:
+            for two in self.extend(one, base):
+                both = gain(parent.judgement, two.judgement)
+                together = replace(two, gain=both, p_value=max(one.p_value, two.p_value))
+                if two.gain > self.criteria.least_gain and self.worthwhile(together, parent, base):
+                    pairs.append(together)
+        return pairs
 
     def worthwhile(self, one: Explanation, parent: Explanation, base: Explanation) -> bool:
         """Whether the last effect of an explanation earns its place."""
@@ -291,9 +308,14 @@ class Search(Division):
     def special_cases(
         self, model: Model, effects: tuple[Candidate, ...], place: int
     ) -> Iterator[tuple[tuple[Candidate, ...], Model]]:
-        """Sets, and their models, with a special case of an effect's law in its place, at its start."""
-        like_it = special_candidates(effects[place], model.terms[first_term(model, effects, place)], self.effects)
-        return special_cases(model, effects, place, self.new([*self.candidates, *like_it]))
+        """Sets, and their models, with a special case of an effect's law in its place, at its start.
+
+        In the place of a fitted profile only what it looks like.
+        """
+        known: Sequence[Candidate] = self.candidates
+        if PROFILE in effects[place].form:
+            known = special_candidates(effects[place], model.terms[first_term(model, effects, place)], self.effects)
+        return special_cases(model, effects, place, self.new(known))
 
 
 def pursued(better: Sequence[Explanation], criteria: Criteria = STANDARD) -> list[Explanation]:
