@@ -13,7 +13,7 @@ from tactile_cube.identification.search.evidence import Judgement, p_value
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.screening import Score, of_each, with_groups
 from tactile_cube.identification.search.search import Search, pursued
-from tests.identification.test_verdict import explanation, findings, judged
+from tests.identification.test_verdict import JOINTS, explanation, findings, judged
 
 FIT = SimpleNamespace(cost=0.0, model=None)  # stands for a fit: the choice goes by order alone
 
@@ -125,3 +125,27 @@ def test_an_error_of_the_size_of_the_steps_own_is_hidden_by_them(
     asked: Any = SimpleNamespace(finer_steps=finer, fitted=None, shooting=None, noise=None)
     one: Any = SimpleNamespace(error=error, fit=SimpleNamespace(model=None))
     assert Search.hidden_by_steps(asked, one) is hidden
+
+
+class OneAfterAnother(Search):
+    """A search in which a delay explains half of what friction leaves, and play all but `last` of the rest."""
+
+    def __init__(self, last: float) -> None:
+        self.say, self.last_scores, self.last = lambda line: None, [], last
+        self.base = findings(20.0).base
+        self.fitted: Any = SimpleNamespace(joints=JOINTS)
+
+    def extend(self, parent: Explanation, base: Explanation) -> list[Explanation]:
+        chain = [("stribeck_friction", 5.0), ("command_delay", 3.5), ("backlash", self.last), ("payload", self.last)]
+        name, error = chain[len(parent.effects)]
+        one = explanation(name, error, parent.error)
+        return [replace(one, effects=(*parent.effects, *one.effects))]
+
+    def pruned(self, explanation: Explanation) -> Explanation:
+        return explanation
+
+
+@pytest.mark.parametrize(("last", "effects"), [(1.0, [1, 3]), (3.3, [1])])
+def test_an_effect_that_explains_half_stays_where_another_completes_it(last: float, effects: list[int]) -> None:
+    search = OneAfterAnother(last)
+    assert [len(level[0].effects) for level in search.one_by_one(search.base)[0]] == effects
