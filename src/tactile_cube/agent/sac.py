@@ -96,7 +96,7 @@ class Sac:
             self.targets = SoftUpdate(self.loss, tau=self.settings.tau)
         except (TypeError, RuntimeError) as error:
             raise InputError(
-                f"agent.loss: {error}; give a soft actor-critic loss of TorchRL, as conf/agent/tqc.yaml does"
+                f"agent.loss: {error}; give SACLoss, TQCLoss or a class derived from one, as conf/agent/tqc.yaml does"
             ) from error
         parameters = [p for name, p in self.loss.named_parameters() if name != "log_alpha"]
         self.optimizer = self.settings.optimizer(parameters, self.loss.log_alpha)

@@ -121,7 +121,7 @@ class Reward:
         """Refuses values without a meaning."""
         for key in (*REWARD_TERMS, *BORNE_TERMS, "fastest"):
             value = getattr(self, key)
-            if not (math.isfinite(value) and value >= 0.0):
+            if not isinstance(value, (int, float)) or not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"reward.{key} is {value}; give a finite weight >= 0 (signs are built in)")
 
     @property

@@ -63,6 +63,41 @@ def test_a_module_that_is_not_there_is_named() -> None:
         import_own_effects(["no_such_rig.Drag"])
 
 
+BROKEN = """
+from tactile_cube.drivetrain.effects import Effect, Parameter, Stage
+
+class Mine(Effect):
+    name, stage = "mine", Stage.JOINT_TORQUE
+    parameters = (Parameter("a", unit="N m", neutral=0.0, low=0.0, high=1.0, typical=0.1, source="test"),)
+
+    @staticmethod
+    def law(x, j, p, s{dt}):
+        return {law}
+"""
+
+
+@pytest.mark.parametrize(
+    ("law", "dt", "said"),
+    [
+        ("x[SPEED, j]", ", dt", "NameError: name 'SPEED' is not defined"),
+        ("x[0, j] + p[3]", ", dt", "IndexError: index 3 is out of bounds"),
+        ("x[0, j]", "", "TypeError: .*takes 4 positional arguments"),
+        ("x[Stage.JOINT_TORQUE.value, j] + {}.get(j, 0.0)", ", dt", "TypingError: "),
+        ("x[Stage.JOINT_TORQUE.value, j] - p[0] - 0.5", ", dt", "with neutral parameters; it must change nothing"),
+    ],
+)
+def test_a_law_of_ones_own_that_cannot_be_used_is_refused_in_one_line(
+    law: str, dt: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = f"broken_{abs(hash(law))}"
+    (tmp_path / f"{module}.py").write_text(BROKEN.format(law=law, dt=dt))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(InputError, match=rf"effect '{module}.Mine': law\(x, j, p, s, dt\).*{said}") as caught:
+        import_own_effects([f"{module}.Mine"])
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize("name", list(catalogue()))
 def test_every_effect_describes_itself(name: str) -> None:
     effect = catalogue()[name]

@@ -10,8 +10,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tactile_cube.did_you_mean import suggestion
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Effect, Stage
+from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.errors import InputError
 
 EffectClass = type[Effect]
@@ -94,8 +97,35 @@ def import_own_effects(names: Iterable[str]) -> None:
         try:
             import_module(module)
         except Exception as error:  # the user's file may raise anything
-            raise InputError(f"effect '{path}': cannot import '{module}': {error}") from None
-        _own_effect(path)
+            folder = "" if not isinstance(error, ModuleNotFoundError) else "; run from the folder of its file"
+            raise InputError(f"effect '{path}': cannot import '{module}': {error}{folder}") from None
+        _try_laws(_own_effect(path), path)
+
+
+def _try_laws(effect: EffectClass, path: str) -> None:
+    """Ask each law of a user's class once, as Python and compiled; with neutral values it changes nothing.
+
+    Raises:
+        InputError: it fails, or changes its signal.
+    """
+    from tactile_cube.compiled import compiled  # Numba takes half a second; most commands have no such class
+
+    x = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS, 3))
+    neutral, step = np.array([one.neutral for one in effect.parameters]), 1e-3
+    stages = {"law": effect.stage, "torque_law": Stage.MOTOR_TORQUE, "ahead_law": Stage.POSITION_SENSOR}
+    for name, stage in stages.items():
+        law = getattr(effect, name)
+        for call in (law, compiled(law)) if effect.defines(name) else ():
+            where = f"effect '{path}': {name}(x, j, p, s, dt)"
+            try:
+                value = call(x.copy(), 1, neutral, np.zeros(effect.kept(step)), step)
+            except Exception as error:  # a user's law may raise anything, and Numba says in many lines what it refuses
+                said = ": ".join(line.strip() for line in str(error).splitlines() if line.strip())[:300]
+                raise InputError(f"{where}: {type(error).__name__}: {said}") from None
+            if value != x[stage.value, 1]:
+                raise InputError(
+                    f"{where}: makes {value} of {x[stage.value, 1]} with neutral parameters; it must change nothing"
+                )
 
 
 def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectClass, str]]:
