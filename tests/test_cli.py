@@ -37,7 +37,7 @@ from tactile_cube.usage_error import usage_error
         ),
         (
             lambda: Sac(Sizes(3, 2, 1), TD3Loss),
-            "agent.loss: TD3Loss.__init__() got an unexpected keyword argument 'alpha_init'; give a soft actor-critic",
+            "agent.loss: TD3Loss.__init__() got an unexpected keyword argument 'alpha_init'; give SACLoss, TQCLoss",
         ),
         (
             lambda: instantiate({"_target_": "tactile_cube.env.Task", "name": "full", "filter_time": -1.0}),

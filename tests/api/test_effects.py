@@ -28,7 +28,7 @@ def test_an_effect_describes_itself(effect: EffectDescription) -> None:
 def test_a_description_shows_law_parameters_signature_and_source() -> None:
     (stiction,) = tactile_cube.effects("stribeck_friction")
     assert "F += excess * exp(-|v / velocity|^exponent)" in stiction.law
-    assert stiction.rows[1] == ("velocity", "rad/s", "0.15", "0.15", "0.01 to 1", "0.05-0.3 rad/s")
+    assert stiction.rows[1] == ("velocity", "rad/s", "0.15", "0.15", "0.01 to 3", "0.05-0.3 rad/s")
     for part in (
         stiction.summary,
         stiction.law,
@@ -47,7 +47,7 @@ def test_numbered_parameters_that_are_alike_share_a_row_and_limits_may_be_infini
 def test_the_table_has_every_effect_with_its_ranges() -> None:
     lines = effects_table(EVERY).splitlines()
     assert {line.partition(":")[0] for line in lines if line and not line.startswith(" ")} >= NAMES
-    assert "    velocity  0.01 to 1 rad/s" in lines
+    assert "    velocity  0.01 to 3 rad/s" in lines
     assert "    exponent  0.3 to 4" in lines
 
 
