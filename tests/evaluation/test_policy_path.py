@@ -53,7 +53,9 @@ def test_training_begins_from_a_run_with_its_critics_where_it_has_a_checkpoint(t
 
 
 def test_training_from_an_unknown_policy_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^training.init_from=nobody: .* default, fingertips, published, robust, table, taught$"):
+    with pytest.raises(
+        InputError, match=r"^training.init_from=nobody: .* default, fingertips, published, robust, table, taught$"
+    ):
         networks_path("nobody")
 
 

@@ -110,7 +110,7 @@ def test_what_seems_to_know_its_commands_early_is_told_from_commands_that_were_l
     effect: str, values: dict[str, float], tmp_path: Path
 ) -> None:
     recording = simulated(tmp_path, Size(), find_effect(effect), values)
-    assert in_time(recording, EVERY, lambda line: None) is recording
+    assert in_time(recording, EFFECTS, lambda line: None) is recording, "though nobody asks for that effect"
 
 
 def test_what_was_found_is_written_once_and_read_by_every_command(tmp_path: Path) -> None:

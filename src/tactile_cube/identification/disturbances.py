@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
@@ -195,8 +196,10 @@ def _late_beside_effects(
 ) -> bool:
     """Whether earlier commands explain much that no effect does.
 
-    A controller that integrates or knows its command's speed, and a spring, seem to know their commands early too.
+    A controller that integrates or knows its command's speed, and a spring, seem to know their commands early too,
+    whether somebody asks for them or not.
     """
+    effects = tuple(dict.fromkeys((*effects, *catalogue().values())))
     as_logged = _beside_an_effect(recording, effects, known)
     if as_logged <= STANDARD.adequate:
         return False

@@ -82,7 +82,7 @@ def _explains(chosen: Explanation, base: Explanation, ask: Simulations, criteria
     """Whether an explanation is the whole of it.
 
     One effect may leave more than is tolerated: real laws differ in detail from those of the catalogue. Where several
-    leave it, the last of them may follow such a detail of the first. What is left at other joints is no detail of it.
+    leave it, the last of them may follow a detail of the first. What is left at other joints is no such thing.
     """
     share = chosen.explained(base)
     if chosen.error > criteria.adequate and share < criteria.most:

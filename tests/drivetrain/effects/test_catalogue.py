@@ -89,7 +89,7 @@ class Mine(Effect):
 def test_a_law_of_ones_own_that_cannot_be_used_is_refused_in_one_line(
     law: str, dt: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = f"broken_{abs(hash(law))}"
+    module = f"broken_{tmp_path.name}"
     (tmp_path / f"{module}.py").write_text(BROKEN.format(law=law, dt=dt))
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
