@@ -8,7 +8,7 @@ import pytest
 from hydra.errors import HydraException
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
-from torchrl.objectives import SACLoss, TD3Loss
+from torchrl.objectives import REDQLoss, SACLoss, TD3Loss
 
 from tactile_cube import cli
 from tactile_cube.agent.networks import Sizes
@@ -39,6 +39,7 @@ from tactile_cube.usage_error import usage_error
             lambda: Sac(Sizes(3, 2, 1), TD3Loss),
             "agent.loss: TD3Loss.__init__() got an unexpected keyword argument 'alpha_init'; give SACLoss, TQCLoss",
         ),
+        (lambda: Sac(Sizes(3, 2, 1), REDQLoss), 'agent.loss: \'key "privileged" not found in TensorDict'),
         (
             lambda: instantiate({"_target_": "tactile_cube.env.Task", "name": "full", "filter_time": -1.0}),
             "task.filter_time is -1",

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 import torch
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModule
 from torch import Tensor
 from torchrl.data import Bounded
@@ -94,7 +94,8 @@ class Sac:
         try:
             self.loss = self._build_loss(loss, networks).to(self.device)
             self.targets = SoftUpdate(self.loss, tau=self.settings.tau)
-        except (TypeError, RuntimeError) as error:
+            self._try_losses()
+        except (TypeError, RuntimeError, LookupError, AttributeError) as error:
             raise InputError(
                 f"agent.loss: {error}; give SACLoss, TQCLoss or a class derived from one, as conf/agent/tqc.yaml does"
             ) from error
@@ -119,6 +120,16 @@ class Sac:
             )
         loss.make_value_estimator(gamma=self.settings.gamma)
         return loss
+
+    def _try_losses(self) -> None:
+        """Ask for what an update needs of a made-up batch: a loss that does not fit is told before any episode."""
+        sizes, one, no = self.sizes, torch.ones(2, 1), torch.zeros(2, 1, dtype=torch.bool)
+        state = {"observation": torch.zeros(2, sizes.observation), "privileged": torch.zeros(2, sizes.privileged)}
+        chosen = {"action": torch.zeros(2, sizes.action), "demonstrated": no, "steps_to_next_obs": one}
+        following = state | {"reward": one, "done": no, "terminated": no}
+        with torch.random.fork_rng():  # training draws what it drew without this
+            losses = self.losses(TensorDict(state | chosen | {"next": following}, [2]))
+        losses.select("loss_qvalue", "loss_actor", "loss_alpha", "alpha")
 
     def losses(self, batch: TensorDictBase) -> TensorDictBase:
         """The loss of a batch: loss_qvalue, loss_actor, loss_alpha, alpha, entropy, value of the actor's actions."""
