@@ -95,6 +95,9 @@ def test_where_nothing_is_named_the_model_that_predicts_best_is_recommended() ->
     best = replace(explanation("payload", 10.0), effects=(*plain.effects, *explanation("payload", 10.0).effects))
     verdict = decide(findings(20.0, plain, best))
     assert (verdict.kind, verdict.chosen) == ("unknown_effect", best)
+    beside = replace(findings(20.0, plain), unclear=(best,))
+    assert decide(beside) == verdict
+    assert decide(replace(beside, unclear=(replace(best, fit=at_its_edge("payload")),))).chosen == plain
 
 
 def test_an_error_that_no_effect_lowers_is_unknown() -> None:

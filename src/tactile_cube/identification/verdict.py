@@ -51,12 +51,12 @@ def decide(findings: Findings, ask: Simulations, criteria: Criteria = STANDARD) 
     if at_bound(chosen):
         as_good = [one for one in plausible if not worse(one.judgement, chosen.judgement, criteria)]
         if not as_good:
-            return _but_for_the_implausible(chosen, plausible, base, criteria)
+            return _but_for_the_implausible(chosen, plausible, findings, criteria)
         chosen = simplest(as_good, criteria)
     chosen = next((one for one in plausible if contains(chosen, one) and ask.alike(chosen, one)), chosen)
     whole = _explains(chosen, base, ask, criteria) and not ask.follows_signals(chosen)
     if not whole and chosen.explained(base) < criteria.most and not ask.as_repeats(chosen):
-        return Verdict("unknown_effect", closest(plausible))
+        return Verdict("unknown_effect", closest(plausible, findings))
     rivals = find_rivals(chosen, plausible, ask, criteria)
     if not whole:
         return Verdict("partly_explained", chosen, rivals)
@@ -64,18 +64,19 @@ def decide(findings: Findings, ask: Simulations, criteria: Criteria = STANDARD) 
 
 
 def _but_for_the_implausible(
-    chosen: Explanation, plausible: Sequence[Explanation], base: Explanation, criteria: Criteria
+    chosen: Explanation, plausible: Sequence[Explanation], findings: Findings, criteria: Criteria
 ) -> Verdict:
     """What is left to say where the best explanation stands in for another law: its plausible part, if that is most."""
-    part = [one for one in plausible if named(one) < named(chosen) and one.explained(base) > criteria.most]
+    part = [one for one in plausible if named(one) < named(chosen) and one.explained(findings.base) > criteria.most]
     if part:
         return Verdict("partly_explained", simplest(part, criteria))
-    return Verdict("unknown_effect", closest(plausible or [chosen]))
+    return Verdict("unknown_effect", closest(plausible or [chosen], findings))
 
 
-def closest(found: Sequence[Explanation]) -> Explanation:
+def closest(found: Sequence[Explanation], findings: Findings) -> Explanation:
     """The explanation that follows the held-out trials best: where none is claimed, a model is there to predict."""
-    return min(found, key=lambda one: one.judgement.costs.sum())
+    possible = [*found, *(one for one in findings.unclear if not at_bound(one))]
+    return min(possible, key=lambda one: one.judgement.costs.sum())
 
 
 def _explains(chosen: Explanation, base: Explanation, ask: Simulations, criteria: Criteria) -> bool:

@@ -46,10 +46,12 @@ def find_effect(name: str) -> EffectClass:
     """
     if name in catalogue():
         return catalogue()[name]
+    if "@" in name:
+        raise InputError(f"effect '{name}': name no joint here, all are asked about; `identify` fits one at a joint")
     if "." not in name:
         raise InputError(
-            f"effect '{name}' is unknown; use a dotted path to your own class, or one of: {', '.join(catalogue())}"
-            f"{suggestion(name, catalogue())}"
+            f"effect '{name}' is unknown{suggestion(name, catalogue())}; use a dotted path to your own class, or one "
+            f"of: {', '.join(catalogue())}"
         )
     return _own_effect(name)
 

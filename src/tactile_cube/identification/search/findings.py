@@ -25,6 +25,7 @@ class Findings:
         scores: screening of the first level, best first.
         unproven: where the search ended, what would explain much and may be chance, best first.
         surpassed: what was found one by one and is clearly worse than the sets that were found together.
+        unclear: sets that were found together and are not clearly better: to predict with where none is claimed.
     """
 
     base: Explanation
@@ -33,6 +34,7 @@ class Findings:
     scores: tuple[Score, ...]
     unproven: tuple[Explanation, ...] = ()
     surpassed: tuple[Explanation, ...] = ()
+    unclear: tuple[Explanation, ...] = ()
 
 
 def find(search: Search) -> Findings:
@@ -45,8 +47,9 @@ def find(search: Search) -> Findings:
     found = [e for level in levels for e in level]
     best = min(found, key=lambda e: e.error, default=base)
     surpassed: list[Explanation] = []
+    unclear: tuple[Explanation, ...] = ()
     if search.sets and not standard and best.error > criteria.far and not search.hidden_by_steps(best):
-        sets = Together(search, base, search.fold_divisions()).run(search.leaders, best)
+        sets, unclear = Together(search, base, search.fold_divisions()).run(search.leaders, best)
         levels, surpassed, doubtful = ([sets], found, []) if sets else (levels, surpassed, doubtful)
     while found := [e for level in levels for e in level]:
         chosen = simplest(found, criteria)
@@ -59,7 +62,7 @@ def find(search: Search) -> Findings:
         shared = shared_offset(base, search.fitted, search.effects, search.shooting.sizes)
         levels = [(shared,)] if shared else []
     unproven = tuple(sorted(doubtful, key=lambda e: e.error))
-    return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed))
+    return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed), unclear)
 
 
 def among(search: Search, known: Sequence[Explanation]) -> Findings:

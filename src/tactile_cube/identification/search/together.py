@@ -47,8 +47,10 @@ class Together:
         others = [fold.fit_base().judgement for fold in self.folds]
         self.base_evidence = all_of([base.judgement, *others])
 
-    def run(self, leaders: Sequence[Proposal], best: Explanation) -> tuple[Explanation, ...]:
-        """Sets that earn their place, best first; empty unless they are clearly better than the best one known.
+    def run(
+        self, leaders: Sequence[Proposal], best: Explanation
+    ) -> tuple[tuple[Explanation, ...], tuple[Explanation, ...]]:
+        """Sets that earn their place, best first: those clearly better than the best one known, and all others.
 
         Args:
             leaders: single effects that fit best.
@@ -61,10 +63,12 @@ class Together:
         found: dict[frozenset[tuple[str, str]], tuple[Explanation, Judgement]] = {}
         for one, evidence in judged:
             explanation = self.explanation(one, evidence, len(proposals))
-            if self.search.worthwhile(explanation, self.base, self.base) and worse(known, evidence, self.criteria):
+            if self.search.worthwhile(explanation, self.base, self.base):
                 found.setdefault(named_by(one.effects), (explanation, evidence))
         ordered = sorted(found.values(), key=lambda pair: pair[1].costs.sum())
-        return tuple(one for one, evidence in ordered if not worse(evidence, ordered[0][1], self.criteria))
+        better = [pair for pair in ordered if worse(known, pair[1], self.criteria)]
+        clear = tuple(one for one, evidence in better if not worse(evidence, better[0][1], self.criteria))
+        return clear, tuple(one for one, _ in ordered if one not in clear)
 
     def proposals(self, leaders: Sequence[Proposal]) -> list[Proposal]:
         """Sets by their fit, grown as long as that pays."""
