@@ -24,7 +24,7 @@ import torch
 
 from benchmarks.faults.command import Command, be_ready
 from benchmarks.faults.kinds import KINDS, Kind
-from tactile_cube.agent.policy_file import current_commit, load_policy
+from tactile_cube.agent.policy_file import current_commit, load_actor
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import BEFORE, FILE, Checkpoints, load_checkpoint
 
@@ -104,7 +104,7 @@ def results(folder: Path) -> dict[str, Any]:
     state = Checkpoints(folder).load() or {}
     with (folder / "metrics.csv").open(newline="") as file:
         rows = [{key: value for key, value in row.items() if key not in TIMES} for row in csv.DictReader(file)]
-    policy = load_policy(folder / "policy.safetensors")[0].state_dict()
+    policy = load_actor(folder / "policy.safetensors")[0].state_dict()
     replay = state["learner"]["replay"]["rows"]
     return {"agent": state["learner"]["agent"], "replay": replay, "rows": rows, "policy": policy}
 

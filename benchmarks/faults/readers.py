@@ -17,7 +17,7 @@ from safetensors.numpy import load
 
 from benchmarks.faults.mutations import VALUES, damaged
 from tactile_cube.agent.networks import Actor, Sizes
-from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy, sealed
+from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy, sealed
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.composition import composed
 from tactile_cube.deployment.controller import read_network
@@ -158,7 +158,7 @@ def _damage_policy(folder: Path, random: Random) -> None:
 
 def _read_policy(folder: Path) -> None:
     (folder / "info.json").unlink(missing_ok=True)
-    info = load_policy(folder / "policy.safetensors")[1]
+    info = load_actor(folder / "policy.safetensors")[1]
     environment(_evaluation(), PolicySource(HoldPolicy(), "stranger", config=info.config), {})
     interface_contract(read_network(folder / "policy.safetensors"))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.agent.policy_file import load_actor
 from tactile_cube.agent.policy_parts import making
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import SHIPPED
@@ -64,7 +64,7 @@ def _with_ancestors(folder: Path, given: set[str]) -> list[Ancestor]:
     steps, cpu_hours, wall_hours = _costs(folder / LEDGER)
     if not (folder / POLICY).is_file():
         return [Ancestor(folder.name, steps, cpu_hours, wall_hours)]
-    info = load_policy(folder / POLICY)[1]
+    info = load_actor(folder / POLICY)[1]
     with making(str(folder / POLICY)):
         exploration, start = info.config.get("exploration") or {}, (info.config.get("training") or {}).get("init_from")
         teacher = exploration.get("teacher") if exploration.get("demonstrations") else None

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.paper.ancestry import read_ancestry
 from benchmarks.paper.model_card import model_card
-from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.agent.policy_file import load_actor
 from tactile_cube.evaluation.evaluation import read_results
 from tactile_cube.evaluation.policy_path import SHIPPED, policy_path
 
@@ -27,7 +27,7 @@ def main() -> None:
     parser.add_argument("--name", default="default", help="what it is called: evaluate policy=<name>")
     given = parser.parse_args()
     source = policy_path(given.policy)
-    info = load_policy(source)[1]
+    info = load_actor(source)[1]
     runs = read_ancestry([*given.before, given.run or source.parent])
     results = [read_results(file) for file in given.results]
     target = SHIPPED / f"{given.name}.safetensors"

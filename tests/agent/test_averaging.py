@@ -7,7 +7,7 @@ import torch
 
 from tactile_cube.agent.averaging import averaged, kept_policies
 from tactile_cube.agent.networks import Actor, Sizes
-from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
+from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
 from tactile_cube.errors import InputError
 
 
@@ -38,7 +38,7 @@ def test_weights_are_the_mean_and_the_file_says_of_what(tmp_path: Path) -> None:
     actor, info = averaged([keep(tmp_path, steps, bias) for steps, bias in ((10, 1.0), (20, 2.0), (30, 6.0))])
     assert all(torch.equal(parameter, torch.full_like(parameter, 3.0)) for parameter in actor.parameters())
     save_policy(tmp_path / "mean.safetensors", actor, info)
-    read = load_policy(tmp_path / "mean.safetensors")[1]
+    read = load_actor(tmp_path / "mean.safetensors")[1]
     assert (read.averaged, read.steps, read.performance) == ((10, 20, 30), 30, None)
 
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from tactile_cube.agent.networks import Actor, Sizes
-from tactile_cube.agent.policy_file import PolicyInfo, load_policy, read_policy, require_sizes, save_policy, sealed
+from tactile_cube.agent.policy_file import PolicyInfo, load_actor, read_policy, require_sizes, save_policy, sealed
 from tactile_cube.deployment.controller import read_network
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import SHIPPED
@@ -25,7 +25,7 @@ def saved(path: Path) -> Actor:
 
 def test_policy_comes_back_as_it_was(tmp_path: Path) -> None:
     actor = saved(tmp_path / "p.safetensors")
-    loaded, info = load_policy(tmp_path / "p.safetensors")
+    loaded, info = load_actor(tmp_path / "p.safetensors")
     x = torch.randn(5, 10)
     assert torch.equal(actor.deterministic(x), loaded.deterministic(x))
     assert (info.seed, info.steps, info.time_constant, info.hidden) == (4, 1000, 0.25, (16, 8))
@@ -34,7 +34,7 @@ def test_policy_comes_back_as_it_was(tmp_path: Path) -> None:
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nowhere\.safetensors: no such policy file"):
-        load_policy(tmp_path / "nowhere.safetensors")
+        load_actor(tmp_path / "nowhere.safetensors")
 
 
 @pytest.mark.parametrize("keep", [0, 7, 300])
@@ -43,7 +43,7 @@ def test_damaged_file_is_refused(tmp_path: Path, keep: int) -> None:
     saved(path)
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(InputError, match="damaged"):
-        load_policy(path)
+        load_actor(path)
 
 
 @pytest.mark.parametrize("mask", [0x01, 0x80, 0xFF])
@@ -51,18 +51,18 @@ def test_a_changed_byte_anywhere_is_refused_in_one_line(tmp_path: Path, mask: in
     path = tmp_path / "p.safetensors"
     saved(path)
     content = path.read_bytes()
-    load_policy(path)
+    load_actor(path)
     for place in np.linspace(0, len(content) - 1, 64).round().astype(int):
         damaged = bytearray(content)
         damaged[place] ^= mask
         path.write_bytes(damaged)
         with pytest.raises(InputError, match=r"^[^\n]*p\.safetensors: (damaged|not a policy file)[^\n]*$"):
-            load_policy(path)
+            load_actor(path)
 
 
 @pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.safetensors")), ids=lambda path: path.stem)
 def test_shipped_policies_answer_differently_to_different_observations(path: Path) -> None:
-    actor, info = load_policy(path)
+    actor, info = load_actor(path)
     rest, bent = actor.deterministic(
         torch.stack([torch.zeros(info.observation_size), torch.full((info.observation_size,), 0.3)])
     )
@@ -105,7 +105,7 @@ def test_a_file_that_claims_what_it_is_not_is_refused_by_every_reader(
     path.write_bytes(strange())
     read_policy(path)
     path.write_bytes(content)
-    for reader in (read_policy, load_policy, read_network):
+    for reader in (read_policy, load_actor, read_network):
         with pytest.raises(InputError, match=rf"^[^\n]*p\.safetensors: [^\n]*{reason}[^\n]*$"):
             reader(path)
 
@@ -114,11 +114,11 @@ def test_a_file_larger_than_any_policy_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "p.safetensors").open("wb") as file:
         file.truncate(1 << 40)
     with pytest.raises(InputError, match="1099511627776 bytes"):
-        load_policy(tmp_path / "p.safetensors")
+        load_actor(tmp_path / "p.safetensors")
 
 
 def test_policy_of_another_environment_is_refused(tmp_path: Path) -> None:
     saved(tmp_path / "p.safetensors")
-    _, info = load_policy(tmp_path / "p.safetensors")
+    _, info = load_actor(tmp_path / "p.safetensors")
     with pytest.raises(InputError, match="10 observations to 3 actions, the environment has 120 and 12"):
         require_sizes(tmp_path / "p.safetensors", info, 120, 12)

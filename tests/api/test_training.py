@@ -10,7 +10,7 @@ import torch
 import tactile_cube
 from benchmarks.paper.ancestry import read_ancestry
 from tactile_cube import InputError
-from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.agent.policy_file import load_actor
 from tactile_cube.api import training
 from tactile_cube.api.job import Job, called_job
 from tactile_cube.api.training import TrainingResult
@@ -130,7 +130,7 @@ def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_poli
     with pytest.raises(KeyboardInterrupt):
         tactile_cube.train(*TINY, folder=parts)
     assert tactile_cube.train(*TINY, folder=parts).steps == whole.steps == 96
-    same, other = (load_policy(one / "policy.safetensors")[0].state_dict() for one in (tmp_path / "whole", parts))
+    same, other = (load_actor(one / "policy.safetensors")[0].state_dict() for one in (tmp_path / "whole", parts))
     assert all(torch.equal(same[key], other[key]) for key in same)
     assert all((parts / engine / "results.json").is_file() for engine in ("bullet", "mujoco"))
     assert [(run.name, run.steps) for run in read_ancestry([parts])] == [("parts", 96)]

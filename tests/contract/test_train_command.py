@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tactile_cube.agent.policy_file import load_policy
+from tactile_cube.agent.policy_file import load_actor
 from tactile_cube.composition import with_recipe
 from tactile_cube.evaluation.policy_path import SHIPPED
 from tactile_cube.training.checkpoint import load_checkpoint
@@ -71,7 +71,7 @@ def test_fine_tuning_goes_on_from_the_shipped_policy(tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
     assert "default.safetensors; critics begin anew, the actor waits for 3000 updates" in run.stdout
     files = (tmp_path / "outputs/train/finetune-seed0/policy.safetensors", SHIPPED / "default.safetensors")
-    mine, shipped = (load_policy(file)[0].state_dict() for file in files)
+    mine, shipped = (load_actor(file)[0].state_dict() for file in files)
     assert mine.keys() == shipped.keys()
     assert all((mine[name] - shipped[name]).abs().max() < 0.01 for name in mine)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 
 from tactile_cube.agent.networks import Actor
-from tactile_cube.agent.policy_file import PolicyInfo, load_policy
+from tactile_cube.agent.policy_file import PolicyInfo, load_actor
 from tactile_cube.errors import InputError
 
 KEPT = re.compile(r"policy_(\d+)\.safetensors")
@@ -42,7 +42,7 @@ def averaged(files: Sequence[Path]) -> tuple[Actor, PolicyInfo]:
     Raises:
         InputError: a file is damaged, or not of the size of the last one.
     """
-    loaded = [load_policy(file) for file in files]
+    loaded = [load_actor(file) for file in files]
     actor, info = loaded[-1]
     for file, (_, other) in zip(files, loaded, strict=True):
         if (other.observation_size, other.hidden) != (info.observation_size, info.hidden):

@@ -126,7 +126,7 @@ def read_policy(path: Path) -> tuple[PolicyInfo, list[Layer]]:
     return info, [(tensors[f"actor.{k}.weight"], tensors[f"actor.{k}.bias"]) for k in layers]
 
 
-def load_policy(path: Path | str) -> tuple[Actor, PolicyInfo]:
+def load_actor(path: Path | str) -> tuple[Actor, PolicyInfo]:
     """Read a policy file as torch's network; raises what `read_policy` does."""
     import torch  # imports slowly, and the robot's computer does without it
 

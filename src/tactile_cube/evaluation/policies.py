@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 from tactile_cube.agent.networks import Actor
-from tactile_cube.agent.policy_file import load_policy, require_sizes
+from tactile_cube.agent.policy_file import load_actor, require_sizes
 from tactile_cube.drivetrain.plain_yaml import read_yaml
 from tactile_cube.env import RotationEnv
 from tactile_cube.errors import InputError
@@ -162,7 +162,7 @@ def find_policy(name: str | None) -> PolicySource:
             raise InputError(f"{place}: the recorded episode has no steps to replay")
         return PolicySource(ReplayPolicy(record.target), f"replay of {Path(place).name}")
     path = policy_path(name)
-    actor, info = load_policy(path)
+    actor, info = load_actor(path)
     joints = info.action_size
     reading = 2 * joints  # q_m and e_q
     stack = max(1, info.observation_size // reading)

@@ -13,7 +13,7 @@ from filelock import BaseFileLock, FileLock, Timeout
 
 from tactile_cube.agent.interface import Agent
 from tactile_cube.agent.networks import Actor, Sizes
-from tactile_cube.agent.policy_file import load_policy, require_sizes
+from tactile_cube.agent.policy_file import load_actor, require_sizes
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
@@ -184,7 +184,7 @@ def _protected(training: TrainingSettings) -> TrainingSettings:
 def _warm_start(agent: Agent, path: Path) -> None:
     """Begin from the networks of a checkpoint, or from a policy file's actor."""
     if path.suffix == POLICY_SUFFIX:
-        actor, info = load_policy(path)
+        actor, info = load_actor(path)
         require_sizes(path, info, agent.sizes.observation, agent.sizes.action)
         if info.hidden != agent.settings.hidden:
             raise InputError(

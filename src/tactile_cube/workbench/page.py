@@ -30,7 +30,7 @@ from tactile_cube.visualization.charts import FLOOR, SIMULATED
 from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, signals
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import RIGS, TABLES
-from tactile_cube.workbench.state import Stage, Value, Workbench
+from tactile_cube.workbench.state import ModelStage, Value, Workbench
 from tactile_cube.workbench.widgets import NONE, RED, YELLOW, ImportForm, button, column_of, listed, row_of, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
@@ -398,7 +398,7 @@ def _error_by_stage(bench: Workbench) -> str:
         )
         return f"<tr><td>{escape(label)}</td>{cells}<td style='text-align:right'>{over}</td></tr>"
 
-    def stage_row(stage: Stage) -> str:
+    def stage_row(stage: ModelStage) -> str:
         return row(stage.label, stage.raw.joints, f"{stage.judgement.error:.2f}")
 
     head = "".join(f"<th>{escape(joint)}</th>" for joint in joints)

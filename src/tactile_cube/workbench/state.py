@@ -50,7 +50,7 @@ COMMAND = "python -m tactile_cube.workbench recording={}"
 
 
 @dataclass(frozen=True)
-class Stage:
+class ModelStage:
     """One model on the way, and how it does on the trials that are never fitted.
 
     Attributes:
@@ -140,17 +140,17 @@ class Workbench:
         self.recording = self.search.fitted.with_trials([known[trial.name] for trial in moving.trials])
         base = self.search.fit_base()
         stated = replace(base.fit, model=self.search.start)
-        first: tuple[Stage, ...] = (self._stage("stated", stated, fitted=False), self._stage("refitted", base.fit))
+        first: tuple[ModelStage, ...] = (self._stage("stated", stated, fitted=False), self._stage("refitted", base.fit))
         self.history = [first]
         self._kept: tuple[Fit, Fit] | None = None
 
     @property
-    def stages(self) -> tuple[Stage, ...]:
+    def stages(self) -> tuple[ModelStage, ...]:
         """From the stated model to the one in force."""
         return self.history[-1]
 
     @property
-    def stage(self) -> Stage:
+    def stage(self) -> ModelStage:
         """The model in force."""
         return self.stages[-1]
 
@@ -233,7 +233,7 @@ class Workbench:
         return [one for one in found if one.joint == joint]
 
     @as_input_errors
-    def add(self, *names: str) -> Stage:
+    def add(self, *names: str) -> ModelStage:
         """Add effects, NAME@JOINT, one after another, each with a refit of everything on the fitted trials.
 
         Raises:
@@ -252,7 +252,7 @@ class Workbench:
                 stages = (*stages, self._stage(f"+ {label}", self.search.quickly_refitted(added.model)))
         return self._push(stages)
 
-    def remove(self, label: str) -> Stage:
+    def remove(self, label: str) -> ModelStage:
         """Take an effect out and refit everything that is left.
 
         Raises:
@@ -289,7 +289,7 @@ class Workbench:
             found.append(Value(key, value, interval, of_joint(unit, units), unknown))
         return found
 
-    def set_parameter(self, key: str, value: float) -> Stage:
+    def set_parameter(self, key: str, value: float) -> ModelStage:
         """Set a number by hand; nothing is refitted. Several in a row are one stage, each undone alone.
 
         Raises:
@@ -362,14 +362,14 @@ class Workbench:
         kept = self.known.object_effects if self.known else []
         return model.model_copy(update={"effects": model.with_effects(kept)})
 
-    def _stage(self, label: str, fit: Fit, fitted: bool = True) -> Stage:
+    def _stage(self, label: str, fit: Fit, fitted: bool = True) -> ModelStage:
         self.say(f"judging: {label}")
         scales = np.array([unknown.scale for unknown in fit.unknowns])
         errors = standard_errors(self.search.problem, fit) if fitted else np.zeros(len(scales))
         judgement = self.search.judged(fit.model)
         model = fit.model.with_offsets(judgement.model.offsets)
         fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and taken anew by whoever builds on it
-        return Stage(label, fit, model, judgement, *self._errors(model), NORMAL_95 * errors * scales)
+        return ModelStage(label, fit, model, judgement, *self._errors(model), NORMAL_95 * errors * scales)
 
     def _frozen(self, fit: Fit) -> Fit:
         """A fit with its derivatives, which the first look, a candidate's torque and a refit take alike."""
@@ -390,6 +390,6 @@ class Workbench:
         found = missing_torques(search.validation, search.held_out, self.stage.judgement.model, residual)
         return found[self.recording.joints.index(joint)]
 
-    def _push(self, stages: tuple[Stage, ...]) -> Stage:
+    def _push(self, stages: tuple[ModelStage, ...]) -> ModelStage:
         self.history = [*self.history[-MOST:], stages]
         return self.stage

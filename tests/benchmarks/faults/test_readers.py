@@ -15,7 +15,7 @@ import tactile_cube
 from benchmarks.faults.fuzz import strike
 from benchmarks.faults.readers import GAINS, READERS, Reader, state
 from tactile_cube.agent.networks import Actor, Sizes
-from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
+from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, read_model, write_model
 from tactile_cube.errors import InputError
@@ -67,7 +67,7 @@ def test_any_policy_is_read_back_bit_for_bit(width: int, action: int, hidden: li
     actor = Actor(Sizes(width, 0, action), tuple(hidden))
     with tempfile.TemporaryDirectory() as place:
         save_policy(Path(place) / "policy.safetensors", actor, PolicyInfo.describe(actor, seed=3, config={"a": width}))
-        back, info = load_policy(Path(place) / "policy.safetensors")
+        back, info = load_actor(Path(place) / "policy.safetensors")
     assert (info.observation_size, info.action_size, info.hidden) == (width, action, tuple(hidden))
     assert all(torch.equal(a, b) for a, b in zip(actor.parameters(), back.parameters(), strict=True))
 

@@ -7,7 +7,7 @@ import pytest
 from benchmarks.paper.ancestry import Ancestor, ancestry_table, in_words, read_ancestry, read_table, total
 from benchmarks.paper.model_card import model_card, read_card
 from tactile_cube.agent.networks import Actor, Sizes
-from tactile_cube.agent.policy_file import PolicyInfo, load_policy, save_policy
+from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import SHIPPED
 from tests.benchmarks.paper.test_page import results
@@ -142,7 +142,7 @@ def test_a_beginning_that_is_gone_is_called_so(tmp_path: Path) -> None:
 def test_the_card_of_a_shipped_policy_counts_its_whole_ancestry(card: Path) -> None:
     runs = read_table(card.read_text())
     assert read_card(card)["CPU hours"] == total(runs)
-    assert load_policy(card.with_suffix(".safetensors"))[1].commit == runs[-1].commit
+    assert load_actor(card.with_suffix(".safetensors"))[1].commit == runs[-1].commit
     for index, one in enumerate(runs):
         earlier = {run.name for run in runs[:index]}
         begun = one.settings.get("begins with", "fresh networks")

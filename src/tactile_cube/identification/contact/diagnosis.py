@@ -20,8 +20,8 @@ from tactile_cube.identification.contact.fit import (
     fit_contact,
     grouped,
     narrowed,
+    offset_penalty,
     pooled_cost,
-    prior_penalty,
     shown_by,
     solved,
 )
@@ -158,7 +158,7 @@ def offsets_gained(trials: Sequence[ContactTrial], before: ContactModel, after: 
     The F test of one more number, which holds whatever the spread of the offsets is. It has trials to fit and held-out
     ones together: a single held-out initialisation may need less offset by chance.
     """
-    first, last = (prior_penalty(trials, contact) for contact in (before, after))
+    first, last = (offset_penalty(trials, contact) for contact in (before, after))
     freedom = sum({one.trial.initialisation: one.freedom for one in trials}.values())
     ratio = max(first - last, 0.0) / (last / freedom)
     return 1 - float(np.sqrt(last / first)), float(stats.f.sf(ratio, 1, freedom))

@@ -164,10 +164,10 @@ def pooled_cost(trials: Sequence[ContactTrial], contact: ContactModel, effect: t
     misfit = float(np.sum(np.log([trial.cost(contact) for trial in trials])))
     if effect.shows_in != "offsets":
         return misfit
-    return prior_penalty(trials, contact) + MISFIT_COUNTS * misfit / len(trials)
+    return offset_penalty(trials, contact) + MISFIT_COUNTS * misfit / len(trials)
 
 
-def prior_penalty(trials: Sequence[ContactTrial], contact: ContactModel) -> float:
+def offset_penalty(trials: Sequence[ContactTrial], contact: ContactModel) -> float:
     """How improbable the joint offsets are that the trials need, those of one initialisation sharing theirs."""
     groups = grouped(trials, "initialisation")
     return sum(float(np.mean([one.prior_penalty(contact) for one in group])) for group in groups)
