@@ -70,6 +70,8 @@ def test_mass_matrix_and_bias_equal_those_of_a_physics_engine(tmp_path) -> None:
         torque = np.array(pybullet.calculateInverseDynamics(body, *lists, physicsClientId=client))
         np.testing.assert_allclose(M, matrix[np.ix_(order, order)], rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(M @ a + h, torque[order], rtol=1e-9, atol=1e-12)
+        (taken,) = tree.inverse_dynamics(q[None], v[None], a[None], GRAVITY)
+        np.testing.assert_allclose(taken, torque[order], rtol=1e-9, atol=1e-12)
     pybullet.disconnect(client)
 
 
@@ -120,6 +122,9 @@ def test_a_coupling_given_beside_the_urdf_does_the_same_as_mimic() -> None:
     beside = RigidBodyTree.from_urdf(BRANCHED, coupled={"e": Mimic("d", 2.0, 0.1)})
     q = np.array([0.1, 0.2, 0.3, 0.4])
     assert np.array_equal(inside.actuated_mass_matrix(q), beside.actuated_mass_matrix(q))
+    still = (q[None], 0.0 * q[None])
+    free, pushed = (inside.inverse_dynamics(*still, a, np.zeros(3))[0] for a in (0.0 * q[None], q[None]))
+    np.testing.assert_allclose(pushed - free, inside.actuated_mass_matrix(q) @ q, rtol=1e-12)
 
 
 def test_joints_are_ordered_as_asked_and_the_others_are_locked() -> None:

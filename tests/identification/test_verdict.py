@@ -12,7 +12,13 @@ from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate, forms, term_unknowns
 from tactile_cube.identification.search.evidence import Judgement, gain, worse
-from tactile_cube.identification.search.explanation import Explanation, least_gain, unproven, worthwhile
+from tactile_cube.identification.search.explanation import (
+    Explanation,
+    least_gain,
+    needless,
+    unproven,
+    worthwhile,
+)
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict, at_bound, unexplained_joints
 from tactile_cube.measurement.replay.model import Model, Term
@@ -279,6 +285,16 @@ def test_a_loss_is_measured_by_what_the_better_model_leaves_unexplained() -> Non
     best = judged(2.0)
     assert not worse(replace(best, costs=best.costs * 1.1), best)
     assert worse(replace(best, costs=best.costs * 1.5), best)
+
+
+def test_a_law_of_one_joint_is_judged_by_what_is_left_there() -> None:
+    best, parts = judged(2.0), judged(1.2).costs / 2.0
+    best = replace(best, joint_costs=np.stack([best.costs - parts, parts], axis=1))
+    more = replace(best, costs=best.costs + parts, joint_costs=np.stack([best.costs - parts, 2.0 * parts], axis=1))
+    assert not worse(more, best)
+    (here,) = explanation("backlash", 2.0).effects
+    there = replace(here, joints=("q2",))
+    assert [needless(best, more, JOINTS, removed) for removed in ([here], [there])] == [True, False]
 
 
 def test_a_single_segment_does_not_decide() -> None:

@@ -123,6 +123,22 @@ class RigidBodyTree:
         mass_matrix_and_bias(self.parent, self.prismatic, *numbers, *state, work, M, h)
         return M, h
 
+    def inverse_dynamics(self, q: Array, v: Array, a: Array, gravity: Array) -> Array:
+        """Torques (samples, n) [N m] of the drives that make actuated joints move so, rotors apart.
+
+        Args:
+            q: actuated positions (samples, n).
+            v: their velocities.
+            a: their accelerations.
+            gravity: (3,) in the base.
+        """
+        J = self.coupling
+        taken = np.empty_like(q)
+        for k, (position, speed) in enumerate(zip(q, v, strict=True)):
+            M, h = self.equations(self.expand(position), J @ speed, gravity)
+            taken[k] = J.T @ (M @ (J @ a[k]) + h)
+        return taken
+
     def actuated_mass_matrix(self, q: Array) -> Array:
         """J^T M J (n, n) [kg m^2] at actuated positions q (n,): the inertia that the drives feel, rotors apart."""
         M, _ = self.equations(self.expand(q), np.zeros(self.dofs), np.zeros(3))

@@ -180,6 +180,7 @@ class Stubbed(Search):
     def __init__(self, errors: dict[str, float]) -> None:
         self.errors, self.candidates, self.problem = errors, KNOWN, None  # type: ignore[assignment]
         self.start, self.effects = Model({}, (), {}), tuple(catalogue().values())
+        self.fitted = SimpleNamespace(joints=("q1", "q2", "q3"))  # type: ignore[assignment]
         self.said: list[str] = []
         self.say = self.said.append
 

@@ -11,7 +11,7 @@ from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.search.candidates import Candidate, forms, special_cases
 from tactile_cube.identification.search.evidence import Judgement, all_of
 from tactile_cube.identification.search.explanation import Explanation, Proposal
-from tactile_cube.identification.search.residual_shape import Missing
+from tactile_cube.identification.search.residual_shape import Motion
 from tactile_cube.identification.search.screening import Columns, Score, best_subsets, possible
 from tactile_cube.identification.search.together import Together, regressed
 from tactile_cube.measurement.replay.model import Model, Term
@@ -61,6 +61,7 @@ class MadeUp:
     """A division of the trials in which the error follows from the names of a model's effects."""
 
     offsets: dict[int, np.ndarray] = {}  # noqa: RUF012
+    fitted = SimpleNamespace(joints=("q1",))
 
     def __init__(self, seed: int = 0, chance: bool = False) -> None:
         self.seed, self.chance, self.candidates = seed, chance, []
@@ -100,7 +101,7 @@ class Proposed(Together):
 
 def found(search: MadeUp, folds: list[MadeUp]) -> tuple[Explanation, ...]:
     base = search.fit_base()
-    return Proposed(search, base, folds).run([], base)  # type: ignore[arg-type]
+    return Proposed(search, base, folds).run([], base)[0]  # type: ignore[arg-type]
 
 
 def test_a_set_is_pruned_of_what_the_held_out_trials_do_not_ask_for() -> None:
@@ -139,14 +140,34 @@ def test_a_set_in_the_price_of_which_each_number_counts() -> None:
 RNG = np.random.default_rng(0)
 
 
-def test_friction_by_direction_offset_and_gain_come_back_from_the_missing_torque() -> None:
-    speed, drive = RNG.normal(size=5000), 30.0 * RNG.normal(size=5000)
-    torque = -20.4 * np.sign(speed) - np.where(speed > 0, 167.0, 240.0) * speed - 3.2 + 0.05 * drive
-    signals = {"velocity of slide [rad/s]": speed, "torque of slide [N m]": drive}
-    blocks = np.zeros(5000, dtype=np.int64)
-    found = regressed(Missing("slide", torque + RNG.normal(size=5000), signals, blocks, blocks))
+def made_up(speed: np.ndarray, lacking: np.ndarray) -> Motion:
+    """A log of joints that move at such speeds (samples, n), whose drives give what the motion takes and so much."""
+    taken = 30.0 * RNG.normal(size=speed.shape)
+    return Motion(speed, np.sign(speed), RNG.normal(size=speed.shape), taken + lacking, taken)
+
+
+def test_friction_by_direction_inertia_offset_and_gain_come_back_from_the_log() -> None:
+    v = RNG.normal(size=(5000, 1))
+    motion = made_up(v, 20.4 * np.sign(v) + np.where(v > 0, 167.0, 240.0) * v + 3.2 + RNG.normal(size=v.shape))
+    motion = replace(motion, drive=(motion.drive + 12.0 * motion.acceleration) / 1.05)
+    found = regressed(motion, 0)
+    assert set(found) == {"coulomb_friction", "viscous_friction", "torque_bias", "reflected_inertia", "torque_gain"}
     assert found["coulomb_friction"]["friction"] == pytest.approx(20.4, rel=0.01)
     assert found["viscous_friction"]["damping"] == pytest.approx(0.5 * (167.0 + 240.0), rel=0.01)
     assert found["viscous_friction"]["difference"] == pytest.approx(167.0 - 240.0, rel=0.02)
     assert found["torque_bias"]["bias"] == pytest.approx(-3.2, rel=0.05)
+    assert found["reflected_inertia"]["excess"] == pytest.approx(12.0, rel=0.01)
     assert found["torque_gain"]["error"] == pytest.approx(0.05, rel=0.05)
+
+
+def test_what_a_drive_does_not_need_is_no_law_of_it() -> None:
+    v = RNG.normal(size=(5000, 3))
+    coupled = 2.0 * v[:, 1] + 2.4 * np.sign(v[:, 2]) + 0.9 * v[:, 2] + 0.1 * RNG.normal(size=5000)
+    motion = made_up(
+        v, np.stack([RNG.normal(size=5000), coupled, 5.0 * np.sign(v[:, 2]) + RNG.normal(size=5000)], axis=1)
+    )
+    assert regressed(motion, 0) == {}
+    found = regressed(motion, 1)
+    assert set(found) == {"viscous_friction", "joint_coupling"}
+    assert found["joint_coupling"] == pytest.approx({"damping_next": -0.9, "friction_next": -2.4}, rel=0.05)
+    assert regressed(motion, 2) == {"coulomb_friction": {"friction": pytest.approx(5.0, rel=0.01)}}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ class Judgement:
         residual: (G, R) weighted.
         joint_errors: (n,) RMS error of each joint in units of the sensor noise.
         trial: (G,) to which each belongs; segments of one trial follow each other in time.
+        joint_costs: (G, n) part of the squared error that is each joint's; empty where it is not known.
     """
 
     model: Model
@@ -44,6 +45,7 @@ class Judgement:
     residual: Array = field(repr=False)
     joint_errors: Array
     trial: NDArray[np.int64]
+    joint_costs: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     @property
     def error(self) -> float:
@@ -57,7 +59,10 @@ def judge(problem: Problem, held_out: Recording, model: Model) -> Judgement:
     samples = np.count_nonzero(problem.weight, axis=1)
     costs = charged(problem.cost(fitted.residual), samples, problem.chosen_numbers(fitted.model))
     joints = _joint_errors(problem, fitted.residual)
-    return Judgement(fitted.model, costs, samples, fitted.residual, joints, problem.segment_trial)
+    squares = np.maximum(_joint_squares(problem, fitted.residual)[0], 0.0)
+    shares = squares / np.maximum(squares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    trial = problem.segment_trial
+    return Judgement(fitted.model, costs, samples, fitted.residual, joints, trial, costs[:, None] * shares)
 
 
 def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]) -> Array:
@@ -78,8 +83,10 @@ def all_of(judgements: Sequence[Judgement]) -> Judgement:
     samples = np.array([one.samples.sum() for one in judgements])
     trial = np.concatenate([one.trial + place * TRIALS for place, one in enumerate(judgements)])
     squares = np.average([one.joint_errors**2 for one in judgements], axis=0, weights=samples)
-    costs, counts = (np.concatenate([getattr(one, key) for one in judgements]) for key in ("costs", "samples"))
-    return Judgement(first.model, costs, counts, first.residual, np.sqrt(squares), trial)
+    costs, counts, parts = (
+        np.concatenate([getattr(one, key) for one in judgements]) for key in ("costs", "samples", "joint_costs")
+    )
+    return Judgement(first.model, costs, counts, first.residual, np.sqrt(squares), trial, parts)
 
 
 def _joint_errors(problem: Problem, residual: Array) -> Array:
@@ -110,6 +117,15 @@ def _joint_squares(problem: Problem, residual: Array) -> tuple[Array, NDArray[np
 def gain(before: Judgement, after: Judgement) -> float:
     """Share of the squared error that the second model takes away."""
     return float(1.0 - after.costs.sum() / before.costs.sum())
+
+
+def at_joints(judged: Judgement, places: Sequence[int]) -> Judgement:
+    """The same of some joints alone, as far as that is known."""
+    if not len(places) or not judged.joint_costs.size:
+        return judged
+    part = len(places) / judged.joint_costs.shape[1]
+    costs = judged.joint_costs[:, places].sum(axis=1)
+    return replace(judged, costs=costs, samples=np.round(part * judged.samples).astype(np.int64))
 
 
 def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> bool:

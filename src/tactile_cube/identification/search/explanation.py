@@ -10,7 +10,7 @@ import numpy as np
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.search.candidates import Candidate
-from tactile_cube.identification.search.evidence import Judgement, gain, worse
+from tactile_cube.identification.search.evidence import Judgement, at_joints, gain, worse
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,21 @@ def named(explanation: Explanation) -> frozenset[tuple[str, str]]:
 def named_by(effects: Sequence[Candidate]) -> frozenset[tuple[str, str]]:
     """The same of single effects."""
     return frozenset((c.effect.name, joint) for c in effects for joint in c.joints)
+
+
+def needless(
+    judged: Judgement,
+    simpler: Judgement,
+    joints: Sequence[str],
+    removed: Sequence[Candidate],
+    criteria: Criteria = STANDARD,
+) -> bool:
+    """Whether the held-out trials do without effects, as far as the joints where these act are concerned.
+
+    A joint of many is a small part of a machine's error, whatever it needs itself.
+    """
+    places = sorted({joints.index(joint) for one in removed for joint in one.joints})
+    return not worse(at_joints(simpler, places), at_joints(judged, places), criteria)
 
 
 def worthwhile(

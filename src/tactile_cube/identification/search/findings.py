@@ -11,7 +11,7 @@ from tactile_cube.identification.search.explanation import Explanation, named, n
 from tactile_cube.identification.search.screening import Score, screen, with_groups
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import shared_offset
-from tactile_cube.identification.search.together import Together, standard_explanation
+from tactile_cube.identification.search.together import Together, standard_explanations
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,14 @@ def find(search: Search) -> Findings:
     base, criteria = search.base, search.criteria
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
     nominal = search.judged(search.start)
-    standard = standard_explanation(search, base) if base.error > criteria.far else None
+    standard = standard_explanations(search, base) if base.error > criteria.far else ()
     levels, scores, doubtful = search.one_by_one(base, standard)
     found = [e for level in levels for e in level]
     best = min(found, key=lambda e: e.error, default=base)
     surpassed: list[Explanation] = []
     unclear: tuple[Explanation, ...] = ()
-    if search.sets and not standard and best.error > criteria.far and not search.hidden_by_steps(best):
+    whole = standard and standard[0].explained(base) > criteria.most
+    if search.sets and not whole and best.error > criteria.far and not search.hidden_by_steps(best):
         sets, unclear = Together(search, base, search.fold_divisions()).run(search.leaders, best)
         levels, surpassed, doubtful = ([sets], found, []) if sets else (levels, surpassed, doubtful)
     while found := [e for level in levels for e in level]:

@@ -29,11 +29,12 @@ from tactile_cube.identification.search.candidates import (
     without_effect,
 )
 from tactile_cube.identification.search.division import BRIEF, LONG, SEGMENTS, Division, some
-from tactile_cube.identification.search.evidence import gain, p_value, worse
+from tactile_cube.identification.search.evidence import gain, p_value
 from tactile_cube.identification.search.explanation import (
     Explanation,
     Proposal,
     least_gain,
+    needless,
     proven,
     simplest,
     unproven,
@@ -135,15 +136,15 @@ class Search(Division):
         ]
 
     def one_by_one(
-        self, base: Explanation, standard: Explanation | None = None
+        self, base: Explanation, standard: tuple[Explanation, ...] = ()
     ) -> tuple[list[tuple[Explanation, ...]], tuple[Score, ...], list[Explanation]]:
         """Effects added one at a time: levels of explanations, the first look, and what may be chance at the end.
 
-        They are added to `standard` where the standard model explains nearly all, else to the base model.
+        They are added to the base model, and to the first of `standard`, what of the standard model is stated wrongly.
         """
-        levels: list[tuple[Explanation, ...]] = [(standard,)] if standard else []
+        levels: list[tuple[Explanation, ...]] = [standard] if standard else []
         scores: tuple[Score, ...] = ()
-        beam: tuple[Explanation, ...] = (standard or base,)
+        beam: tuple[Explanation, ...] = (*standard[:1], base)
         while len(levels) < DEEPEST and not any(e.largest_error <= self.criteria.floor for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
             scores = scores or tuple(self.last_scores)
@@ -283,16 +284,18 @@ class Search(Division):
 
         A later one may have done an earlier one's work, or what an earlier one's law was bent to.
         """
-        explanation = self.each_pruned(replace(explanation, effects=apart(explanation.effects)))
-        return replace(explanation, effects=joined(explanation.effects))
+        whole = replace(explanation, effects=apart(explanation.effects))
+        pruned = self.each_pruned(whole, whole)
+        return replace(pruned, effects=joined(pruned.effects))
 
-    def each_pruned(self, explanation: Explanation) -> Explanation:
-        """The same where every effect is at a single joint."""
+    def each_pruned(self, explanation: Explanation, whole: Explanation) -> Explanation:
+        """The same where every effect is at a single joint; what went before counts in what the `whole` does better."""
         for said, effects, model in self.simpler(explanation):
             fitted, judgement = self.settled(model)
-            if not worse(judgement, explanation.judgement, self.criteria):
+            removed = [one for one in whole.effects if one not in effects]
+            if needless(whole.judgement, judgement, self.fitted.joints, removed, self.criteria):
                 self.say(f"  {said}")
-                return self.each_pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement))
+                return self.each_pruned(replace(explanation, effects=effects, fit=fitted, judgement=judgement), whole)
         return explanation
 
     def simpler(self, explanation: Explanation) -> Iterator[tuple[str, tuple[Candidate, ...], Model]]:

@@ -6,18 +6,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit, precision
-from tactile_cube.identification.search.candidates import Candidate, with_effects, without_effect
+from tactile_cube.identification.criteria import STANDARD, Criteria
+from tactile_cube.identification.fitting.gauss_newton import fit
+from tactile_cube.identification.search.candidates import Candidate, joined, with_effects, without_effect
 from tactile_cube.identification.search.division import BRIEF, Division
 from tactile_cube.identification.search.evidence import Judgement, all_of, gain, p_value, worse
-from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by
-from tactile_cube.identification.search.residual_shape import Missing, missing_torques
+from tactile_cube.identification.search.explanation import Explanation, Proposal, named, named_by, needless
+from tactile_cube.identification.search.residual_shape import Motion, logged_motion
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.screening import best_subsets, candidate_columns
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.replay.model import Model
 
+Array = NDArray[np.float64]
 MOST = 4  # effects in a set; one more than are looked for one by one, for pruning takes back what was too much
 REFITTED = 6  # sets of each size that are refitted briefly, of which the best ones go on
 KEPT = 2  # sets that are grown further
@@ -118,15 +121,23 @@ class Together:
 
         Which effect is needed least, and which special case does best, the fit says; the held-out trials say whether.
         """
-        places = range(len(proposal.effects) if len(proposal.effects) > 1 else 0)
-        without = [self.without(proposal, place) for place in places]
-        for simpler in (without, self.special(proposal)):
-            if simpler:
-                next_one = min(simpler, key=lambda one: one.fit.cost)
+        pruned, left = proposal, evidence
+        while simpler := self.simpler(pruned, proposal, evidence):
+            pruned, left = simpler
+        return pruned, left
+
+    def simpler(self, pruned: Proposal, whole: Proposal, evidence: Judgement) -> tuple[Proposal, Judgement] | None:
+        """One step of it, held against the evidence of the whole; None where there is none."""
+        places = range(len(pruned.effects) if len(pruned.effects) > 1 else 0)
+        without = [self.without(pruned, place) for place in places]
+        for tried in (without, self.special(pruned)):
+            if tried:
+                next_one = min(tried, key=lambda one: one.fit.cost)
                 less = self.evidence(next_one.fit.model)
-                if not worse(less, evidence, self.criteria):
-                    return self.pruned(next_one, less)
-        return proposal, evidence
+                removed = [one for one in whole.effects if one not in next_one.effects]
+                if needless(evidence, less, self.search.fitted.joints, removed, self.criteria):
+                    return next_one, less
+        return None
 
     def without(self, proposal: Proposal, place: int) -> Proposal:
         """The set without one of its effects, refitted."""
@@ -151,75 +162,106 @@ class Together:
         return found
 
 
-ITERATIONS = 12
+WEAKEST = 0.3  # part of a drive's torque that a regression may take for its strength
 MOVES = 0.05  # of a joint's speed: slower samples say little of its friction
 
 
-def standard_explanation(search: Search, base: Explanation) -> Explanation | None:
-    """Return what of the standard model the recording's owner states wrongly, or None where that is no explanation.
+def standard_explanations(search: Search, base: Explanation) -> tuple[Explanation, ...]:
+    """Return what of the standard model the recording's owner states wrongly: what of it is proven, then all of it.
 
-    All laws are regressed on the torque that the base model lacks, then fitted at all joints at once. Those stay that
-    the fit needs for its error, then those that the trials to judge by ask for.
+    All laws are regressed on the torque that the measured motion takes, joint by joint. What is needed for it is fitted
+    at all joints at once; unless that explains nearly all, it stays at joints of which it does.
 
     Source: Gautier, Dynamic identification of robots with power model, ICRA 1997; viscous friction by direction as in
     Janot, Gautier, Brunot, EMPS benchmark, 2019.
     """
-    frozen = search.frozen(base.fit)
-    missing = missing_torques(search.problem, search.fitted, frozen.model, frozen.residual)
     known = {effect.name: effect for effect in search.effects}
-    wanted = [
-        Candidate(known[name], (one.joint,), form, search.shooting.sizes)
-        for one in missing
-        for name, form in regressed(one).items()
-        if name in known
-    ]
-    needed = _needed(search, frozen, search.new(wanted))
-    if not needed:
-        return None
-    search.say(f"standard model: {' & '.join(one.label for one in needed)}")
-    fitted = search.refitted(with_effects(base.fit.model, needed))
-    found = search.pruned(search.explanation(base, tuple(needed), fitted.model, 1))
-    enough = found.explained(base) > search.criteria.most and search.worthwhile(found, base, base)
-    return found if enough else None
+    motion = logged_motion(search.problem, search.fitted, base.fit.model)
+    wanted = search.new(
+        [
+            Candidate(known[name], (joint,), form, search.shooting.sizes)
+            for j, joint in enumerate(search.fitted.joints)
+            for name, form in regressed(motion, j, search.criteria).items()
+            if name in known
+        ]
+    )
+    if not wanted:
+        return ()
+    search.say(f"standard model: {' & '.join(one.label for one in wanted)}")
+    found = _of_laws(search, base, wanted)
+    if found.explained(base) <= search.criteria.most:
+        left, before = (one.judgement.joint_errors**2 - 1.0 for one in (found, base))
+        followed = 1.0 - left / np.maximum(before, 1e-9) > search.criteria.most
+        good = [one for one in wanted if followed[search.fitted.joints.index(one.joints[0])]]
+        if not good:
+            return ()
+        found = _of_laws(search, base, good)
+    if not search.worthwhile(found, base, base):
+        return ()
+    proven = search.pruned(found)
+    return (proven,) if named(proven) == named(found) else (proven, replace(found, effects=joined(found.effects)))
 
 
-def regressed(missing: Missing) -> dict[str, dict[str, float]]:
-    """Return effect -> parameters of the laws that are linear in the missing torque, by least squares.
+def _of_laws(search: Search, base: Explanation, laws: Sequence[Candidate]) -> Explanation:
+    """The base model with laws, everything fitted."""
+    fitted = search.refitted(with_effects(base.fit.model, laws))
+    return search.explanation(base, tuple(laws), fitted.model, 1)
 
-    Torque (samples,) [N m] = -Fc sgn v - b v - d / 2 |v| + bias + g tau, of samples that move.
+
+def regressed(motion: Motion, j: int, criteria: Criteria = STANDARD) -> dict[str, dict[str, float]]:
+    """Return effect -> parameters of the laws that the drive of joint number j needs, by least squares.
+
+    Torque of the drive [N m] = (1 + k) taken + J a + Fc sgn v + b v + d / 2 |v| - bias, less b' v' and Fc' sgn v' of
+    its neighbours in the chain, where it moves. Of these numbers those stay without which the squared error would grow
+    by a large part of itself.
     """
-    speed = missing.signals[f"velocity of {missing.joint} [rad/s]"]
-    drive = missing.signals[f"torque of {missing.joint} [N m]"]
-    moving = np.abs(speed) > MOVES * np.abs(speed).max()
-    v = speed[moving]
-    columns = np.stack([-np.sign(v), -v, -0.5 * np.abs(v), np.ones_like(v), drive[moving]], axis=1)
-    sizes = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-    friction, damping, difference, bias, gain = (
-        np.linalg.lstsq(columns / sizes, missing.torque[moving], rcond=1e-6)[0] / sizes
-    ).tolist()
-    return {
-        "coulomb_friction": {"friction": max(friction, 0.0)},
-        "viscous_friction": {"damping": max(damping, 0.5 * abs(difference)), "difference": difference},
-        "torque_bias": {"bias": bias},
-        "torque_gain": {"error": float(np.clip(gain, -0.7, 0.7))},
+    speed, n = np.abs(motion.velocity[:, j]), motion.velocity.shape[1]
+    moving = speed > MOVES * speed.max()
+    velocity, direction = motion.velocity[moving].T, motion.direction[moving].T
+    taken = motion.taken[moving, j]
+    lacking = taken - motion.drive[moving, j]
+    sides = {side: k for side, k in (("previous", (j - 1) % n), ("next", (j + 1) % n)) if k != j}
+    laws = {
+        "taken": taken,
+        "friction": direction[j],
+        "damping": velocity[j],
+        "difference": 0.5 * np.abs(velocity[j]),
+        "bias": -np.ones_like(taken),
+        "excess": motion.acceleration[moving, j],
+        **{f"damping_{side}": -velocity[k] for side, k in sides.items()},
+        **{f"friction_{side}": -direction[k] for side, k in sides.items()},
     }
+    columns = np.stack([*laws.values()], axis=1)
+    sizes = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
 
+    def solved(kept: list[int]) -> tuple[float, Array]:
+        numbers = np.zeros(len(sizes))
+        numbers[kept] = np.linalg.lstsq(columns[:, kept] / sizes[kept], -lacking, rcond=1e-6)[0] / sizes[kept]
+        return float(np.sum((lacking + columns @ numbers) ** 2)), numbers
 
-def _needed(search: Search, frozen: Fit, wanted: list[Candidate]) -> list[Candidate]:
-    """Those of the laws, fitted together, without which the fit's squared error grows by a large part of itself."""
-    left = list(wanted)
-    while left:
-        model = with_effects(frozen.model, left)
-        fitted = fit(search.problem, model, search.unknowns(model)[len(frozen.unknowns) :], ITERATIONS, frozen)
-        inverse = np.linalg.pinv(fitted.information + np.diag(precision(fitted.unknowns)))
-        least = search.criteria.large_gain * fitted.cost
-        worth, first = [], len(frozen.unknowns)
-        for one in left:
-            own = slice(first, first := first + one.size)
-            values = np.array([u.of(fitted.model) / u.scale for u in fitted.unknowns[own]])
-            worth.append(float(values @ np.linalg.solve(inverse[own, own], values)))
-        kept = [one for one, cost in zip(left, worth, strict=True) if cost >= least]
-        if len(kept) == len(left) or not kept:
-            return kept
-        left = kept
-    return left
+    kept = [*range(len(sizes))]
+    cost, numbers = solved(kept)
+    while kept:
+        without = {k: solved([one for one in kept if one != k]) for k in kept}
+        least = min(without, key=lambda k: without[k][0])
+        if without[least][0] >= (1.0 + criteria.large_gain) * cost:
+            break
+        kept.remove(least)
+        cost, numbers = without[least]
+    strength = 1.0 / max(1.0 + numbers[0], WEAKEST)  # of the drive, as which a gain is stated
+    found = {name: float(strength * number) for name, number in zip(laws, numbers, strict=True) if number}
+    found.pop("taken", None)
+    if "friction" in found:
+        found["friction"] = max(found["friction"], 0.0)
+    if "difference" in found:
+        found["damping"] = max(found.get("damping", 0.0), 0.5 * abs(found["difference"]))
+    effects = {
+        "coulomb_friction": ["friction"],
+        "viscous_friction": ["damping", "difference"],
+        "torque_bias": ["bias"],
+        "reflected_inertia": ["excess"],
+        "joint_coupling": [name for name in laws if "_" in name],
+    }
+    needed = {effect: {name: found[name] for name in names if name in found} for effect, names in effects.items()}
+    needed["torque_gain"] = {"error": strength - 1.0} if numbers[0] else {}
+    return {effect: form for effect, form in needed.items() if form}
