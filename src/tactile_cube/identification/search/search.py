@@ -140,11 +140,12 @@ class Search(Division):
     ) -> tuple[list[tuple[Explanation, ...]], tuple[Score, ...], list[Explanation]]:
         """Effects added one at a time: levels of explanations, the first look, and what may be chance at the end.
 
-        They are added to the base model, and to the first of `standard`, what of the standard model is stated wrongly.
+        They are added to the base model, and to the first of `standard`, what of the standard model is stated wrongly,
+        unless that leaves nothing: then only single effects that do as well are of interest.
         """
         levels: list[tuple[Explanation, ...]] = [standard] if standard else []
         scores: tuple[Score, ...] = ()
-        beam: tuple[Explanation, ...] = (*standard[:1], base)
+        beam = (*(e for e in standard[:1] if e.largest_error > self.criteria.floor), base)
         while len(levels) < DEEPEST and not any(e.largest_error <= self.criteria.floor for e in beam):
             found = [(parent, e) for parent in beam for e in self.extend(parent, base)]
             scores = scores or tuple(self.last_scores)
