@@ -80,7 +80,7 @@ LEFT = 0.05  # share of what the effect explains that a brief refit of another l
 
 
 def twins(search: Search, chosen: Explanation, base: Explanation, found: Sequence[Explanation]) -> list[Explanation]:
-    """Return explanations as good, with another law in the place of one of the chosen ones, of those not tried before.
+    """Return explanations as good, with another law in the place of one of the chosen ones, of those not known as good.
 
     The other effects and all constants are free. Without this, what is named hangs on the order in which effects were
     added: the second of two laws that do the same finds nothing left to explain. A law that contains the chosen one
@@ -92,7 +92,7 @@ def twins(search: Search, chosen: Explanation, base: Explanation, found: Sequenc
         base: the refitted base model.
         found: what has been tried.
     """
-    known = {named_by(one.effects) for one in found}
+    known = {named_by(one.effects) for one in found if not worse(one.judgement, chosen.judgement, search.criteria)}
     search.say(f"what else would explain as much as {chosen.label}?")
     reached = search.frozen(chosen.fit).cost
     others = []

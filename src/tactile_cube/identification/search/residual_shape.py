@@ -118,7 +118,7 @@ class Motion:
         velocity: [rad/s].
         direction: its sign; between -1 and 1 where that changes.
         acceleration: [rad/s^2].
-        drive: torque that the controller asks of the drives [N m].
+        drive: torque that the controller asks of the drives, less the friction that is stated [N m].
         taken: torque that the motion takes by the equations of motion [N m].
     """
 
@@ -141,7 +141,7 @@ def logged_motion(problem: Problem, recording: Recording, model: Model) -> Motio
     taken = problem.shooting.tree.inverse_dynamics(q, v, a, recording.gravity)
     taken += model.constants["reflected_inertia"] * a
     direction = np.sign(_derivatives(measured, step, time)[1])
-    drive = _drive(problem, model, position, velocity)
+    drive = _drive(problem, model, position, velocity) - model.constants["static_friction"] * direction
     inner = slice(segment // 8, -segment // 8)
     inside = np.all(weight[some][:, inner] > 0, axis=2)
     logged = (*(one[some] for one in (velocity, direction, acceleration, drive)), taken.reshape(-1, segment, n))
