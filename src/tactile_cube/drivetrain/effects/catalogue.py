@@ -50,8 +50,8 @@ def find_effect(name: str) -> EffectClass:
         raise InputError(f"effect '{name}': name no joint here, all are asked about; `identify` fits one at a joint")
     if "." not in name:
         raise InputError(
-            f"effect '{name}' is unknown{suggestion(name, catalogue())}; use a dotted path to your own class, or one "
-            f"of: {', '.join(catalogue())}"
+            f"effect '{name}' is unknown{suggestion(name, catalogue()) or '.'} Use one of {', '.join(catalogue())}, "
+            "or a dotted path to your own class"
         )
     return _own_effect(name)
 
