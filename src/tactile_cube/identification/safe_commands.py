@@ -237,7 +237,7 @@ def _limited(command: Array, most: float) -> Array:
     return safe
 
 
-SCALES = 0.8 ** np.arange(11)  # of a command about its middle, down to a tenth
+SCALES = [0.8**k for k in range(11)]  # of a command about its middle, down to a tenth
 
 
 @dataclass(frozen=True)
@@ -314,20 +314,28 @@ class PossibleMotions:
 
     def _scaled(self, kind: str, commands: Array) -> tuple[Trial, Safety]:
         middle = middle_command(self.recording)
-        for scale in SCALES:
-            less = middle + scale * (commands - middle)
-            safety = self.safety(kind, less, float(scale))
-            if safety.safe:
-                break
-        return replace(trials_from_rest(self.recording, kind, less)[-1], initialisation=0), safety
+
+        def scaled(scale: float) -> Array:
+            return np.asarray(middle + scale * (commands - middle))
+
+        safety = self.safety(kind, commands)
+        if not safety.safe:  # the least first: what is unsafe at a tenth is not asked for in between
+            safety = self.safety(kind, scaled(SCALES[-1]), SCALES[-1])
+            for scale in SCALES[1:-1] if safety.safe else ():
+                more = self.safety(kind, scaled(scale), scale)
+                if more.safe:
+                    safety = more
+                    break
+        return replace(trials_from_rest(self.recording, kind, scaled(safety.scale))[-1], initialisation=0), safety
 
     def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
-        """What commands (T, n) do from rest, simulated freely for their whole duration."""
+        """What commands (T, n) do from rest, simulated freely for their whole duration until a model leaves the limits."""
         trials = trials_from_rest(self.recording, kind, commands)
-        reached = Envelope.around([*map(self._commanded, trials), *self._simulated(self.fits, trials)])
-        if within_limits(reached, self.limits, self.margin):
-            ends = (one for models in self.ends for one in self._simulated(models, trials[-1:]))
-            reached = Envelope.around([reached, *ends])
+        reached = Envelope.around(map(self._commanded, trials))
+        for one in self._simulated(trials):
+            reached = Envelope.around([reached, one])
+            if not within_limits(reached, self.limits, self.margin):
+                break
         count = len(self.fits) + sum(map(len, self.ends))
         open_loop = self.recording.torque_controlled
         starts = np.array([trial.position[0] for trial in trials])
@@ -339,10 +347,12 @@ class PossibleMotions:
         still = np.zeros(len(self.recording.joints))
         return Envelope(trial.command.min(axis=0), trial.command.max(axis=0), still, still)
 
-    def _simulated(self, models: Sequence[Model], trials: Sequence[Trial]) -> Iterator[Envelope]:
-        """What each model does in each trial, positions both as the sensors read them and as they are."""
-        for model, runs in zip(models, self.shooting.free_runs(models, trials), strict=True):
-            for trial, run in zip(trials, runs, strict=True):
+    def _simulated(self, trials: Sequence[Trial]) -> Iterator[Envelope]:
+        """What each model does, the fitted ones in every trial; positions both as the sensors read them and as they are."""
+        last = trials[-1]
+        batches = [*((self.fits, trial) for trial in reversed(trials)), *((models, last) for models in self.ends)]
+        for models, trial in batches:
+            for model, (run,) in zip(models, self.shooting.free_runs(models, [trial]), strict=True):
                 motion = Envelope.of_motion(run.position, run.torque, trial.step)
                 offset = model.offsets[trial.initialisation]
                 low, high = motion.low + np.minimum(offset, 0.0), motion.high + np.maximum(offset, 0.0)
