@@ -37,18 +37,21 @@ def main() -> None:
     """Draw what is not drawn yet."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("outputs/rounds"))
+    key = yaml.safe_load(KEY.read_text())
+    kinds = list(key["rounds"])
+    parser.add_argument("--only", nargs="+", choices=kinds, default=kinds, help="another process may draw the others")
     parser.add_argument("--seal", action="store_true", help="write the sums of today's files into the key")
     args = parser.parse_args()
-    key = yaml.safe_load(KEY.read_text())
     if args.seal:
         head = KEY.read_text().partition("files:")[0]
         KEY.write_text(head + yaml.safe_dump({"files": sums()}))
         return
     if found := changed(key):
         sys.exit(f"error: {KEY}: {', '.join(found)} changed after the key; check out the commit that it came with")
-    most = max(int(re.search(r"--draws (\d+)", words)[1]) for words in key["rounds"].values())  # type: ignore[index]
+    rounds = {name: words for name, words in key["rounds"].items() if name in args.only}
+    most = max(int(re.search(r"--draws (\d+)", words)[1]) for words in rounds.values())  # type: ignore[index]
     for reached in range(AT_ONCE, most + AT_ONCE, AT_ONCE):
-        for name, words in key["rounds"].items():
+        for name, words in rounds.items():
             draws = int(re.search(r"--draws (\d+)", words)[1])  # type: ignore[index]
             if draws <= reached - AT_ONCE:
                 continue
