@@ -329,7 +329,7 @@ class PossibleMotions:
         return replace(trials_from_rest(self.recording, kind, scaled(safety.scale))[-1], initialisation=0), safety
 
     def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
-        """What commands (T, n) do from rest, simulated freely for their whole duration until a model leaves the limits."""
+        """What commands (T, n) do from rest, simulated freely until they end or a model leaves the limits."""
         trials = trials_from_rest(self.recording, kind, commands)
         reached = Envelope.around(map(self._commanded, trials))
         for one in self._simulated(trials):
@@ -348,7 +348,7 @@ class PossibleMotions:
         return Envelope(trial.command.min(axis=0), trial.command.max(axis=0), still, still)
 
     def _simulated(self, trials: Sequence[Trial]) -> Iterator[Envelope]:
-        """What each model does, the fitted ones in every trial; positions both as the sensors read them and as they are."""
+        """What each model does, fitted ones in every trial; positions as the sensors read them and as they are."""
         last = trials[-1]
         batches = [*((self.fits, trial) for trial in reversed(trials)), *((models, last) for models in self.ends)]
         for models, trial in batches:
