@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from tactile_cube.env import Conditions
@@ -9,7 +10,7 @@ from tactile_cube.errors import InputError
 
 
 @dataclass(frozen=True)
-class Ramps:
+class Ramps(ABC):
     """Where each condition starts; it ends, linearly in the progress, at the task's own value.
 
     Attributes:
@@ -31,9 +32,9 @@ class Ramps:
             if value is not None and not value >= 0.0:
                 raise InputError(f"curriculum {key} is {value}; give a scale >= 0")
 
+    @abstractmethod
     def progress(self, environment_steps: int, performance: float) -> float:
         """Part of the way to the task's own conditions; below 0 it has not begun, above 1 it is over."""
-        raise NotImplementedError
 
     def conditions(self, environment_steps: int, performance: float, final: Conditions) -> Conditions:
         """Conditions of the episodes that start now, see `Curriculum`."""

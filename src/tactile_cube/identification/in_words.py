@@ -279,8 +279,8 @@ def _open_loop(experiment: Experiment) -> str:
 def _nothing_safe(experiment: Experiment) -> str:
     return (
         f"No safe command was found: each kind, down to {_percent(SCALES[-1])} of its size, leaves the limits in at "
-        f"least one of {experiment.safety.models} models ({MODELS}). The nearest is {_named(experiment)}, "
-        f"{_seconds(experiment)}:"
+        f"least one of {experiment.safety.models} models ({MODELS}). What {_named(experiment)}, "
+        f"{_seconds(experiment)}, reach in the first model that leaves them:"
     )
 
 

@@ -98,7 +98,7 @@ def next_experiment(
     proposed = motions.safe_trials(seed)
     safe = [(trial, safety) for trial, safety in proposed if safety.safe]
     if not safe:
-        return _unsafe(recording, *min(proposed, key=lambda one: one[1].share_used))
+        return _unsafe(recording, *proposed[0])
     trials = [trial for trial, _ in safe]
     whole = finer(shooting.cut(recording, noise, trials, segment=len(trials[0].time)), FINER)
     names, fits = list(rivals), list(rivals.values())
@@ -172,7 +172,7 @@ def _told(
 
 
 def _unsafe(recording: Recording, trial: Trial, safety: Safety) -> Experiment:
-    """The command that comes nearest to the limits, which is not to be played."""
+    """A command that is not to be played, as an example."""
     return Experiment(trial.kind, recording.joints, trial.time, trial.command, 0.0, recording.joints[0], {}, safety)
 
 

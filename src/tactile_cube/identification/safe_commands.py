@@ -247,9 +247,9 @@ class Safety:
     Attributes:
         limits: of the machine.
         margin: part of each stated limit that is kept free.
-        reached: the furthest in any model.
+        reached: the furthest in any model; of a command that is not safe, up to the first model that leaves the limits.
         scale: of the command, relative to the excitation as it was designed.
-        models: how many were simulated: each explanation, and with its numbers at either end of their intervals.
+        models: how many may be true: each explanation, and with its numbers at either end of their intervals.
         starts: (S, n) positions at which it began, under the joint offsets of each initialisation; the last one is
             where the machine stands now [rad].
         open_loop: the commands are torques, and nothing brings the joints back.
@@ -313,20 +313,20 @@ class PossibleMotions:
         return [self._scaled(kind, commands) for kind, commands in designed.items()]
 
     def _scaled(self, kind: str, commands: Array) -> tuple[Trial, Safety]:
+        """The largest scale that is safe; where the least is not, those in between are not asked for."""
         middle = middle_command(self.recording)
 
-        def scaled(scale: float) -> Array:
-            return np.asarray(middle + scale * (commands - middle))
+        def at(scale: float) -> tuple[Trial, Safety]:
+            less = middle + scale * (commands - middle)
+            trial = trials_from_rest(self.recording, kind, less)[-1]
+            return replace(trial, initialisation=0), self.safety(kind, less, scale)
 
-        safety = self.safety(kind, commands)
-        if not safety.safe:  # the least first: what is unsafe at a tenth is not asked for in between
-            safety = self.safety(kind, scaled(SCALES[-1]), SCALES[-1])
-            for scale in SCALES[1:-1] if safety.safe else ():
-                more = self.safety(kind, scaled(scale), scale)
-                if more.safe:
-                    safety = more
-                    break
-        return replace(trials_from_rest(self.recording, kind, scaled(safety.scale))[-1], initialisation=0), safety
+        largest, *between, least = SCALES
+        if (designed := at(largest))[1].safe:
+            return designed
+        smallest = at(least)
+        between = between if smallest[1].safe else []
+        return next((one for one in map(at, between) if one[1].safe), smallest)
 
     def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
         """What commands (T, n) do from rest, simulated freely until they end or a model leaves the limits."""
