@@ -92,6 +92,11 @@ def test_a_good_recording_has_no_warnings(tmp_path: Path) -> None:
     assert recording.trials[0].valid.all()
 
 
+def test_a_joint_that_a_neighbour_drags_along_is_not_swapped(tmp_path: Path) -> None:
+    spoil: Spoil = lambda columns: columns.update({"a.position": 0.3 * columns["b.position"]})  # noqa: E731
+    assert read_recording(write(tmp_path, spoil=spoil)).joints == ("a", "b")
+
+
 def test_missing_torque_of_one_joint_is_a_warning(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path, spoil=lambda columns: columns.pop("b.torque")))
     assert recording.trials[0].torque is None
