@@ -116,14 +116,15 @@ def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) 
             )
         others = [_correlation(other, position) if np.ptp(other) > MOVES else 0.0 for other in columns.command.T]
         leader = int(np.argmax(others))
-        # a joint too weak for its command is dragged along by a neighbour, which follows its own
-        leaders_own = _correlation(columns.command[:, leader], columns.position[:, leader])
-        if own < 0.4 and others[leader] > 0.9 and leaders_own < 0.4:
-            raise InputError(
+        if own < 0.4 and others[leader] > 0.9:
+            said = (
                 f"{path}: column '{joint.name}.position', row {row}: it follows the command of "
                 f"'{joints[leader].name}' (correlation {others[leader]:.2f}), not its own ({own:.2f}); "
-                "are the joints swapped?"
             )
+            # a joint too weak for its command is dragged along by a neighbour that follows its own
+            if _correlation(columns.command[:, leader], columns.position[:, leader]) < 0.4:
+                raise InputError(said + "are the joints swapped?")
+            warnings.append(said + "does the neighbour drag it along, or is it a copy of the neighbour's column?")
     return warnings
 
 
