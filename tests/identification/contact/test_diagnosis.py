@@ -5,7 +5,7 @@ import pytest
 
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, Provenance
 from tactile_cube.errors import InputError
-from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, ContactSearch, with_contact
+from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, ContactSearch, Tried, with_contact
 from tactile_cube.identification.contact.fit import ContactFit
 from tactile_cube.identification.contact.trial import compare_contact
 from tactile_cube.measurement.comparing.comparison import comparison_json
@@ -14,6 +14,7 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.replay.hand_replay import ContactModel
+from tactile_cube.simulation.contact_effects import ObjectSize
 from tests.identification.easy_contact import EasyTrial, GrippedTrial, friction
 from tests.measurement.replay.test_hand_replay import source
 
@@ -50,9 +51,21 @@ def test_a_size_is_found_by_the_offsets_that_grips_need(size: float, names: list
     assert found.rivals == []
 
 
+@pytest.mark.parametrize(("sizes", "names"), [((0.005, 0.004, 0.006), ["object_size"]), ((0.005, -0.005, 0.003), [])])
+def test_only_what_the_initialisations_agree_on_is_kept(sizes: tuple[float, ...], names: list[str]) -> None:
+    trials = [GrippedTrial("hold", k, {("object_size", "excess"): size}, {}) for k, size in enumerate(sizes)]
+    said: list[str] = []
+    made = ContactSearch(trials, trials, said.append)  # type: ignore[arg-type]
+    made.found = [Tried(ObjectSize, ContactModel({}), 1e-3, 0.4, 1e-9, "offsets")]
+    fit = made.prove(ContactModel({}))
+    assert [one.effect.name for one in made.found] == names
+    assert [effect for effect, _ in fit.estimates] == names
+    assert ("object_size: the initialisations do not agree that there is any" in said) is not bool(names)
+
+
 def test_what_no_effect_explains_is_unknown() -> None:
     found = search()
-    assert found.verdict(0.02) == "unknown_effect"
+    assert found.verdict(0.0025) == "unknown_effect"
 
 
 def test_an_effect_that_explains_as_much_is_a_rival() -> None:

@@ -3,6 +3,7 @@ import pytest
 
 from tactile_cube.identification.contact.fit import (
     NARROWINGS,
+    ContactFit,
     GroupEstimate,
     contact_unknowns,
     first_value,
@@ -82,6 +83,23 @@ def test_initialisations_that_agree_leave_the_spacing_of_the_last_grid() -> None
 def test_without_a_telling_trial_the_interval_is_everything() -> None:
     estimate = summarise_fit(LATERAL, [said(0, 0.5, telling=False)])
     assert (estimate.value, estimate.low, estimate.high) == (0.9, 0.2, 1.6)
+
+
+@pytest.mark.parametrize(
+    ("values", "stated", "shown"),
+    [
+        ([0.005, 0.006, 0.007], 0.0, True),
+        ([0.005, 0.006, 0.007], 0.006, False),  # news is what the model does not state
+        ([0.005, -0.002, 0.003], 0.0, False),
+        ([0.006], 0.0, True),  # within the spacing of the first grid, 5 mm
+        ([0.004], 0.0, False),
+        ([], 0.0, False),
+    ],
+)
+def test_an_effect_shows_where_the_initialisations_agree(values: list[float], stated: float, shown: bool) -> None:
+    by_initialisation = {("object_size", "excess"): [said(k, value) for k, value in enumerate(values)]}
+    fit = ContactFit(ContactModel({}), {}, by_initialisation)
+    assert fit.shows(ObjectSize, ContactModel({"object_size": {"excess": stated}})) is shown
 
 
 def test_one_trial_alone_gives_a_wide_interval() -> None:

@@ -41,9 +41,9 @@ FITTED, JUDGED = 3, 2  # trials of each kind that are fitted and judged
 LOOKED = 2  # of those that are fitted, how many decide whether an effect helps
 ROUGHLY = 2  # times that the grid is halved for that
 PROMISE = 1.1  # factor by which an effect must lower the cost of those to be judged
-GAIN = 0.15  # least share of the held-out error that an effect must take off
+GAIN = 0.1  # least share of the held-out error that an effect must take off, or of the offsets
 AS_GOOD = 0.1  # an effect that leaves at most this share more is a rival
-P_VALUE = 0.01
+P_VALUE = 0.05  # of a gain that is worth a fit of all initialisations, which decides
 GOOD = 2e-3  # [rad] a grasp is followed no better, with drives known to 10 % and a solver that stops early
 MOST_EFFECTS = 3
 
@@ -106,10 +106,24 @@ class ContactSearch:
             self.rivals = [one for one in helps[1:] if one.error < (1 + AS_GOOD) * best.error]
             contact, before = best.contact, mean_squares(self.validation, best.contact)
 
+    def prove(self, start: ContactModel) -> ContactFit:
+        """Fit what was found to all initialisations and keep what they agree on."""
+        while self.found:
+            fit = fit_contact(self.trials, [one.effect for one in self.found], start, self.say)
+            kept = [one for one in self.found if fit.shows(one.effect, start)]
+            if kept == self.found:
+                return fit
+            for one in self.found:
+                if one not in kept:
+                    self.say(f"{one.effect.name}: the initialisations do not agree that there is any")
+            self.rivals = self.rivals if kept[-1:] == self.found[-1:] else []
+            self.found = kept
+        return ContactFit(start, {}, {})
+
     def verdict(self, left: float) -> Kind:
         """The answer, with `left` of the held-out error [rad]."""
         if not self.found:
-            return "adequate" if left < 2 * GOOD else "unknown_effect"
+            return "adequate" if left < GOOD else "unknown_effect"
         return "ambiguous" if self.rivals else "missing_effect"
 
     def _try(self, effect: type[ContactEffect], contact: ContactModel, before: Array) -> Tried:
@@ -265,10 +279,8 @@ def diagnose_contact(
         validation = some_of_each_kind(grasps.held_out, JUDGED)
         search = ContactSearch(trials, validation, say)
         search.run(grasps.start)
-        fit, end = ContactFit(grasps.start, {}, {}), search.first
-        if search.found:
-            fit = fit_contact(trials, [one.effect for one in search.found], grasps.start, say)
-            end = mean_squares(validation, fit.contact)
+        fit = search.prove(grasps.start)
+        end = mean_squares(validation, fit.contact)
     errors = {"nominal": search.first, "with_effects": end}
     stages = {key: summarise_errors(list(np.sqrt(squares)), grasps.joints) for key, squares in errors.items()}
     return ContactDiagnosis(fit, stages, grasps.noise_floor, [one.trial.name for one in validation], search)

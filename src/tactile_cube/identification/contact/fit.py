@@ -30,6 +30,7 @@ SHARES = (1.0, 0.4)  # of a step that are tried
 TRUSTED = 60.0  # measured numbers as which a trial counts, beside one of what is expected of each unknown
 KNOWN = 0.5  # standard deviation over what was expected, below which the trials know a number
 CONFIDENCE = 0.95
+PROVING = 0.9  # of the interval that must leave out the stated value: three initialisations seldom show more
 FEW = 3  # trials of a first look
 ASKED = 2  # trials of each initialisation, with loads as different as there are
 SOLVER = {
@@ -271,6 +272,14 @@ class ContactFit:
         """Parameters of which no trial knows anything."""
         return [" ".join(key) for key, said in self.by_initialisation.items() if not any(one.telling for one in said)]
 
+    def shows(self, effect: type[ContactEffect], stated: ContactModel) -> bool:
+        """Whether the initialisations agree that a parameter of an effect is another than a contact states."""
+        for unknown in contact_unknowns([effect]):
+            interval = _interval(unknown, self.by_initialisation[effect.name, unknown.parameter.name], PROVING)
+            if interval and abs(interval[0] - unknown.scaled(unknown.of(stated))) > interval[1]:
+                return True
+        return False
+
 
 def fit_contact(
     trials: Sequence[ContactTrial],
@@ -346,18 +355,27 @@ def summarise_fit(unknown: ContactUnknown, by_initialisation: Sequence[GroupEsti
 
     Where none knows anything the value is the neutral one and the interval the whole range.
     """
-    parameter = unknown.parameter
+    parameter, interval = unknown.parameter, _interval(unknown, by_initialisation, CONFIDENCE)
+    if interval is None:
+        return Estimate(value=unknown.neutral, low=parameter.low, high=parameter.high, unit=parameter.unit)
+    mean, half = interval
+    low, value, high = (unknown.unscaled(mean + side * half) for side in (-1, 0, 1))
+    return Estimate(value=value, low=low, high=high, unit=parameter.unit)
+
+
+def _interval(
+    unknown: ContactUnknown, by_initialisation: Sequence[GroupEstimate], confidence: float
+) -> tuple[float, float] | None:
+    """Mean and half of the interval on the scale of `scaled`; None where no initialisation knows anything."""
     values = [unknown.scaled(one.value) for one in by_initialisation if one.telling]
     if not values:
-        return Estimate(value=unknown.neutral, low=parameter.low, high=parameter.high, unit=parameter.unit)
+        return None
     half = unknown.spacing
     if len(values) > 1:
         scatter = float(np.std(values, ddof=1)) / np.sqrt(len(values))
-        half = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * scatter
+        half = float(stats.t.ppf((1 + confidence) / 2, len(values) - 1)) * scatter
         half = max(float(np.hypot(half, SOLVER[unknown.effect.name])), unknown.spacing / 2**NARROWINGS)
-    mean = float(np.mean(values))
-    low, value, high = (unknown.unscaled(mean + side * half) for side in (-1, 0, 1))
-    return Estimate(value=value, low=low, high=high, unit=parameter.unit)
+    return float(np.mean(values)), half
 
 
 def grouped(trials: Sequence[ContactTrial], key: str) -> list[list[ContactTrial]]:
