@@ -3,11 +3,12 @@
     python -m benchmarks.blind.coverage --draws 20
 
 Every draw is a pendulum-like joint of its own, recorded in three initialisations with one hidden effect of known size;
-`identify` is told the effect's name and not its size. Counted are the effect's parameters and the constants fitted
-beside it. Writes coverage.json with every interval and its truth. With `--step 0.002` the recorded world takes the
-model's own steps: what is missed even then is the intervals' fault, what is missed in the finer world alone is the
-time step's. `--told` states that world's rate as controller.rate_hz, and the fit follows it. `--beside cogging@j` hides
-another effect, which nobody tells: the model is wrong then, and not its numbers alone.
+`identify` is told the effect's name and not its size; details of a law stay at their standard values. Counted are the
+effect's parameters and the constants fitted beside it. Writes coverage.json with every interval and its truth. With
+`--step 0.002` the recorded world takes the model's own steps: what is missed even then is the intervals' fault, what is
+missed in the finer world alone is the time step's. `--told` states that world's rate as controller.rate_hz, and the fit
+follows it. `--beside cogging@j` hides another effect, which nobody tells: the model is wrong then, and not its numbers
+alone.
 """
 
 from __future__ import annotations
@@ -58,7 +59,8 @@ def drawn(draw: int, seed: int, step: float, told: bool, beside: list[str], fold
     """
     rng = np.random.default_rng([seed, draw])
     effect = find_effect(EFFECTS[draw % len(EFFECTS)])
-    truth = {one.name: float(one.typical * rng.uniform(*SIZE)) for one in effect.parameters}
+    standard = [one for one in effect.parameters if one.name not in effect.details]
+    truth = {one.name: float(one.typical * rng.uniform(*SIZE)) for one in standard}
     urdf = folder / f"{draw}.urdf"
     urdf.write_text(single_joint_urdf("rig", "j", rng.uniform(0.05, 0.15), rng.uniform(0.03, 0.08), limit=1.2))
     hidden = f"{effect.name}@j: " + ", ".join(f"{name}={value:.6g}" for name, value in truth.items())
@@ -72,7 +74,11 @@ def drawn(draw: int, seed: int, step: float, told: bool, beside: list[str], fold
     fitted = tactile_cube.identify(folder / str(draw), [f"{effect.name}@j"], "engine=fast", say=lambda line: None).model
     known = CONTROLLER | NOMINAL
     constants = [(key, known[key], one["j"]) for key, one in fitted.values.items() if key in known and "j" in one]
-    parameters = [(f"{effect.name}.{name}", truth[name], one) for name, one in fitted.effects[0].parameters.items()]
+    parameters = [
+        (f"{effect.name}.{name}", truth[name], one)
+        for name, one in fitted.effects[0].parameters.items()
+        if name in truth
+    ]
     return [
         Interval(draw, name, value, one.value, one.low, one.high)
         for name, value, one in [*constants, *parameters]

@@ -1,10 +1,15 @@
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.drivetrain.effects.scales import FINGER
 from tactile_cube.errors import InputError
-from tactile_cube.identification.identification import identify_effects
+from tactile_cube.identification import identification
+from tactile_cube.identification.identification import identify_effects, with_effect
 from tests.identification.rigs_of_any_size import Size, simulated
 
 
@@ -17,3 +22,18 @@ def test_the_parameters_to_fit_are_named_as_a_diagnosis_names_them(tmp_path: Pat
 
     with pytest.raises(InputError, match=r"'viscous_friction@a\(diference\)': 'diference' is none .*difference"):
         identify_effects(recording, ["viscous_friction@a(diference)"])
+
+
+@pytest.mark.parametrize(("less", "sign"), [(3.0, 1.0), (5.0, -1.0)])
+def test_of_starts_that_noise_cannot_tell_apart_the_usual_one_is_taken(
+    less: float, sign: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(identification, "residual_candidates", lambda *_: [])
+    search = SimpleNamespace(
+        shooting=SimpleNamespace(sizes={"a": FINGER}),
+        problem=SimpleNamespace(weight=np.ones(1000)),
+        fitted=None,
+        refit=lambda _, one: (one, SimpleNamespace(cost=1000.0 - less * (one.form["mass"] < 0.0), form=one.form)),
+    )
+    taken: Any = with_effect(search, None, find_effect("payload"), "a")  # type: ignore[arg-type]
+    assert np.sign(taken.form["mass"]) == sign

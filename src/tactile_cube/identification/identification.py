@@ -12,7 +12,7 @@ from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.disturbances import in_time
-from tactile_cube.identification.fitting.gauss_newton import Fit, fit
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation
 from tactile_cube.identification.fitting.intervals import Fitted, final_fit
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
@@ -26,6 +26,8 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
 from tactile_cube.measurement.split import held_out_split
+
+CHI_SQUARED_95 = 3.84  # of one degree of freedom: squared error [sensor variances] that noise takes off by itself
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,8 @@ def _check_parameters(effect: type[Effect], joint: str, parameters: Sequence[str
 def with_effect(search: Search, frozen: Fit, effect: type[Effect], joint: str, parameters: Sequence[str] = ()) -> Fit:
     """Return a frozen fit with one more effect, in whichever of its forms and from whichever start it does best.
 
-    Everything else stays frozen: the model that it returns is where a fit of everything begins.
+    Of fits that differ by less than noise makes them, it is that of the first start, the usual one: a payload has a
+    positive mass. Everything else stays frozen: the model that it returns is where a fit of everything begins.
     With `parameters`, those of a form are fitted that has them, or beside a form's own.
     """
     every = candidates(search.shooting.sizes, [effect])
@@ -166,4 +169,6 @@ def with_effect(search: Search, frozen: Fit, effect: type[Effect], joint: str, p
         neutral = {p.name: p.neutral for p in effect.parameters if p.name in parameters}
         having = [replace(c, form={**neutral, **c.form}) for c in options]
     refitted = [search.refit(frozen, option)[1] for option in (having if parameters else options)]
-    return min(refitted, key=lambda one: one.cost)
+    best = min(one.cost for one in refitted)
+    same = best + CHI_SQUARED_95 * noise_inflation(search.problem, best)
+    return next(one for one in refitted if one.cost <= same)
