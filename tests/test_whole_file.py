@@ -24,3 +24,11 @@ def test_a_write_that_fails_leaves_what_was_there_and_nothing_else(tmp_path: Pat
         write_whole(tmp_path / "a", b"half", "no bytes")  # type: ignore[arg-type]
     assert (tmp_path / "a").read_bytes() == b"before"
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_a_link_in_the_place_of_the_draft_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "other").write_text("theirs")
+    (tmp_path / "a.partial").symlink_to(tmp_path / "other")
+    write_whole(tmp_path / "a", b"mine")
+    assert (tmp_path / "other").read_text() == "theirs"
+    assert (tmp_path / "a").read_bytes() == b"mine"

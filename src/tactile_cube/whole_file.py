@@ -16,7 +16,8 @@ def write_whole(path: Path, *parts: bytes | memoryview) -> None:
     """
     partial = path.with_name(f"{path.name}.partial")
     try:
-        with partial.open("wb") as file:
+        partial.unlink(missing_ok=True)  # one left behind, or a link to elsewhere
+        with partial.open("xb") as file:
             for part in parts:
                 file.write(part)
             file.flush()

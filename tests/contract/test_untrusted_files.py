@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -20,6 +21,7 @@ from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, save_policy
 from tactile_cube.composition import composed
 from tactile_cube.deployment.training_setting import training_setting
+from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import environment
 from tactile_cube.evaluation.policies import HoldPolicy, PolicySource
@@ -138,6 +140,15 @@ def test_an_effect_of_its_owner_is_not_imported() -> None:
         config = {"env": sound()["env"] | named}
         with pytest.raises(InputError, match=r"own_effects=\[stranger\.Harm\]"):
             evaluated(config)
+    assert untouched()
+
+
+def test_the_name_of_an_effect_does_not_make_a_loaded_package_import_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    lazy = ModuleType("lazy")
+    lazy.__getattr__ = lambda name: os.mkdir(MARK)  # type: ignore[method-assign]
+    monkeypatch.setitem(sys.modules, "lazy", lazy)
+    with pytest.raises(InputError, match="'lazy' has no subclass of Effect named 'part'"):
+        find_effect("lazy.part")
     assert untouched()
 
 

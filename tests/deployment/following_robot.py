@@ -51,10 +51,12 @@ class FollowingRobot:
     def wait(self) -> float:
         self.ticks += 1
         self.now = self.latest + TICK
-        for spoil in self.in_wait[self.ticks]:
-            spoil(self)
-        if np.isfinite(self.now):
-            self.latest = max(self.latest, self.now)
+        try:
+            for spoil in self.in_wait[self.ticks]:
+                spoil(self)
+        finally:
+            if np.isfinite(self.now):
+                self.latest = max(self.latest, self.now)
         return self.now
 
     def read(self) -> Reading | None:

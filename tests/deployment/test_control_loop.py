@@ -5,11 +5,13 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from tactile_cube.deployment import run_loop as run_loop_module
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
@@ -108,6 +110,7 @@ def test_enter_on_the_terminal_confirms_but_not_what_was_typed_before(monkeypatc
     robot = FollowingRobot(HOME)
     robot.confirms = False
     robot.in_read[700].append(lambda robot: os.write(keyboard, b"\x04"))  # Ctrl-D
+    robot.in_read[800].append(lambda robot: os.write(keyboard, b"x\x04"))  # half a line
     robot.in_read[1000].append(lambda robot: os.write(keyboard, b"\n"))
     lines: list[str] = []
     run(robot, opened=OPEN, say=lines.append)
@@ -364,13 +367,49 @@ def test_the_second_signal_ends_a_policy_that_hangs_and_an_ignored_one_ends_noth
     signal.signal(signal.SIGHUP, handler)
 
 
-def test_a_robot_that_cannot_wait_any_more_gets_the_hold_once() -> None:
-    robot = FollowingRobot(HOME)
-    for tick in range(RUNNING, RUNNING + 3):
+@pytest.mark.parametrize("times", [1, 2, 1000])
+def test_a_robot_that_cannot_wait_any_more_gets_the_whole_hold(times: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = FollowingRobot(HOME, follow=0.0)
+    monkeypatch.setattr(time, "sleep", lambda seconds: setattr(robot, "latest", robot.latest + seconds))
+    for tick in range(RUNNING + 100, RUNNING + 100 + times):
         robot.in_wait[tick].append(raising(OSError("gone")))
     with pytest.raises(OSError, match="gone"):
         run(robot)
-    assert sum(one.mode is Mode.STOPPED for one in robot.sent) == 1
+    assert np.abs(robot.sent[-HOLD_TICKS - 20].q_d - HOME).max() > 1e-3
+    np.testing.assert_array_equal(robot.sent[-HOLD_TICKS].q_d, HOME)
+
+
+def test_the_hold_ends_only_when_it_rests_however_slow_commands_may_change() -> None:
+    robot = FollowingRobot(HOME, follow=0.0)
+    limits = JointLimits(**vars(LIMITS) | {"rate": 0.1})
+    assert run(robot, limits=limits).reason == "time is over"
+    held = [one.q_d for one in robot.sent if one.mode is Mode.STOPPED]
+    assert len(held) > 2 * HOLD_TICKS
+    np.testing.assert_array_equal(held[-HOLD_TICKS], HOME)
+
+
+def test_a_second_signal_neither_shortens_the_hold_nor_keeps_the_robot_from_being_closed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupt(robot: FollowingRobot) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    class Closing(FollowingRobot):
+        def close(self) -> None:
+            interrupt(self)
+            super().close()
+
+    robot = Closing(HOME, follow=0.0)
+    for tick in (RUNNING + 100, RUNNING + 110, RUNNING + 120):
+        robot.in_wait[tick].append(interrupt)
+    assert run(robot).reason == "interrupted by SIGINT"
+    np.testing.assert_array_equal(robot.sent[-HOLD_TICKS].q_d, HOME)
+    monkeypatch.setattr(run_loop_module, "PATIENCE", 0.0)
+    robot = FollowingRobot(HOME)
+    for tick in (RUNNING, RUNNING + 10):
+        robot.in_wait[tick].append(interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run(robot)
 
 
 def test_a_hold_that_is_lost_is_sent_again_and_a_link_that_stays_broken_is_said() -> None:
@@ -381,7 +420,7 @@ def test_a_hold_that_is_lost_is_sent_again_and_a_link_that_stays_broken_is_said(
             robot.in_send[tick].append(raising(OSError("gone")))
         with contextlib.nullcontext() if lost == 3 else pytest.raises(OSError, match="gone"):
             assert run(robot).reason == "interrupted by SIGTERM"
-        assert sum(one.mode is Mode.STOPPED for one in robot.sent) == max(HOLD_TICKS - lost, 1)
+        assert sum(one.mode is Mode.STOPPED for one in robot.sent) >= (HOLD_TICKS if lost == 3 else 1)
 
 
 # --- settings --------------------------------------------------------------------------------------------------------

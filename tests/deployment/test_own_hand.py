@@ -40,7 +40,10 @@ def policy(tmp_path: Path) -> Path:
 
 
 def test_its_contract_has_its_joints_gains_object_and_the_start_around_it(policy: Path, tmp_path: Path) -> None:
-    contract = json.loads(tactile_cube.export(policy, tmp_path / "two.npz").read_text())
+    with pytest.raises(InputError, match="from the policy's file alone; name the hand: hand=two_fingers"):
+        tactile_cube.export(policy, tmp_path / "two.npz")
+    named = ["hand=three_finger", "hand.name=two_fingers", "~hand.fingers.thumb"]
+    contract = json.loads(tactile_cube.export(policy, tmp_path / "two.npz", *named).read_text())
     assert len(contract["joints"]) == len(contract["start_angles"]["angles"]) == JOINTS
     assert contract["observation"]["shape"] == ["batch", 80]
     assert (contract["impedance"]["kp"]["value"], contract["impedance"]["kd"]["value"]) == (3.0, 0.3)
@@ -114,6 +117,12 @@ def test_a_policy_of_files_elsewhere_wants_them_named_and_knows_its_urdf(elsewhe
     Path("mine.urdf").write_text(Path("mine.urdf").read_text() + "\n")
     with pytest.raises(InputError, match="its URDF has the SHA-256"):
         tactile_cube.deploy(elsewhere, "seconds=0.1", *hand, *object_, say=lambda line: None)
+
+
+def test_a_robot_is_not_driven_by_limits_that_only_the_policy_states(policy: Path) -> None:
+    robot = ["robot=ros2", "robot.states=/states", "robot.commands=/commands"]
+    with pytest.raises(InputError, match="what the drives of hand 'two_fingers' bear"):
+        tactile_cube.deploy(policy, *robot, say=lambda line: None)
 
 
 @pytest.mark.parametrize("drives", [{"torque_limit": 1.1}, {"kp": 1e-9}, {"kp": 9.0}, {"kd": [0.3] * 7 + [1e3]}])

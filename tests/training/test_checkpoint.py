@@ -70,6 +70,27 @@ def test_when_both_are_damaged_the_file_and_the_remedy_are_named(tmp_path: Path)
     assert tiny_run(tmp_path, resume="never").learner.steps == 0
 
 
+def test_files_of_others_beside_the_rows_are_kept_and_a_link_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "replay").mkdir()
+    (tmp_path / "replay" / "measured.csv").write_text("mine")
+    finish(tiny_run(tmp_path))
+    finish(tiny_run(tmp_path, resume="never"))
+    assert (tmp_path / "replay" / "measured.csv").read_text() == "mine"
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "replay").symlink_to(tmp_path / "replay")
+    with pytest.raises(InputError, match="replay: is a link"):
+        tiny_run(tmp_path / "run")
+
+
+def test_a_folder_in_the_place_of_a_checkpoint_is_damage(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path))
+    for name in (FILE, BEFORE):
+        (tmp_path / name).unlink()
+        (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=r"checkpoint\.pt: is a folder"):
+        tiny_run(tmp_path)
+
+
 @pytest.mark.parametrize("failing", ["rows", "state", "rename"])
 def test_a_full_disk_leaves_the_checkpoint_before_whole(
     tmp_path: Path, reference: torch.Tensor, monkeypatch: pytest.MonkeyPatch, failing: str

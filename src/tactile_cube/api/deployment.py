@@ -76,7 +76,18 @@ def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSet
     if hand is not None and not trained:
         return TrainingSetting.of(hand)
     object_: Any = OmegaConf.to_container(config.object, resolve=True) if config.get("object") else None
-    return training_setting(network.info, hand, object_, network.label)
+    setting = training_setting(network.info, hand, object_, network.label)
+    if hand is None and setting.hand.drive and not _simulated(config):
+        name = setting.hand.name
+        raise InputError(
+            f"{network.label}: what the drives of hand '{name}' bear, and so the limits of every command, would come "
+            f"from the policy's file alone; name the hand: hand={name}"
+        )
+    return setting
+
+
+def _simulated(config: Any) -> bool:
+    return str(config.get("robot", {}).get("_target_")).endswith(".SimulatedHand")
 
 
 @dataclass(frozen=True)
@@ -136,8 +147,7 @@ def run_deployment(job: Job, say: Say) -> DeploymentResult:
     config, network = job.config, load_policy(job.config.policy)
     setting = _setting(config, network, config.motion == "policy")
     limits = robot_limits(setting, config.rate_limit)
-    target = str(config.robot._target_)
-    simulated = target.endswith(".SimulatedHand")
+    target, simulated = str(config.robot._target_), _simulated(config)
     own = {"setting": setting} if simulated else {"hand": setting.hand} if target.startswith("tactile_cube.") else {}
     runs, turned = [], []
     for number in range(config.runs):

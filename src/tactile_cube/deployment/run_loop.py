@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import signal
 import sys
@@ -69,7 +70,9 @@ def _table(number: int, run: Log) -> TrialTable:
 
 
 NO_HAND = 5.0  # [s] without believable measurements at the beginning
-HOLD_TICKS = 200  # of the hold at the end: the command comes to rest, and a lost message does no harm
+HOLD_TICKS = 200  # of the hold once its command rests, so that a lost message does no harm
+PATIENCE = 5.0  # [s] that the hold and the closing have before a further signal ends them
+TICK = 0.001  # [s] of a robot that cannot wait any more
 TICK_TIMES = {"median": 0.5, "p99.9": 0.999, "largest": 1.0}
 Say = Callable[[str], None]
 
@@ -99,7 +102,7 @@ def run_loop(loop: ControlLoop, robot: Robot, say: Say = print) -> LoopRun:
     However it ends, by an exception too, the hold is sent and the robot is closed.
     """
     run = LoopRun()
-    with noted_signals() as signals, closing(robot):
+    with noted_signals(lambda: loop.mode is Mode.STOPPED) as signals, closing(robot):
         try:
             loop.warm_up()
             _until_stopped(loop, robot, say, run, signals)
@@ -144,19 +147,30 @@ def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun) -> None:
 
 
 def _hold(loop: ControlLoop, robot: Robot, now: float) -> None:
-    """Send the hold at once, then until it has come to rest at the limited rate."""
-    failure: Exception | None = None
-    for _ in range(HOLD_TICKS):
+    """Send the hold at once, then until it has come to rest at the limited rate, and `HOLD_TICKS` more."""
+    lost: Exception | None = None
+    broken: Exception | None = None
+    before, resting = None, 0
+    while resting < HOLD_TICKS:
         q_d = loop.tick(now)
         if q_d is None:
             return
+        resting = resting + 1 if before is not None and np.array_equal(q_d, before) else 0
+        before = q_d.copy()  # what is sent is the robot's
         try:
             robot.send(q_d)
-            failure = None
+            lost = None
         except Exception as error:  # the next message may get through
-            failure = error
-        now = robot.wait()
-    if failure:
+            lost = error
+        if broken is None:
+            try:
+                now = robot.wait()
+                continue
+            except Exception as error:  # from here on by our own clock, which is late rather than early
+                broken = error
+        time.sleep(TICK)
+        now += TICK
+    if failure := lost or broken:
         raise failure
 
 
@@ -170,29 +184,43 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class EnterKey:
-    """Enter on the terminal, where there is one, from now on: what was typed before does not count."""
+    """Enter on the terminal, where there is one to read from, from now on: what was typed before does not count."""
 
     def __init__(self) -> None:
-        self.usable = sys.stdin is not None and sys.stdin.isatty()
+        self.usable = sys.stdin is not None and sys.stdin.isatty() and _in_front(sys.stdin.fileno())
         if self.usable:
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
     def pressed(self) -> bool:
-        """Whether Enter has been pressed; never waits."""
-        return self.usable and bool(select.select([sys.stdin], [], [], 0.0)[0]) and sys.stdin.readline() != ""
+        """Whether Enter has been pressed; never waits, not for the rest of a line either."""
+        if not self.usable or not select.select([sys.stdin], [], [], 0.0)[0]:
+            return False
+        return b"\n" in os.read(sys.stdin.fileno(), 4096)
+
+
+def _in_front(terminal: int) -> bool:
+    """Whether this process may read the terminal: one in the background is stopped when it tries."""
+    try:
+        return os.tcgetpgrp(terminal) == os.getpgrp()
+    except OSError:  # not the one that this process is controlled from
+        return True
 
 
 @contextmanager
-def noted_signals() -> Iterator[list[str]]:
+def noted_signals(stopped: Callable[[], bool]) -> Iterator[list[str]]:
     """Note SIGINT (Ctrl-C), SIGTERM and SIGHUP by name instead of ending the program.
 
-    The second one raises KeyboardInterrupt. A signal that was ignored at the start, as by nohup, stays ignored.
+    The second one raises KeyboardInterrupt, but once the loop has `stopped` only `PATIENCE` after the first.
+    A signal that was ignored at the start, as by nohup, stays ignored.
     """
     noted: list[str] = []
+    first = 0.0
 
     def note(number: int, frame: FrameType | None) -> None:
+        nonlocal first
         noted.append(signal.Signals(number).name)
-        if len(noted) > 1:
+        first = first or time.monotonic()
+        if len(noted) > 1 and not (stopped() and time.monotonic() - first < PATIENCE):
             raise KeyboardInterrupt
 
     kinds = ENDING if threading.current_thread() is threading.main_thread() else ()

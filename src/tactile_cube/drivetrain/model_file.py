@@ -1,6 +1,7 @@
 """The one file that says what was identified: values, intervals, effects, provenance and errors, as plain YAML."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -152,7 +153,7 @@ class ModelFile(Strict):
     @model_validator(mode="after")
     def _said_once(self) -> "ModelFile":
         for key, names in (("joints", self.joints), ("effects", [one.effect for one in self.effects])):
-            twice = [name for name in names if names.count(name) > 1]
+            twice = [name for name, count in Counter(names).items() if count > 1]
             if twice:
                 raise ValueError(f"{key} names '{twice[0]}' more than once")
         return self

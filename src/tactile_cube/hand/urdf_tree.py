@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -66,7 +67,7 @@ def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
         raise InputError(f"URDF: it has {len(joints)} joints; at most {limits.JOINTS} are read")
     for kind, elements in (("link", links), ("joint", joints)):
         names = [attribute(element, "name", f"a {kind}") for element in elements]
-        twice = [name for name in set(names) if names.count(name) > 1]
+        twice = [name for name, count in Counter(names).items() if count > 1]
         if twice:
             raise InputError(f"URDF: two {kind}s are called '{twice[0]}'; rename one")
     bodies = {str(link.get("name")): body_of(link) for link in links}

@@ -2,7 +2,6 @@
 
 import hashlib
 import io
-import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,8 @@ from torch import Tensor
 
 from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
-from tactile_cube.training.replay_files import FOLDER, ReplayFiles, Segment
+from tactile_cube.training.replay_files import ReplayFiles, Segment
+from tactile_cube.untrusted_file import regular
 from tactile_cube.whole_file import sync_folder, write_whole
 
 FILE, BEFORE = "checkpoint.pt", "checkpoint_before.pt"
@@ -88,7 +88,7 @@ class Checkpoints:
         refusals: list[InputError] = []
         for path in (self.folder / FILE, self.folder / BEFORE):
             try:
-                state = self._load(path) if path.is_file() else None
+                state = self._load(path) if path.exists() else None
             except InputError as error:
                 refusals.append(error)
                 continue
@@ -118,7 +118,7 @@ class Checkpoints:
         """Delete them all, to start over."""
         for name in (FILE, BEFORE):
             (self.folder / name).unlink(missing_ok=True)
-        shutil.rmtree(self.folder / FOLDER, ignore_errors=True)
+        self._replay.clear()
 
 
 class _Ring(BaseModel):
@@ -146,8 +146,7 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
     Raises:
         InputError: the file is missing or damaged, claims more than it holds, or has numbers that are not finite.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: no such checkpoint")
+    regular(path)
     try:
         content = memoryview(path.read_bytes())
         head, content = bytes(content[: len(HEAD) + 65]), content[len(HEAD) + 65 :]

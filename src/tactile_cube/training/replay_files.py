@@ -1,7 +1,9 @@
 """The replay on disk: a file for the rows that each checkpoint adds, none of them ever rewritten."""
 
 import hashlib
+import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.whole_file import write_whole
 
 FOLDER = "replay"
+OWN = re.compile(r"\d{12,}\.f32(\.partial)?")
 
 Segment = tuple[int, int, str]
 """Number of the first row, number of rows, SHA-256 of their float32 values."""
@@ -21,7 +24,14 @@ class ReplayFiles:
     """Rows by their number in order of arrival; row n lies at n % capacity of the ring."""
 
     def __init__(self, folder: Path):
+        """Take the folder of a run.
+
+        Raises:
+            InputError: its `replay` is a link, behind which rows would be written and deleted.
+        """
         self.folder = folder / FOLDER
+        if self.folder.is_symlink():
+            raise InputError(f"{self.folder}: is a link; a run keeps its replay in its own folder: delete the link")
         self._segments: list[Segment] = []
 
     def append(self, rows: Tensor, written: int, capacity: int) -> list[Segment]:
@@ -78,11 +88,17 @@ class ReplayFiles:
             raise InputError(f"{self.folder}: holds the replay up to row {at}, the checkpoint claims {written} rows")
 
     def delete_all_but(self, segments: Iterable[Segment]) -> None:
-        """Delete what no checkpoint refers to."""
+        """Delete segments that no checkpoint refers to, and nothing else."""
         wanted = {self._path(first) for first, _, _ in segments}
         for path in self.folder.glob("*"):
-            if path not in wanted:
+            if OWN.fullmatch(path.name) and path not in wanted:
                 path.unlink(missing_ok=True)
+
+    def clear(self) -> None:
+        """Delete all segments, and the folder if nothing else is in it."""
+        self.delete_all_but(())
+        with suppress(OSError):
+            self.folder.rmdir()
 
     def _path(self, first: int) -> Path:
         return self.folder / f"{first:012d}.f32"

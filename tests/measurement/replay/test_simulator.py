@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactile_cube.drivetrain.effects.command import CommandDelay, RateLimit
 from tactile_cube.drivetrain.effects.transmission import Backlash
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
@@ -15,6 +16,7 @@ from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model, Term
 from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
 from tactile_cube.measurement.replay.simulator import Engine, Simulator, free_run
+from tactile_cube.measurement.replay.windows import cut
 from tests.measurement.small_rig import write
 
 SHARED = Path(__file__).parents[4] / "shared" / "recordings"
@@ -68,6 +70,24 @@ def test_a_free_run_starts_where_the_first_row_is_within_a_smooth_play(recording
     play = Term(Backlash, "a", {"play": 0.0, "gap": 0.0, "smooth": 0.03, "softness": 0.004, "crossing": 0.0}, ())
     ((result,),) = Simulator(recording).free_runs([replace(nominal_model(recording), terms=(play,))], [trial])
     assert result.position[:, 0] == pytest.approx(0.1, abs=1e-6)
+
+
+def delayed(seconds: float) -> Term:
+    return Term(CommandDelay, "a", {"delay": seconds}, ())
+
+
+@pytest.mark.parametrize("terms", [(), (delayed(0.1),), (delayed(0.1), Term(RateLimit, "a", {"speed": 0.2}, ()))])
+def test_only_the_past_that_effects_remember_is_played_and_nothing_changes(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch, terms: tuple[Term, ...]
+) -> None:
+    model = replace(nominal_model(recording), terms=terms)
+    windows = cut(recording, np.full(2, 1e-4), segment=8)
+    assert windows.history == 240
+    assert np.any(windows.time > 2.0)
+    simulator = Simulator(recording)
+    some = simulator.simulate([model], [windows])
+    monkeypatch.setattr(Simulator, "_past", lambda self, model, windows: windows.history * windows.substeps)
+    assert np.array_equal(simulator.simulate([model], [windows]), some)
 
 
 @pytest.mark.parametrize(("read", "felt"), [("after", 0), ("before", 1)])

@@ -171,7 +171,7 @@ def _own_effect(path: str) -> EffectClass:
             f"effect '{path}' is a class of its owner's, whose code no file can have run; if you trust it, name it "
             f"yourself: own_effects=[{path}] on the command line, import {module_name} in a program"
         )
-    found = getattr(sys.modules[module_name], class_name, None)
+    found = vars(sys.modules[module_name]).get(class_name)  # getattr would let a module import another one
     if not (isinstance(found, type) and issubclass(found, Effect)):
         raise InputError(f"effect '{path}': '{module_name}' has no subclass of Effect named '{class_name}'")
     return found

@@ -133,6 +133,8 @@ class CommandDelay(Effect):
     stage = Stage.COMMAND
     parameters = (Parameter("delay", "s", 0.0, 0.0, LONGEST, 0.02, "2-60 ms"),)
 
+    bounded_memory = True
+
     @classmethod
     def state_size(cls, dt: float) -> int:
         """Return the size of: first-call flag, write index, ring of past commands."""

@@ -125,6 +125,8 @@ class Effect:
     """Names of simpler effects that are special cases of this one."""
     state_size: ClassVar[Any] = 0
     """How many numbers the law keeps between steps, zero after a reset; a class method of the step [s] if it counts."""
+    bounded_memory: ClassVar[bool] = False
+    """Whether the law of a COMMAND remembers no more steps than its state has numbers; older ones are not played."""
     weighs: ClassVar[bool] = False
     """Whether the law reads WEIGHT, which makes a step several per cent slower."""
     chosen_starts: ClassVar[int] = 0

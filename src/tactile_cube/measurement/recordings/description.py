@@ -1,5 +1,6 @@
 """What recording.yaml may say: the rig, its controller, the values its owner believes, and the trials."""
 
+from collections import Counter
 from typing import Annotated, Literal
 
 import numpy as np
@@ -136,7 +137,7 @@ class Description(Strict):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Description":
-        twice = {joint for joint in self.joints if self.joints.count(joint) > 1}
+        twice = {joint for joint, count in Counter(self.joints).items() if count > 1}
         if twice:
             raise ValueError(f"joints names {sorted(twice)} more than once")
         holding = [index for index, trial in enumerate(self.trials) if trial.object is not None]

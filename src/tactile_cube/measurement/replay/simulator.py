@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
 from tactile_cube.errors import InputError
@@ -182,7 +182,7 @@ class Simulator:
         if self._world is not None:
             self._in_world(self._world, windows, memory, rows, signals)
         else:
-            self._in_closed_form(windows, correction, memory, rows, signals, pool)
+            self._in_closed_form(windows, self._past(model, windows), correction, memory, rows, signals, pool)
         jump = simulated_jumps(signals[:, :, 2], windows)
         shown = signals[:, :: windows.substeps]
         free = free_way(self.plant, memory[:, None], jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
@@ -210,6 +210,7 @@ class Simulator:
     def _in_closed_form(
         self,
         windows: Windows,
+        past: int,
         correction: Array,
         memory: Array,
         rows: NDArray[np.int64],
@@ -217,13 +218,14 @@ class Simulator:
         pool: ThreadPoolExecutor | None,
     ) -> None:
         count, fine = len(windows), windows.substeps
+        commands = np.ascontiguousarray(windows.commands[:, windows.history * fine - past :])
 
         def run(first: int, last: int) -> None:
             self.plant.kernel.segments_batch(
-                windows.commands,
+                commands,
                 np.arange(count),
                 np.full(count, signals.shape[1]),
-                windows.history * fine,
+                past,
                 1,
                 windows.segment * fine,
                 windows.position,
@@ -242,6 +244,12 @@ class Simulator:
         else:
             parts = [count * k // self.workers for k in range(self.workers + 1)]
             list(pool.map(run, parts[:-1], parts[1:]))
+
+    def _past(self, model: Model, windows: Windows) -> int:
+        """Steps before a window that its effects on the command remember."""
+        longest = windows.history * windows.substeps
+        effects = [term.effect for term in model.terms if term.effect.stage is Stage.COMMAND]
+        return max((min(e.kept(self.plant.dt), longest) if e.bounded_memory else longest for e in effects), default=0)
 
     def _in_world(
         self, world: RigWorld, windows: Windows, memory: Array, rows: NDArray[np.int64], signals: Array
