@@ -3,6 +3,7 @@
 import gzip
 import io
 import os
+import re
 import stat
 from collections.abc import Callable
 from pathlib import Path
@@ -103,7 +104,7 @@ def test_text_in_a_csv_is_named_with_its_row(tmp_path: Path) -> None:
     rows = ["time,a.command,a.position,b.command,b.position"] + [f"{k / 100},0,0,0,0" for k in range(40)]
     rows[8] = "0.07,0,oops,0,0"
     with_first(tmp_path, "first.csv").write_text("\n".join(rows))
-    assert "first.csv: column 'a.position', row 7: expected a number, received 'oops'" in error_of(tmp_path)
+    assert "first.csv: column 'a.position', row 7: expected a number, not 'oops'" in error_of(tmp_path)
 
 
 def test_degrees_within_wide_limits_are_recognised_by_the_torque(tmp_path: Path) -> None:
@@ -158,6 +159,13 @@ def test_a_damaged_file_or_folder_is_named(tmp_path: Path) -> None:
     assert "first.parquet: not a complete .parquet file" in error_of(tmp_path)
 
 
+def test_a_joint_without_inertia_is_named(tmp_path: Path) -> None:
+    folder = write(tmp_path, setting({"nominal.reflected_inertia": 0.0}))
+    urdf = folder / "rig.urdf"
+    urdf.write_text(re.sub("<inertial>.*?</inertial>", "", urdf.read_text(), flags=re.DOTALL))
+    assert "rig.urdf: joint 'a' moves no inertia" in error_of(tmp_path)
+
+
 def test_an_npz_file_that_is_a_trap_is_refused(tmp_path: Path) -> None:
     path = with_first(tmp_path, "first.npz")
     np.savez(path, time=np.arange(100.0))
@@ -171,6 +179,9 @@ def test_an_npz_file_that_is_a_trap_is_refused(tmp_path: Path) -> None:
     with ZipFile(path, "w", ZIP_DEFLATED) as archive:
         archive.writestr("time.npy", header.getvalue() + bytes(800))
     assert "claims 1.6e+04 MB, 1.6e+04 of them for 'time'" in error_of(tmp_path)
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        archive.writestr("time.npy", b"\x93NUMPY\x02\x00" + (100_000_000).to_bytes(4, "little") + bytes(800))
+    assert "'time.npy' has a header that no plain array needs" in error_of(tmp_path)
 
 
 def test_damping_of_zero_is_a_warning(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
+from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.disturbances import Disturbance, in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit
@@ -35,6 +36,7 @@ from tactile_cube.measurement.replay.windows import steps_per_row
 
 UNPROVEN = 3
 FAR_OFF = 10.0  # a model as many times further off than its steps hides them, until it is known what it lacks
+MOST_STEPS = 1000  # from row to row: more are a sign of a wrong inertia, and would take days
 MUCH_LONGER = 4  # times as long are steps that are worth a search of their own
 
 
@@ -161,6 +163,11 @@ def in_long_steps_first(asked: Inquiry) -> Inquiry:
     recording, effects, known, said = asked.recording, asked.effects, asked.known, list[str]()
     fine = resolved(recording, effects, said.append, known)
     off = stated_error(recording, effects, known) / FAR_OFF
+    if _steps(fine) > MOST_STEPS:
+        raise InputError(
+            f"{recording.rig.path}: gains and inertias call for {_steps(fine)} steps of simulation a row, at most "
+            f"{MOST_STEPS} are made; check kp, kd, nominal.reflected_inertia and the inertias of the URDF"
+        )
     quick = resolved(recording, effects, said.append, known, off) if off > 1.0 else fine
     if MUCH_LONGER * _steps(quick) > _steps(fine):
         asked.say(f"{_steps(fine)} steps of simulation a sample")

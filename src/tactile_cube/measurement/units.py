@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 TURNS, SLIDES = "rad", "m"
 EITHER = "rad or m"
+MILLION = 1e6  # beyond it numbers are written as powers of ten
 THOUSANDTHS = {TURNS: "mrad", SLIDES: "mm", EITHER: "mrad or mm"}
 SLIDING = (("N m", "N"), ("kg m^2", "kg"), ("rad", "m"))
 
@@ -21,8 +22,9 @@ def milli(value: float, unit: str = TURNS, digits: int = 3) -> str:
 
 
 def short(value: float, digits: int = 3) -> str:
-    """Significant digits, no powers of ten: 0.0471, 12.3, 382."""
-    return f"{value:.0f}" if abs(value) >= 10**digits * 0.9995 / 10 else f"{value:.{digits}g}"
+    """Significant digits, no powers of ten below a million: 0.0471, 12.3, 382."""
+    whole = 10**digits * 0.9995 / 10 <= abs(value) < MILLION
+    return f"{value:.0f}" if whole else f"{value:.{digits}g}"
 
 
 def of_joint(text: str, unit: str) -> str:

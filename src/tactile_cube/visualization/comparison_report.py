@@ -4,7 +4,7 @@ from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.measurement.comparing.comparison import AT_THE_FLOOR, Comparison
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.units import THOUSANDTHS, common_unit, milli, short
+from tactile_cube.measurement.units import MILLION, THOUSANDTHS, common_unit, milli, short
 from tactile_cube.visualization import comparison_figures as figures
 from tactile_cube.visualization.report import Block, Figure, Listing, Report, Section, Table
 
@@ -27,7 +27,7 @@ def summary(comparison: Comparison) -> str:
     errors, floor, raw = comparison.errors, comparison.floor, comparison.raw[0]
     unit = common_unit(comparison.recording.units.values())
     rows = [
-        f"{joint:<16}{_numbers(error, floor.joints[joint], raw.joints[joint])}{comparison.fit[joint]:>7.1f} %"
+        f"{joint:<16}{_numbers(error, floor.joints[joint], raw.joints[joint])}{_cell(comparison.fit[joint], 7, 1)} %"
         for joint, error in errors.joints.items()
     ]
     lines = [
@@ -59,13 +59,22 @@ def outcome(comparison: Comparison) -> str:
         f"The simulated joints are {milli(comparison.errors.overall, unit)} (RMS) away from the measured ones; "
         f"{milli(comparison.floor.overall, unit)} would be noise alone."
     )
+    if comparison.diverged:
+        return (
+            f"{head} This simulation tells nothing: its own time step changes it by more than the joints move. Gains "
+            "too stiff for the inertia do that: check kp, kd, nominal.reflected_inertia and the URDF's inertias."
+        )
     if comparison.at_the_floor:
         return f"{head} The model is as good as this recording can tell."
     return f"{head} That is {short(comparison.ratio)} times the noise: {comparison.sentences[0]}."
 
 
 def _numbers(error: float, floor: float, raw: float) -> str:
-    return f"{1e3 * error:>9.3f}{1e3 * floor:>9.3f}{error / floor:>15.2f}{1e3 * raw:>9.3f}"
+    return f"{_cell(1e3 * error, 9, 3)}{_cell(1e3 * floor, 9, 3)}{_cell(error / floor, 15, 2)}{_cell(1e3 * raw, 9, 3)}"
+
+
+def _cell(value: float, width: int, digits: int) -> str:
+    return f"{value:>{width}.{digits}f}" if abs(value) < MILLION else f"{value:>{width}.2g}"
 
 
 def _source(floor: NoiseFloor) -> str:

@@ -6,6 +6,7 @@ import pytest
 from tactile_cube.measurement.comparing import comparison as module
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.visualization.comparison_report import outcome
 from tests.measurement.small_rig import setting, table, write
 
 
@@ -43,3 +44,12 @@ def test_steps_are_shorter_where_the_sensors_would_show_their_error(
     smaller = comparison.floor.step_size["a"] / usual.floor.step_size["a"]
     assert smaller == pytest.approx(1.0 if used == USUAL_STEP else 1.0 / (module.FINER - 1))
     assert (comparison.errors == usual.errors) == (used == USUAL_STEP)
+
+
+def test_a_simulation_that_diverges_is_no_good_model(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path, setting({"controller.kp": 4e5})))
+    comparison = compare_recording(recording)
+    assert comparison.errors.overall < module.AT_THE_FLOOR * comparison.floor.reachable
+    assert comparison.diverged
+    assert not comparison.at_the_floor
+    assert "This simulation tells nothing: its own time step" in outcome(comparison)

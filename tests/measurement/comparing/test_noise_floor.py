@@ -32,6 +32,13 @@ def test_repeats_give_the_sensor_noise_and_not_the_joint_offset(tmp_path: Path, 
     assert floor.overall == pytest.approx(2e-4, rel=0.1)
 
 
+def test_repeats_of_a_simulation_are_no_better_than_their_sensor(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))
+    floor = noise_floor(recording.with_trials([recording.trials[0], replace(recording.trials[0], name="again")]))
+    assert floor.source == "repeats"
+    assert floor.overall == pytest.approx(2e-4, rel=0.1)
+
+
 def test_a_repeat_that_starts_later_is_aligned(tmp_path: Path) -> None:
     def spoil(columns: dict) -> None:
         late = table(5, samples=312)

@@ -15,6 +15,7 @@ from tactile_cube.measurement.recordings.rig import RigJoint
 from tactile_cube.measurement.recordings.writing import write_recordings
 from tactile_cube.measurement.sources import units
 from tactile_cube.measurement.sources.csv_files import CsvFiles
+from tactile_cube.measurement.sources.source import rate_of
 from tactile_cube.measurement.sources.units import position_unit, same_unit
 from tests.measurement.small_rig import URDF, table
 
@@ -278,6 +279,65 @@ def test_ticks_of_a_geared_motor_are_counted_at_its_joint_and_a_command_in_degre
     moved = trial.position[:, 0] - trial.position[0, 0]
     assert moved == pytest.approx(columns["a.position"] - columns["a.position"][0], abs=2e-3)
     assert trial.command[:, 0] == pytest.approx(columns["a.command"], abs=1e-6)
+
+
+@pytest.mark.parametrize(("first", "middle", "zero"), [(2048, 300, 2048), (0, 300, 0), (40, 300, 0), (3000, 300, 2048)])
+def test_the_zero_of_ticks_is_where_the_joint_keeps_its_limits_and_else_the_nearer(
+    first: int, middle: int, zero: int
+) -> None:
+    values = np.array([first - min(first, middle), first, first + middle], dtype=float)
+    for limit in (2.0, np.inf) if first in (0, 2048) else (np.inf,):
+        unit = position_unit(4096, "Present Position", values, RigJoint("a", -limit, limit, None))
+        assert unit.zero == zero
+
+
+def test_a_load_is_no_second_encoder(tmp_path: Path) -> None:
+    columns = table(0)
+    logged = {"time": columns["time"], "Goal Position": columns["a.command"], "Present Position": columns["a.position"]}
+    trial = imported(tmp_path, {"log.csv": logged | {"Present Load": columns["a.torque"]}}, ONE_JOINT).trials[0]
+    assert trial.link_position is None
+
+
+@pytest.mark.parametrize("rate", [250.0, 1000.0, 83.371])
+def test_a_clock_that_counts_from_1970_moves_no_command_to_another_row(rate: float, tmp_path: Path) -> None:
+    columns = table(0, samples=20_000)
+    stamps = 1.7723664e9 + np.arange(20_000) / rate
+    lines = zip(stamps, columns["a.command"], columns["a.position"], strict=True)
+    text = "time,a_cmd,a_pos\n" + "\n".join(f"{t:.6f},{q_d:.6f},{q:.6f}" for t, q_d, q in lines)
+    recording = imported(tmp_path, {"log.csv": text}, ONE_JOINT)
+    assert recording.rate == pytest.approx(rate, rel=1e-8)
+    # a row feels the mean of its own command and the one before, so commands are looked at where they are read
+    assert recording.trials[0].command[:, 0] == pytest.approx(columns["a.command"], abs=1e-6)
+
+
+def test_the_rate_of_irregular_rows_is_the_medians() -> None:
+    steps = np.tile([0.01, 0.01, 0.013, 0.01, 0.2], 30)
+    assert rate_of(np.cumsum(steps), 3, "log") == 100.0
+
+
+def test_a_header_may_be_a_comment_and_a_decimal_comma_may_come_late(tmp_path: Path) -> None:
+    columns = table(0)
+    rows = np.stack([columns["time"], columns["a.command"], columns["a.position"]], axis=1)
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time,a_cmd,a_pos", fmt="%.9f")
+    whole = [["0", "0", "0"], *([f"{x:.9f}".replace(".", ",") for x in row] for row in rows[1:])]
+    other = "\n".join(";".join(row) for row in [["time", "a_cmd", "a_pos"], *whole])
+    for text in ((tmp_path / "log.csv").read_text(), other):
+        trial = imported(tmp_path, {"log.csv": text}, ONE_JOINT).trials[0]
+        assert trial.position[1:, 0] == pytest.approx(columns["a.position"][1:], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time a_cmd a_pos\n0 0 0\n", "separated by blanks"),
+        ("0.0,0.0,0.0\n0.1,0.0,0.0\n", "its first line has numbers, '0.0,0.0,0.0'; write the columns' names above"),
+        ("time,a_cmd,a_pos\ns,rad,rad\n0.0,0,0\n0.01,0,0\n", "'time', row 0: .* not 's'; is that a row of units"),
+        ("time,a_cmd,a_pos\n0.0,0,0\n0.01,0,ERR\n0.02,0,0\n", "'a_pos', row 1: expected a number, not 'ERR'"),
+    ],
+)
+def test_what_is_no_table_of_numbers_is_named(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=said):
+        imported(tmp_path, {"log.csv": text}, ONE_JOINT)
 
 
 @pytest.mark.parametrize("ticks", [3, 0])

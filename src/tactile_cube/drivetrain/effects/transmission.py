@@ -124,7 +124,8 @@ class VelocityFilterLag(Effect):
     `second` is above zero.
 
     In data: less damping than stated in fast motion; overshoot.
-    Confused with: `command_delay` and `actuator_lag` in slow motion.
+    Confused with: `command_delay` and `actuator_lag` in slow motion; a controller that computes its torque once a row,
+    whose damping is half a row late.
     Source: any controller that differentiates an encoder; the filters of servo drives are of first or second order.
     """
 

@@ -94,9 +94,15 @@ class Comparison:
         return self.errors.overall / self.floor.overall
 
     @property
+    def diverged(self) -> bool:
+        """Whether the simulation's own time step changes it by more than the joints move, so that it tells nothing."""
+        moved = np.concatenate([trial.position for trial in self.recording.trials]).std(axis=0)
+        return not self.floor.reachable < float(np.sqrt(np.mean(moved**2)))
+
+    @property
     def at_the_floor(self) -> bool:
         """Whether the model is as good as this recording and this simulator can tell."""
-        return self.errors.overall <= AT_THE_FLOOR * self.floor.reachable
+        return not self.diverged and self.errors.overall <= AT_THE_FLOOR * self.floor.reachable
 
 
 def compare_recording(

@@ -112,8 +112,9 @@ def noise_floor(recording: Recording, step_size: Mapping[str, float] | None = No
     """Noise floor of a recording; `step_size` is the error [rad] of the simulator's time step, joint by joint."""
     groups = aligned_repeats(recording.trials)
     sensor = sensor_noise(recording)
-    variance = _scatter(groups) if groups else sensor**2
-    variance = np.maximum(variance, LEAST**2)
+    variance = np.maximum(sensor, LEAST) ** 2  # repeats of a simulation differ by less than its sensor's noise
+    if groups:
+        variance = np.maximum(variance, _scatter(groups))
     return NoiseFloor(
         float(np.sqrt(variance.mean())),
         dict(zip(recording.joints, map(float, np.sqrt(variance)), strict=True)),

@@ -97,6 +97,21 @@ def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
         raise ValueError("key 'nominal.stiffness': received 0: the drive would transmit nothing; .inf means rigid")
 
 
+def check_inertia(recording: Recording) -> None:
+    """Refuse a joint that has nothing to move.
+
+    Raises:
+        InputError: neither its links nor its rotor have inertia.
+    """
+    tree, middle = recording.rigid_body(), np.mean([trial.position.mean(axis=0) for trial in recording.trials], axis=0)
+    moved = tree.actuated_mass_matrix(middle).diagonal() + recording.nominal.get("reflected_inertia", 0.0)
+    if not (moved > 0.0).all():
+        raise InputError(
+            f"{recording.rig.path}: joint '{recording.joints[int(np.argmin(moved > 0.0))]}' moves no inertia: give the "
+            "links after it an <inertial>, or state nominal.reflected_inertia"
+        )
+
+
 SLOW = 0.1  # [rad/s] below which a torque holds weight and friction alone
 MOST_SAMPLES = 200  # postures change slowly
 FEWEST = 30

@@ -38,7 +38,7 @@ class Controller(Strict):
     kd: PerJoint = 0.0  # [N m s/rad]
     torque_limit: PerJoint = float("inf")  # [N m]
     mode: Literal["position", "torque"] = "position"  # torque: commands are torques [N m]; kp and kd are not used
-    rate_hz: Rate | None = None  # how often it computes its torque; None: as often as a row is logged
+    rate_hz: Rate | None = None  # how often it computes its torque; None: not known, so all the time
 
 
 class ControllerChange(Strict):

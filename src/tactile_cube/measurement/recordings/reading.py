@@ -13,6 +13,7 @@ from tactile_cube.hand.urdf_tree import with_own_files
 from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, pick_columns, without_outliers
 from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
+    check_inertia,
     check_joints,
     check_nominal,
     gains_of,
@@ -57,7 +58,7 @@ def read_recording(folder: str | Path) -> Recording:
         raise
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
-    recording.rigid_body()
+    check_inertia(recording)
     warnings = [*recording.warnings, *swap_warning(recording)]
     if not_drawn:
         warnings.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")

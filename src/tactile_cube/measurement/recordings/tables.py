@@ -1,7 +1,7 @@
 """Columns of numbers from a trial's file: Parquet, CSV or NPZ."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,9 @@ Table = dict[str, NDArray[np.float64]]
 Reader = Callable[[Path, int, bool], Table]
 PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x01", b"\x78\x5e", b"\x78\x9c", b"\x78\xda")
 """How gzip, zstd and zlib begin, which the reader of CSV would unpack whatever comes of it."""
+
+
+NUMBER = re.compile(r"[-+]?[\d.,]+([eE][-+]?\d+)?")
 
 
 def read_table(path: Path, most: int = limits.NUMBERS, only_numbers: bool = True) -> Table:
@@ -67,16 +70,30 @@ def _parquet(path: Path, most: int, only_numbers: bool) -> Table:
 
 
 def _csv(path: Path, most: int, only_numbers: bool) -> Table:
-    separator, decimal_comma, columns = _dialect(path)
+    frame = _csv_frame(path, most)
+    return _numbers(frame if only_numbers else _without_words(frame), path)
+
+
+def _csv_frame(path: Path, most: int) -> polars.DataFrame:
+    separator, decimal_comma, names, columns = _dialect(path)
     with path.open("rb") as stream:
         rows = sum(block.count(b"\n") for block in iter(lambda: stream.read(1 << 20), b""))
     _require_size(path, rows * columns, columns, most)
     frame = polars.read_csv(
         path, glob=False, infer_schema_length=None, comment_prefix="#", separator=separator,
-        decimal_comma=decimal_comma, encoding="utf8-lossy",
+        decimal_comma=decimal_comma, encoding="utf8-lossy", has_header=names is None, new_columns=names,
     )  # fmt: skip
-    frame = frame.rename({name: name.strip().strip("\ufeff") for name in frame.columns})
-    return _numbers(frame if only_numbers else _without_words(frame), path)
+    return frame.rename({name: name.strip().strip("\ufeff") for name in frame.columns})
+
+
+def refuse_words(path: Path, names: Sequence[str]) -> None:
+    """Name the first word in columns of a CSV file that hold numbers beside it.
+
+    Raises:
+        InputError: there is one.
+    """
+    if path.suffix.lower() in (".csv", ".txt"):
+        _numbers(_csv_frame(path, limits.NUMBERS).select(names), path)
 
 
 def _npz(path: Path, most: int, only_numbers: bool) -> Table:
@@ -97,19 +114,27 @@ def _require_size(path: Path, numbers: int, columns: int, most: int) -> None:
         )
 
 
-def _dialect(path: Path) -> tuple[str, bool, int]:
-    """Separator, whether numbers have a decimal comma, and the columns, from the header and the row below it."""
+def _dialect(path: Path) -> tuple[str, bool, list[str] | None, int]:
+    """Separator, whether numbers have a decimal comma, names that stand in a comment, and the number of columns."""
     with path.open("rb") as stream:
         start = [stream.readline(limits.LINE) for _ in range(50)]
     if start[0].startswith(PACKED):
         raise InputError(f"{path}: is compressed; unpack it")
     if any(len(line) == limits.LINE for line in start):
         raise InputError(f"{path}: not a CSV table: a line is longer than {limits.LINE / 1e6:g} MB")
-    text = (line.decode(errors="replace") for line in start)
-    header, row = [*(line for line in text if line.strip() and not line.startswith("#")), "", ""][:2]
-    separator = max(",;\t", key=header.count)
-    decimal_comma = separator != "," and re.search(r"\d,\d", row) is not None
-    return separator, decimal_comma, header.count(separator) + 1
+    text = [line.decode(errors="replace").strip() for line in start]
+    first, *rows = [*(line for line in text if line and not line.startswith("#")), ""]
+    separator = max(",;\t", key=first.count)
+    if separator not in first and len(first.split()) > 1:
+        raise InputError(f"{path}: its columns are separated by blanks; separate them by comma, semicolon or tab")
+    columns, names = first.count(separator) + 1, None
+    if NUMBER.fullmatch(first.partition(separator)[0].strip()):
+        comments = [line.strip("#" + separator + " ").split(separator) for line in text[: text.index(first)] if line]
+        names = next(([name.strip() for name in one] for one in reversed(comments) if len(one) == columns), None)
+        if names is None:
+            raise InputError(f"{path}: its first line has numbers, '{first[:40]}'; write the columns' names above it")
+    decimal_comma = separator != "," and any(re.search(r"\d,\d", row) for row in (first, *rows))
+    return separator, decimal_comma, names, columns
 
 
 def _without_words(frame: polars.DataFrame) -> polars.DataFrame:
@@ -144,7 +169,8 @@ def _numbers(frame: polars.DataFrame, path: Path) -> Table:
             wrong = (parsed.is_null() & column.is_not_null() & (column.str.strip_chars() != "")).arg_true()
             if len(wrong):
                 row = int(wrong[0])
-                raise InputError(f"{path}: column '{name}', row {row}: expected a number, received '{column[row]}'")
+                units = "; is that a row of units? Write them into the names and delete it" if row == 0 else ""
+                raise InputError(f"{path}: column '{name}', row {row}: expected a number, not '{column[row]}'{units}")
             column = parsed
         if not (column.dtype.is_numeric() or column.dtype == polars.Null):
             raise InputError(f"{path}: column '{name}' holds {column.dtype}, expected numbers")

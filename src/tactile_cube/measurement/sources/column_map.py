@@ -21,6 +21,7 @@ COMMAND = _vocabulary(
 )
 POSITION = _vocabulary("position pos angle q measured meas actual present state encoder enc ist theta feedback joint")
 LINK, FEEDFORWARD = _vocabulary("link load output secondary"), _vocabulary("feedforward forward ff")
+ANGLE = _vocabulary("position pos angle q encoder enc theta")  # a "Present Load" is none
 TORQUE = _vocabulary("torque tau effort moment force nm mnm")
 NOT_USED = _vocabulary(  # load: of hobby servos, a share of something
     "velocity vel speed dq qdot qvel omega acc acceleration ddq current curr voltage volt temperature temp pwm "
@@ -36,6 +37,12 @@ class ColumnMap:
     time: str | None  # None where the rows have no time of their own
     joints: dict[str, dict[str, str]]  # joint -> one of SIGNALS -> column
     unused: tuple[str, ...]
+
+    @property
+    def names(self) -> list[str]:
+        """All columns that are used."""
+        signals = [column for entry in self.joints.values() for column in entry.values()]
+        return signals if self.time is None else [self.time, *signals]
 
 
 def map_columns(names: Sequence[str], joints: Sequence[str], given: Given, torque_mode: bool) -> ColumnMap:
@@ -141,7 +148,7 @@ def _signal_of(name: str) -> str | None:
         return "feedforward" if TORQUE & set(said) else None
     if TORQUE & set(said):
         return "torque_command" if commanded else "torque"
-    if LINK & set(said) and POSITION & set(said) and not commanded:
+    if LINK & set(said) and ANGLE & set(said) and not commanded:
         return "link_position"
     if NOT_USED & set(said):
         return None

@@ -16,10 +16,10 @@ from tactile_cube.measurement.comparing.noise_floor import lag_between
 from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import Rig, RigJoint, read_rig
-from tactile_cube.measurement.recordings.tables import Table, read_table
+from tactile_cube.measurement.recordings.tables import Table, read_table, refuse_words
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
-from tactile_cube.measurement.sources.source import described, known, median_rate
+from tactile_cube.measurement.sources.source import described, known, rate_of
 from tactile_cube.measurement.sources.units import Unit, geared, position_unit, same_unit, time_unit, torque_unit
 
 Array = NDArray[np.float64]
@@ -58,6 +58,8 @@ class CsvFiles:
         paths, rig = self._paths(), read_rig(Path(self.urdf))
         tables = {path: read_table(path, only_numbers=False) for path in paths}
         columns = self._columns(tables[paths[0]], paths[0], rig, torque_mode)
+        for path, table in tables.items():
+            refuse_words(path, [name for name in columns.names if np.isnan(table.get(name, 0.0)).any()])
         units = self._units(tables, columns, rig.joints, torque_mode)
         stamps = None
         if columns.time is not None:
@@ -67,7 +69,7 @@ class CsvFiles:
             self._trial(path, table, columns, units, stamps, f"trials/{name}.parquet", start)
             for (path, table), name, start in zip(tables.items(), _distinct(paths), starts, strict=True)
         ]
-        rate = self.rate if self.rate is not None else median_rate(trials[0].time, 3, str(paths[0]))
+        rate = self.rate if self.rate is not None else rate_of(trials[0].time, 3, str(paths[0]))
         guessed = kinds_of([path.stem for path in paths], [trial.command for trial in trials], 1 / rate)
         kinds = _one_each(self.kind, paths, "kind", guessed)
         description = described(

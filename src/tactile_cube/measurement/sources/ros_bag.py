@@ -13,7 +13,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.source import described, known, median_rate
+from tactile_cube.measurement.sources.source import described, known, rate_of
 from tactile_cube.untrusted_file import regular
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ class RosBag:
         """One recording of all bags."""
         rig, joints = read_rig(Path(self.urdf)), list(self.joints)
         tables = [self._trial(Path(name), joints) for name in self.files]
-        rate = self.rate if self.rate is not None else median_rate(tables[0].time, 2, str(tables[0].entry.note))
+        rate = self.rate if self.rate is not None else rate_of(tables[0].time, 2, str(tables[0].entry.note))
         description = described(
             gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=known(self.controller),
             nominal=known(self.nominal), sensors={"read": self.read},

@@ -35,17 +35,31 @@ def known(values: Mapping[str, Value | None]) -> dict[str, Value]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def median_rate(time: NDArray[np.float64], digits: int, where: str) -> float:
-    """Samples per second, to some digits, from the median step of the rows' time (samples,) [s] of the file `where`.
+REGULAR = 0.1  # part of a step by which those of a log at one rate differ
+HIDDEN = 0.01  # of a step: what the last row of a log may be off by a rounded rate
+
+
+def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
+    """Samples per second of rows at times (samples,) [s] of the file `where`.
+
+    Where the steps are regular, their number over the whole time: a clock that counts from 1970 tells a step of some
+    milliseconds to 0.2 us only. Else the median's, for a log with pauses has no other. Rounded to so many digits if no
+    row shows it.
 
     Raises:
         InputError: time does not go forward.
     """
-    step = float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
-    rate = float(np.round(1 / step, digits)) if step > 0 else 0.0
-    if not 0 < rate < float("inf"):
+    steps = np.diff(time)
+    step = float(np.median(steps)) if len(time) > 1 else float("nan")
+    exact = 1.0 / step if step > 0 else 0.0
+    if not 0 < exact < float("inf"):
         raise InputError(f"{where}: the rows are {step:g} s apart in the median; time must go forward by a fixed step")
-    return rate
+    count = np.round(steps / step)
+    if np.quantile(np.abs(steps / step - count), 0.95) < REGULAR:
+        exact = float(count.sum() / (time[-1] - time[0]))
+        rounded = float(np.round(exact, digits))
+        return rounded if abs(rounded - exact) * (time[-1] - time[0]) < HIDDEN else exact
+    return float(np.round(exact, digits))
 
 
 def require_settings(source: DictConfig, option: str) -> None:

@@ -108,6 +108,9 @@ def position_unit(said: str | int | None, name: str, values: Array, joint: RigJo
     Raises:
         InputError: no such unit, or ticks of which nothing tells how many a turn has.
     """
+    values = values[np.isfinite(values)]
+    if not values.size:
+        raise InputError(f"column '{name}': has no number")
     if not joint.prismatic and said is not None and str(said).isdecimal():
         return _ticks(int(said), values, joint, "source.angle_unit")
     if not joint.prismatic and said is None and TICKS & set(words(name)) and not (values % 1.0).any():
@@ -121,19 +124,27 @@ def position_unit(said: str | int | None, name: str, values: Array, joint: RigJo
     chosen = chosen_unit(said, name, units, "length_unit" if joint.prismatic else "angle_unit")
     if chosen is not None:
         return chosen
+    by = "the joint's limits" if np.isfinite(joint.upper - joint.lower) else "no limits of the joint that would tell"
     for unit in ("m", "mm") if joint.prismatic else ("rad", "deg"):
         if joint.reaches(values * units[unit]):
-            return Unit(unit, units[unit], f"values {values.min():.3g} .. {values.max():.3g} and the joint's limits")
+            return Unit(unit, units[unit], f"values {values.min():.3g} .. {values.max():.3g} and {by}")
     first = next(iter(units))
     return Unit(first, 1.0, "assumed: no unit fits the joint's limits")
 
 
 def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
-    """Ticks of an encoder, which are zero in the middle of the turn where else the joint would leave its limits."""
+    """Ticks of an encoder, with the zero at 0 or in the middle of the turn.
+
+    It is where the joint leaves its limits less; where it keeps them both ways, where it is nearer to the motion.
+    """
     if turn < FEWEST_TICKS:
         raise InputError(f"source.angle_unit={turn}: a turn has more ticks; for instance {USUAL_TICKS}")
-    size = 2 * np.pi / turn
-    zero = 0.0 if joint.reaches(values * size) else turn / 2
+    size, middle = 2 * np.pi / turn, 0.5 * (values.min() + values.max())
+
+    def outside(zero: float) -> tuple[float, float]:
+        return max(float(np.max(joint.beyond((values - zero) * size))), 0.0), abs(middle - zero)
+
+    zero = min(0.0, turn / 2, key=outside)
     return Unit(f"ticks, {zero:g} is zero", size, source, zero)
 
 
