@@ -1,1 +1,1 @@
-"""The functions of the package, one for each command; the commands are thin over them."""
+"""The functions of the package, one for nearly each command; the commands are thin over them."""

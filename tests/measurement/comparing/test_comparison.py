@@ -47,9 +47,10 @@ def test_steps_are_shorter_where_the_sensors_would_show_their_error(
 
 
 def test_a_simulation_that_diverges_is_no_good_model(tmp_path: Path) -> None:
-    recording = read_recording(write(tmp_path, setting({"controller.kp": 4e5})))
+    recording = read_recording(
+        write(tmp_path, setting({"controller.kp": 4e5, "controller.torque_limit": float("inf")}))
+    )
     comparison = compare_recording(recording)
-    assert comparison.errors.overall < module.AT_THE_FLOOR * comparison.floor.reachable
     assert comparison.diverged
     assert not comparison.at_the_floor
     assert "This simulation tells nothing: its own time step" in outcome(comparison)

@@ -12,6 +12,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import RigJoint
+from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.writing import write_recordings
 from tactile_cube.measurement.sources import units
 from tactile_cube.measurement.sources.csv_files import CsvFiles
@@ -316,14 +317,12 @@ def test_the_rate_of_irregular_rows_is_the_medians() -> None:
 
 
 def test_a_header_may_be_a_comment_and_a_decimal_comma_may_come_late(tmp_path: Path) -> None:
-    columns = table(0)
-    rows = np.stack([columns["time"], columns["a.command"], columns["a.position"]], axis=1)
-    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time,a_cmd,a_pos", fmt="%.9f")
-    whole = [["0", "0", "0"], *([f"{x:.9f}".replace(".", ",") for x in row] for row in rows[1:])]
-    other = "\n".join(";".join(row) for row in [["time", "a_cmd", "a_pos"], *whole])
-    for text in ((tmp_path / "log.csv").read_text(), other):
-        trial = imported(tmp_path, {"log.csv": text}, ONE_JOINT).trials[0]
-        assert trial.position[1:, 0] == pytest.approx(columns["a.position"][1:], abs=1e-6)
+    rows = np.array([[0.0, 0.0], [1.0, 0.5]])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="time,angle", fmt="%.1f")
+    (tmp_path / "b.csv").write_text("time;angle\n0;0\n1;0,5\n")
+    for name in ("a.csv", "b.csv"):
+        read = read_table(tmp_path / name)
+        assert np.stack([read["time"], read["angle"]], axis=1).tolist() == rows.tolist()
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """How well a model follows a recording, and where it fails."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -64,6 +64,7 @@ def simulate_band(
 AT_THE_FLOOR = 1.3  # error over floor and time step up to which a model is as good as they can tell
 USUAL_STEP = 0.002  # [s] that of the world that training uses
 FINER = 8  # times smaller than the simulation's step, to see the error of the step itself
+FAR = 1e6  # [rad] beyond which a simulation has diverged, wherever it is
 HIDDEN = 0.5  # of the sensor noise: an error of the step that adds an eighth to what a perfect model leaves
 
 
@@ -137,12 +138,12 @@ def compare_recording(
         used = nominal_model(recording, model)
         if model is not None:
             used = with_fitted_offsets(Simulator(recording, [term.effect for term in used.terms], step), used)
-        return free_run(recording, used, engine, step), used
+        return bounded(free_run(recording, used, engine, step)), used
 
     simulated, fitted = simulated_at(used)
     band = simulate_band(recording, model, simulations, spread or {}, used, seed) if simulations else None
     if floor is None or step is None:
-        fine = free_run(recording, fitted, "fast", used / FINER)
+        fine = bounded(free_run(recording, fitted, "fast", used / FINER))
         differences = [a.position - b.position for a, b in zip(simulated, fine, strict=True)]
         left = summarise_errors(differences, recording.joints).joints
         noise = dict(zip(recording.joints, sensor_noise(recording), strict=True))
@@ -153,6 +154,15 @@ def compare_recording(
             simulated, _ = simulated_at(used)
         floor = floor or noise_floor(recording, left)
     return describe_comparison(recording, model, simulated, floor, band, used)
+
+
+def bounded(simulated: Sequence[Simulated]) -> list[Simulated]:
+    """The same, where a simulation that diverges has finite numbers."""
+
+    def finite(values: Array) -> Array:
+        return np.nan_to_num(np.clip(values, -FAR, FAR), nan=FAR)
+
+    return [Simulated(finite(one.position), finite(one.torque)) for one in simulated]
 
 
 def describe_comparison(
