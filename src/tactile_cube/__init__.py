@@ -1,8 +1,8 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
-Nearly each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`, `record`,
-`export`, `deploy`, `view`, `monitor` and `effects`; `search_grasps`, `make_env`, `load_policy`, `read_recording` and
-`recording_from_arrays` give what they work on. Nothing slow is imported before it is used.
+Nearly each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`,
+`record`, `export`, `deploy`, `view`, `monitor` and `effects`; `search_grasps`, `make_env`, `load_policy`,
+`read_recording` and `recording_from_arrays` give what they work on. Nothing slow is imported before it is used.
 """
 
 from __future__ import annotations
