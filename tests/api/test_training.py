@@ -6,14 +6,17 @@ from typing import Any
 
 import pytest
 import torch
+from omegaconf import OmegaConf
 
 import tactile_cube
 from benchmarks.paper.ancestry import read_ancestry
 from tactile_cube import InputError
-from tactile_cube.agent.policy_file import load_actor
+from tactile_cube.agent.networks import Actor, Sizes
+from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
 from tactile_cube.api import training
 from tactile_cube.api.job import Job, called_job
 from tactile_cube.api.training import TrainingResult
+from tactile_cube.hand.urdf_hand import DESCRIPTIONS
 from tactile_cube.training.run import INTERRUPTED, Run
 
 TINY = [
@@ -91,6 +94,20 @@ def test_a_hand_that_the_package_has_no_grasps_of_gets_its_own(tmp_path: Path, m
     first = training.stages_of(called_job("train", ("+experiment=curriculum", "hand=three_finger"), tmp_path))[0]
     assert first.config.start.file == str(tmp_path / "grasps.npz")
     assert (tmp_path / "grasps.npz").is_file()
+
+
+def test_a_policy_of_a_hand_in_a_file_of_its_owners_is_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training, "GRASPS", 1)
+    monkeypatch.chdir(tmp_path)
+    Path("mine.urdf").write_bytes((DESCRIPTIONS / "three_finger.urdf").read_bytes())
+    job = called_job("train", ("+experiment=curriculum", "hand=three_finger", "hand.urdf=mine.urdf"), tmp_path)
+    job.config.judgement = [*job.config.judgement, "protocol.episodes=1", "protocol.seconds=0.3"]
+    stage = training.stages_of(job)[-1]
+    actor = Actor(Sizes(120, 0, 12), (8,))
+    told = PolicyInfo.describe(actor, time_constant=0.5, config=OmegaConf.to_container(stage.config, resolve=True))
+    save_policy(tmp_path / "worlds" / "policy.safetensors", actor, told)
+    assert training.judged(job, tmp_path / "worlds") == "trained and judged"
+    assert (tmp_path / "mujoco" / "results.json").is_file()
 
 
 def test_a_stage_that_cannot_be_composed_is_an_input_error(tmp_path: Path) -> None:

@@ -193,9 +193,10 @@ def judged(job: Job, last: Path) -> str:
     kept = len(list(last.glob("policy_[0-9]*.safetensors")))
     policy = job.folder / POLICY
     save_policy(policy, *averaged(kept_policies(last, min(AVERAGED, kept)) if kept else [last / POLICY]))
-    said = []
+    said, named = [], {_key(word) for word in job.words} & {"hand", "object"}  # which no policy's file has read
+    again = [word for word in job.words if _key(word).partition(".")[0] in named]
     for engine in ENGINES:
-        result = evaluate(policy, *job.config.judgement, f"engine={engine}")
+        result = evaluate(policy, *job.config.judgement, *again, f"engine={engine}")
         result.write(job.folder / engine, film=False)
         said.append(f"{engine}: {result.text}")
     print("\n".join(said))

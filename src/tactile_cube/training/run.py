@@ -100,7 +100,9 @@ class Run:
         else:
             again = f"; the {steps - self.saved_at} steps since then are done again" if steps > self.saved_at else ""
             self.line.say(f"saved at {self.saved_at} steps: the same command goes on from there{again}")
-        self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}")
+        own = (self.config["env"].get("start") or {}).get("file")  # which no policy's file has read
+        start = f" start=grasps start.file={own}" if own else ""
+        self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}{start}")
 
     def close(self) -> None:
         """End the workers and write what is still in memory."""
