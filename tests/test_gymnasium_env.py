@@ -56,6 +56,19 @@ def test_the_name_is_registered_whatever_the_order_of_imports(imports: str, name
     assert run.stdout.strip() == "tactile_cube/Rotation-v0", run.stderr
 
 
+@pytest.mark.parametrize("action", [np.full(12, np.nan), np.zeros(11), np.zeros((1, 12))])
+def test_an_action_that_is_none_is_refused(env: GymnasiumRotation, action: np.ndarray) -> None:
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=r"give \(12,\) finite numbers"):
+        env.step(action)
+
+
+def test_environments_without_a_seed_differ() -> None:
+    noisy = EnvConfig(Task("table", table=True, episode_steps=5), randomization=Randomization(sensor_noise=0.002))
+    first, other = (GymnasiumRotation(noisy).reset()[0] for _ in range(2))
+    assert not np.array_equal(first, other)
+
+
 def test_a_mistyped_option_is_refused_in_one_line_with_what_it_may_have_meant() -> None:
     with pytest.raises(InputError, match=r"^[^\n]*task/tabel[^\n]*; did you mean task=table\?$"):
         gymnasium.make("tactile_cube/Rotation-v0", task="tabel")

@@ -58,7 +58,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"render_mode is {render_mode!r}; choose 'rgb_array' or None")
         self.render_mode = render_mode
-        self._judged = judged
+        self._judged, self._seeded = judged, False
         self._recorder: Recorder | None = None
         self._scene: Scene | None = None
         with torch.random.fork_rng(devices=[]):
@@ -71,8 +71,11 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts the next episode; with a `seed`, the first of a new sequence."""
+        """Starts the next episode; with a `seed`, the first of a new sequence, which else begins at random."""
         super().reset(seed=seed)
+        if seed is None and not self._seeded:
+            seed = int(self.np_random.integers(2**31))
+        self._seeded = True
         with self._own_generator():
             if seed is not None:
                 self._env.set_seed(seed)
@@ -82,7 +85,14 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         return data["observation"][0].numpy().copy(), _info(data)
 
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One policy step of 0.1 s."""
+        """One policy step of 0.1 s.
+
+        Raises:
+            InputError: an action of another shape, or one that is no number.
+        """
+        action = np.asarray(action, dtype=np.float32)
+        if action.shape != self.action_space.shape or not np.isfinite(action).all():
+            raise InputError(f"action {action}: give {self.action_space.shape} finite numbers from -1 to 1")
         command = torch.as_tensor(np.clip(action, -1.0, 1.0), dtype=torch.float32)[None]
         with self._own_generator():
             data = self._env.step(TensorDict({"action": command}, batch_size=[1]))["next"]

@@ -11,6 +11,7 @@ from tactile_cube.did_you_mean import near_key, suggestion
 from tactile_cube.errors import InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+DENIED = (errno.EACCES, errno.EPERM, errno.EROFS, errno.EEXIST, errno.ENOTDIR)
 CHOOSING = "defaults_list.py"
 """Where Hydra fails at `task=1` (a ValueError) and `task=[1]` (a TypeError), with errors that are none of its own."""
 
@@ -30,6 +31,8 @@ def usage_error(error: BaseException) -> str | None:
         if isinstance(cause, OSError) and cause.errno in FULL:
             where = cause.filename or "output"
             return f"{where}: the disk is full; free some of it, or write elsewhere with hydra.run.dir=DIR"
+        if isinstance(cause, OSError) and cause.errno in DENIED and cause.filename:
+            return f"{cause.filename}: {cause.strerror}; choose another place with hydra.run.dir=DIR"
         frames = traceback.extract_tb(cause.__traceback__)
         if isinstance(cause, TypeError | ValueError) and frames and frames[-1].filename.endswith(CHOOSING):
             return f"a choice from a group of conf/ is the name of a file there, e.g. task=table: {_flat(cause)}"

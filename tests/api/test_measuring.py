@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import tactile_cube
 from tactile_cube import InputError, TrialArrays
 from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import called_job
-from tests.measurement.small_rig import URDF, table, write
+from tests.measurement.small_rig import URDF, setting, table, write
 
 RIG = ["source=rig", "source.duration=4", "source.initialisations=2", "source.kinds=[ramps,multisine]"]
 
@@ -58,10 +59,53 @@ def test_a_folder_may_be_called_like_a_number(name: str, tmp_path: Path, monkeyp
         ({"position": np.full((300, 2), 200.0)}, "sines_0"),
     ],
 )
-def test_arrays_that_cannot_be_used_are_refused(change: dict[str, np.ndarray], message: str) -> None:
+def test_arrays_of_the_wrong_shape_are_refused(change: dict[str, np.ndarray], message: str) -> None:
     bad = TrialArrays(np.zeros((300, 2)), **change, kind="sines")
     with pytest.raises(InputError, match=message):
         tactile_cube.recording_from_arrays([bad], ["a", "b"], URDF, 100.0, kp=3.0, kd=0.2)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"trials": []}, "'trials'"),
+        ({"trials": arrays()[0]}, "trials: expected a list of TrialArrays"),
+        ({"trials": [(0, 1)]}, "trials: expected a list of TrialArrays"),
+        ({"trials": [TrialArrays(None, np.zeros((9, 2)))]}, r"trials\[0\]: command is None"),  # type: ignore[arg-type]
+        ({"trials": [TrialArrays([["x"] * 2] * 9, np.zeros((9, 2)))]}, r"trials\[0\]: command holds no numbers"),
+        ({"trials": [TrialArrays(np.zeros((9, 2)), np.full((9, 2), np.nan))]}, "position has no finite number"),
+        ({"rate": 0.0}, "rate is 0.0; give the samples per second"),
+        ({"rate": "500"}, "rate is '500'"),
+        ({"kp": "a"}, "'controller.kp"),
+        ({"mode": "effort"}, "'controller.mode'"),
+        ({"gravity": (0.0, 1.0)}, "'gravity"),
+        ({"joints": ["a", "a"]}, "more than once"),
+        ({"nominal": {"stifness": 3.0}}, r"'nominal\.stifness': unknown; .*; did you mean stiffness\?"),
+    ],
+)
+def test_what_arrays_lack_is_told_in_one_line(change: dict[str, Any], message: str) -> None:
+    given = {"trials": arrays(), "joints": ["a", "b"], "urdf": URDF, "rate": 100.0, "kp": 3.0, "kd": 0.2}
+    with pytest.raises(InputError, match=message) as told:
+        tactile_cube.recording_from_arrays(**(given | change))
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("word", "message"), [("step=0", "step=0: give"), ("step=-1", "step=-1"), ("seed=a", "seed=a: give a whole")]
+)
+def test_a_step_or_a_seed_that_is_none_is_refused(word: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        called_job("compare", ["recording=x", word])
+
+
+def test_an_effect_that_cannot_act_at_its_joint_is_told(tmp_path: Path) -> None:
+    def one(columns: dict[str, np.ndarray]) -> None:
+        for name in [name for name in columns if name.startswith("b.")]:
+            del columns[name]
+
+    folder = write(tmp_path, setting({"joints": ["a"]}), one)
+    with pytest.raises(InputError, match="'torque_crosstalk@a' cannot act there"):
+        tactile_cube.identify(folder, ["torque_crosstalk@a"], say=quiet)
 
 
 def test_record_compare_diagnose_identify_and_know_it_afterwards(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from omegaconf import OmegaConf
 from tactile_cube.api.job import called_job
 from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed
+from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import environment, worlds
 from tactile_cube.evaluation.policies import HoldPolicy, PolicySource, find_policy
 from tactile_cube.randomization import StartStates
@@ -17,6 +18,15 @@ def test_what_any_experiment_teaches_can_be_tried(experiment: str) -> None:
     made = environment(composed("evaluate", []), PolicySource(HoldPolicy(), experiment, config=trained), {})  # type: ignore[arg-type]
     assert made.task.name == trained["env"]["task"]["name"]  # type: ignore[index,call-overload]
     assert (made.curriculum, made.exploration) == (None, None)
+
+
+def test_a_policy_is_not_tried_on_another_hand_or_in_two_engines() -> None:
+    job = called_job("evaluate", ("hand=three_finger",))
+    with pytest.raises(InputError, match="trained on hand dlr_hand2, not three_finger"):
+        environment(job.config, find_policy("published"), job.choices)
+    job = called_job("evaluate", ("engine=mixed",))
+    with pytest.raises(InputError, match="engine=mixed: choose bullet or mujoco"):
+        environment(job.config, find_policy("published"), job.choices)
 
 
 @pytest.mark.parametrize(

@@ -76,6 +76,8 @@ def test_a_joint_that_mimics_another_is_coupled(tmp_path: Path) -> None:
     [
         ({"urdf": "nowhere.urdf"}, "hand.urdf=nowhere.urdf: no such file"),
         ({"urdf": "/dev/zero"}, "/dev/zero: is a device; a regular file is needed here"),
+        ({"tip_radius": -0.01}, "hand.tip_radius is -0.01; give a radius above 0"),
+        ({"start": [9.0] * 12}, "hand.start: left_q1 at 9 rad, its limits are"),
         ({"action": {"lower": [0.1], "upper": [0.2]}}, "hand.action.lower has 1 numbers; give 4"),
         ({"start": [0.0]}, "hand.start has 1 angles; the hand has 12 joints"),
         ({"position": [0.0, 1.0]}, "hand.position is"),
@@ -103,6 +105,11 @@ def test_a_finger_that_does_not_fit_is_named(key: str, value: Any, message: str)
         plain["fingers"]["left"]["tip"] = "left_tip"
     with pytest.raises(InputError, match=message):
         hand_from_urdf(**plain)
+
+
+def test_limits_that_leave_no_room_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"joint 'left_q\d' has the limits \S+ to -\S+ rad"):
+        own_hand(urdf=written(tmp_path, TEXT.replace('upper="', 'upper="-')))
 
 
 def test_a_joint_without_limits_is_refused(tmp_path: Path) -> None:

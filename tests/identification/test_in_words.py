@@ -1,10 +1,22 @@
 """What the answer says in a sentence."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tactile_cube.identification.in_words import OPENING, UNRELATED, disturbed, headline, left_over, sets_in_words
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.identification.in_words import (
+    OPENING,
+    UNRELATED,
+    disturbed,
+    headline,
+    left_over,
+    restated,
+    sets_in_words,
+)
+from tactile_cube.measurement.recordings.reading import read_recording
+from tests.measurement.small_rig import write
 
 
 def result(verdict: str, with_effects: float = 4.3e-3, black_box: float = 0.0) -> dict[str, Any]:
@@ -21,6 +33,21 @@ def test_what_is_left_stands_in_the_headline() -> None:
     assert left_over(result("missing_effect", 3.3e-4)) == ""
     assert left_over(result("partly_explained")) == left_over(result("missing_effect"))
     assert left_over(result("unknown_effect")) == ""
+
+
+def test_an_unstable_machine_is_told_by_short_windows() -> None:
+    unstable = result("missing_effect") | {"error_over_noise": {"with_effects": 1.05}}
+    assert (
+        left_over(unstable) == " (1.1 sensor noises remain in short windows; run freely, the model parts by 4.3 mrad)"
+    )
+
+
+def test_constants_found_far_from_what_was_stated_are_told(tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))  # kp 3, kd 0.2
+    found = {"kp": (3.3, 3.2, 3.4), "kd": (0.3, 0.29, 0.31), "static_friction": (0.02, 0.0, 0.04)}
+    values = {key: {"a": {"value": v, "low": low, "high": high, "unit": ""}} for key, (v, low, high) in found.items()}
+    model = ModelFile.model_validate({"format": 1, "rig": "x", "joints": ["a", "b"], "values": values})
+    assert restated(recording, model) == ["kd at a 0.3 [0.29, 0.31], not 0.2, or viscous friction beside it"]
 
 
 @pytest.mark.parametrize(("share", "said"), [(0.0, UNRELATED), (0.4, OPENING["unknown_effect"])])

@@ -82,6 +82,17 @@ def test_files_of_others_beside_the_rows_are_kept_and_a_link_is_not_followed(tmp
         tiny_run(tmp_path / "run")
 
 
+def test_starting_over_leaves_nothing_of_the_run_before_and_a_refusal_all_of_it(tmp_path: Path) -> None:
+    finish(tiny_run(tmp_path))
+    (tmp_path / "policy_75.safetensors").write_text("old")
+    before = sorted(path.name for path in tmp_path.rglob("*"))
+    with pytest.raises(InputError):
+        tiny_run(tmp_path, resume="never", init_from=str(tmp_path / "none.safetensors"))
+    assert sorted(path.name for path in tmp_path.rglob("*")) == before
+    tiny_run(tmp_path, resume="never").close()
+    assert not [path.name for path in tmp_path.iterdir() if path.name.startswith(("policy", "finished", "checkpoint"))]
+
+
 def test_a_folder_in_the_place_of_a_checkpoint_is_damage(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path))
     for name in (FILE, BEFORE):

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 import torch
 
-from tactile_cube.training.collection import CollectionError
+from tactile_cube.training.collection import CollectionError, MultiSyncCollection
 from tactile_cube.training.recovery import train_on
 from tactile_cube.training.run import Run
 from tests.training.tiny_env import TinyEnv, tiny_environment
@@ -83,6 +84,30 @@ def test_a_killed_or_stopped_worker_is_replaced(
     assert "going back to the last barrier with new workers" in capsys.readouterr().out
     assert (tmp_path / "metrics.csv").read_text().count("\n") == 1 + 160 // 20
     assert not multiprocessing.active_children()
+
+
+def test_a_run_that_starts_over_does_so_once(tmp_path: Path, reference: torch.Tensor) -> None:
+    finish(tiny_run(tmp_path, seed=1, collector=COLLECTOR))
+    first = tiny_run(tmp_path, resume="never", collector=COLLECTOR)
+    iterate = first.learner.iterate
+
+    def killed() -> None:
+        if first.learner.iteration == 6:
+            send(signal.SIGKILL, first)
+        iterate()
+
+    first.learner.iterate = killed  # type: ignore[method-assign]
+    run, _ = train_on(lambda: first, lambda: tiny_run(tmp_path, collector=COLLECTOR))
+    assert torch.equal(weights(run), reference)
+
+
+def test_ctrl_c_while_workers_start_leaves_none_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MultiSyncCollection, "_build", lambda *_: signal.raise_signal(signal.SIGINT) or time.sleep(2))
+    killed = list[bool]()
+    monkeypatch.setattr(MultiSyncCollection, "_kill", lambda self: killed.append(True))
+    with pytest.raises(KeyboardInterrupt):
+        tiny_run(tmp_path, collector=COLLECTOR)
+    assert killed
 
 
 def test_a_run_whose_workers_are_ended_with_it_ends_and_goes_on_later(tmp_path: Path, reference: torch.Tensor) -> None:

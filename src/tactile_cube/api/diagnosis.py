@@ -16,7 +16,7 @@ from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, diag
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis, diagnose_recording, write_experiment
 from tactile_cube.identification.diagnosis_json import as_json
-from tactile_cube.identification.in_words import answer
+from tactile_cube.identification.in_words import answer, restated
 from tactile_cube.identification.model_files import model_file, stated_model
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import compare_recording
@@ -59,7 +59,8 @@ class DiagnosisResult:
     @property
     def text(self) -> str:
         """The answer in plain words."""
-        return answer(self.data, self.free.experiment if self.free else None)
+        constants = restated(self.recording, self.model) if self.free else []
+        return answer(self.data, self.free.experiment if self.free else None, constants)
 
     def write(self, folder: PathLike) -> None:
         """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import shlex
 import sys
 import time
@@ -111,6 +112,11 @@ def _job(config: DictConfig, hydra: Any, command: str, words: Sequence[str], fol
         from tactile_cube.drivetrain.effects import import_own_effects  # imports slowly
 
         import_own_effects(names)
+    step, seed = config.get("step"), config.get("seed", 0)
+    if step is not None and not (isinstance(step, int | float) and 0.0 < step < math.inf):
+        raise InputError(f"step={step}: give a finite number of seconds above 0")
+    if isinstance(seed, bool) or not (isinstance(seed, int) and 0 <= seed < 2**63):
+        raise InputError(f"seed={seed}: give a whole number from 0 to {2**63 - 1}")
     text = shlex.join(["python", "-m", f"tactile_cube.{command}", *words])
     return Job(config, Path(folder), text, dict(hydra.runtime.choices), tuple(hydra.overrides.task))
 

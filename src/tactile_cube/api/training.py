@@ -118,12 +118,13 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
 
 def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
     """Train through faults of the workers."""
-    run, reason = train_on(partial(_training_run, job, plain, stage, later))
+    start = partial(_training_run, job, plain, stage, later)
+    run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 
-def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int) -> Run:
-    """The run that a job describes: new, or where its checkpoint says."""
+def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int, **changes: str) -> Run:
+    """The run that a job describes, with changes to how it is trained: new, or where its checkpoint says."""
     config: Any = job.config
     run = build_run(
         folder=job.folder,
@@ -131,7 +132,9 @@ def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int) -> Ru
         environment=as_environment(instantiate(config.env)),
         make_agent=instantiate(config.agent, _partial_=True),
         collector=CollectorSettings(**plain["collector"]),
-        training=TrainingSettings(**plain["training"] | {"init_from": networks_path(config.training.init_from)}),
+        training=TrainingSettings(
+            **plain["training"] | {"init_from": networks_path(config.training.init_from)} | changes
+        ),
         loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
         config=plain,
     )

@@ -11,6 +11,7 @@ from omegaconf import DictConfig, OmegaConf
 from tactile_cube.agent.policy_parts import making, require_parts
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policies import PolicySource
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.transforms import EnvConfig
 
 CONSTANTS = "tactile_cube.simulation.constants_of"
@@ -55,6 +56,10 @@ def environment(config: DictConfig, source: PolicySource, choices: Mapping[str, 
             f"policy={source.label}: acts on {source.joints} joints, hand '{made.hand.name}' has {made.hand.joints}; "
             "leave hand= out for the one it was trained on"
         )
+    if env := source.config.get("env"):
+        trained = (env.get("hand") or {}).get("name", DLR_HAND2.name)
+        if made.hand.name != trained:
+            raise InputError(f"policy={source.label}: trained on hand {trained}, not {made.hand.name}; leave hand= out")
     return made
 
 
@@ -92,6 +97,8 @@ def _chosen(group: str, choices: Mapping[str, str | None]) -> bool:
 def _set_engine(settings: Any, wanted: str | None) -> None:
     """One engine for the one world of an evaluation: the wanted one, else that of the training."""
     trained = OmegaConf.select(settings, "simulation.engine")
+    if wanted not in (None, "bullet", "mujoco"):
+        raise InputError(f"engine={wanted}: choose bullet or mujoco")
     engine = wanted or ("bullet" if trained == "mixed" else trained)
     if engine is not None:
         OmegaConf.update(settings, "simulation.engine", engine, force_add=True)

@@ -119,6 +119,10 @@ def _require_chain(tree: RigidBodyTree, joints: tuple[str, ...], where: str) -> 
             raise InputError(f"{where}: joint '{name}' slides; fingers have revolute joints")
         if not np.all(np.isfinite([tree.lower[k], tree.upper[k]])):
             raise InputError(f"{where}: joint '{name}' has no limits; give it <limit lower= upper=> [rad]")
+        if not tree.lower[k] < tree.upper[k]:
+            raise InputError(
+                f"{where}: joint '{name}' has the limits {tree.lower[k]:g} to {tree.upper[k]:g} rad; lower < upper"
+            )
         if not (tree.ratio[k] == 1.0 and tree.offset[k] == 0.0):
             raise InputError(
                 f"{where}: joint '{name}' follows another with a ratio other than 1; that is not simulated"

@@ -23,6 +23,8 @@ from tactile_cube.untrusted_file import read_text
 
 DESCRIPTIONS = Path(__file__).parent / "descriptions"
 """URDFs that the package ships."""
+LARGEST_TIP = 0.1
+"""Radius of a fingertip [m]: a ball for a hand."""
 NOMINAL_OBJECT = (0.08, 0.08, 0.08)
 """That the start angles are for where a description names none [m]."""
 
@@ -66,6 +68,8 @@ def hand_from_urdf(
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     if sha256 not in (None, digest):
         raise InputError(f"hand.urdf={urdf}: has the SHA-256 {digest}, wanted is {sha256}; the file has changed")
+    if not 0.0 < tip_radius < LARGEST_TIP:
+        raise InputError(f"hand.tip_radius is {tip_radius}; give a radius above 0 and below {LARGEST_TIP:g} m")
     if not fingers:
         raise InputError("hand.fingers is empty; describe at least one finger")
     chains, columns = zip(*(_finger(str(key), one, text) for key, one in fingers.items()), strict=True)
@@ -98,6 +102,11 @@ def hand_from_urdf(
     angles = np.asarray(start, dtype=np.float64)
     if angles.shape != hand.lower.shape:
         raise InputError(f"hand.start has {angles.size} angles; the hand has {hand.lower.size} joints")
+    outside = ~((hand.lower <= angles) & (angles <= hand.upper))
+    if outside.any():
+        at = int(np.argmax(outside))
+        limits = f"{hand.lower[at]:g} to {hand.upper[at]:g} rad"
+        raise InputError(f"hand.start: {hand.joint_names[at]} at {angles[at]:g} rad, its limits are {limits}")
     return replace(hand, start_angles=angles)
 
 

@@ -165,6 +165,11 @@ def with_effect(search: Search, frozen: Fit, effect: type[Effect], joint: str, p
     every = candidates(search.shooting.sizes, [effect])
     every += residual_candidates(search.problem, search.fitted, frozen, [effect])
     options = [c for c in every if c.joints == (joint,)]
+    if not options:
+        raise InputError(
+            f"effects: '{effect.name}@{joint}' cannot act there: the joint has no neighbour or no joint coupled to it, "
+            "or did not move enough; leave it out"
+        )
     if parameters and not (having := [c for c in options if set(parameters) <= c.form.keys()]):
         neutral = {p.name: p.neutral for p in effect.parameters if p.name in parameters}
         having = [replace(c, form={**neutral, **c.form}) for c in options]

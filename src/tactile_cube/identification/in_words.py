@@ -8,6 +8,7 @@ from typing import Any
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.safe_commands import QUANTITIES, SCALES, TRIALS, Envelope, Safety
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import TURNS, common_unit, milli, of_joint, short
 
 OPENING = {
@@ -20,14 +21,15 @@ OPENING = {
 SEVERAL = "Effects are missing, and they are these:"
 UNRELATED = "The error is above the noise, but it follows none of the logged signals."
 NO_LAW, LEFT = 0.05, 2.0  # share that a black box explains of what follows no law; noise floors worth a word
+FAR = 0.2  # part of a stated constant by which a fitted one may differ without a word
 PARTIAL = "Some effects reduce the error, but more is missing."
 UNPROVEN = "Something is missing, but these trials are too few to prove what."
 GAIN_OF = {"error": "the held-out error", "offsets": "the joint offsets that the grips need"}
 HELD = "Nothing is missing that these grasps show: the world follows them about as well as one with the true effects."
 
 
-def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
-    """A few lines for the terminal, from the content of diagnosis.json."""
+def answer(result: dict[str, Any], experiment: Experiment | None, constants: Sequence[str] = ()) -> str:
+    """A few lines for the terminal, from the content of diagnosis.json; `constants` are said to be stated otherwise."""
     units = result.get("units", {})
     grasps = result.get("noise_floor_source") == "contact"
     unproven = result.get("unproven_effects")
@@ -50,6 +52,7 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     lines += [_unexplained(entry) for entry in result["unexplained"]]
     lines += [f"  {common_offset(entry, units)}" for entry in result.get("common_offsets", [])]
     lines += [f"  {line}" for line in (*disturbed(result), *unseen_effects(result))]
+    lines += [f"Constants found otherwise than stated: {', '.join(constants)}."] if constants else []
     error, unit = result["error"], common_unit(units.values())
     refitted = f"{milli(error['refitted'], unit)} with constants refitted, " if not grasps else ""
     lines.append(
@@ -60,6 +63,19 @@ def answer(result: dict[str, Any], experiment: Experiment | None) -> str:
     if experiment is not None:
         lines += next_steps(experiment, units)
     return "\n".join(lines)
+
+
+def restated(recording: Recording, model: ModelFile) -> list[str]:
+    """Constants whose interval leaves out what the owner states, and which are far from it."""
+    lines = []
+    for key, by_joint in model.values.items():
+        for joint, one in by_joint.items():
+            stated = recording.stated(key, joint)
+            if stated is None or one.low <= stated <= one.high or abs(one.value - stated) <= FAR * abs(stated):
+                continue
+            also = ", or viscous friction beside it" if key == "kd" else ""
+            lines.append(f"{key} at {joint} {one.value:.4g} [{one.low:.4g}, {one.high:.4g}], not {stated:.4g}{also}")
+    return lines
 
 
 def error_of(result: Mapping[str, Any]) -> str:
@@ -87,6 +103,9 @@ def left_over(result: Mapping[str, Any]) -> str:
         return ""
     floors = error["with_effects"] / error["noise_floor"]
     left = milli(error["with_effects"], common_unit(result.get("units", {}).values()))
+    windows = result.get("error_over_noise", {}).get("with_effects", floors)
+    if windows < LEFT < floors:
+        return f" ({short(windows, 2)} sensor noises remain in short windows; run freely, the model parts by {left})"
     return f" ({left} remain, {short(floors, 2)} noise floors)" if floors > LEFT else ""
 
 

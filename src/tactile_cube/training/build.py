@@ -19,6 +19,7 @@ from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint,
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.episodes import EpisodeStatistics
+from tactile_cube.training.finished import FILE as FINISHED
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
@@ -67,15 +68,13 @@ def build_run(
         torch.set_num_threads(training.threads)
         torch.manual_seed(seed)
         checkpoints = Checkpoints(folder)
-        if training.resume == "never":
-            checkpoints.clear()
-            (folder / LEDGER).unlink(missing_ok=True)
-            shutil.rmtree(folder / "tensorboard", ignore_errors=True)
-        saved = checkpoints.load()
+        saved = None if training.resume == "never" else checkpoints.load()
         if saved is not None:
             require_same_settings(folder / FILE, saved["config"], config)
         learner = _build_learner(seed, environment, make_agent, collector, _protected(training), saved)
         held.callback(learner.collection.close)  # worker processes would keep the program from ending
+        if training.resume == "never":  # nothing refuses any more
+            _clear(folder, checkpoints)
         run = Run(
             learner=learner,
             folder=folder,
@@ -95,6 +94,14 @@ def build_run(
         )
         held.pop_all()  # it is the run's from here
     return run
+
+
+def _clear(folder: Path, checkpoints: Checkpoints) -> None:
+    """Delete what an earlier run has left, so that nothing of it is taken for this one's."""
+    checkpoints.clear()
+    for path in (folder / LEDGER, folder / FINISHED, *folder.glob(f"policy*{POLICY_SUFFIX}")):
+        path.unlink(missing_ok=True)
+    shutil.rmtree(folder / "tensorboard", ignore_errors=True)
 
 
 def lock_folder(folder: Path) -> BaseFileLock:

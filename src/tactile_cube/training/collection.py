@@ -285,6 +285,9 @@ class MultiSyncCollection:
         except Exception as error:
             self._kill()
             raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
+        except BaseException:  # Ctrl-C: workers do not listen to it, and would be waited for
+            self._kill()
+            raise
 
     def _kill(self) -> None:
         self._kill_children()

@@ -10,11 +10,12 @@ ATTEMPTS = 3
 """Times in a row that workers may fail without a barrier reached in between."""
 
 
-def train_on(build: Callable[[], Run]) -> tuple[Run, str]:
+def train_on(build: Callable[[], Run], again: Callable[[], Run] | None = None) -> tuple[Run, str]:
     """Train to the end through faults of the workers; gives the closed run and the reason it ended.
 
     All since the barrier is done again from the same state, so that its numbers are those of a run without faults.
-    `build` makes the run, fresh or from its last checkpoint.
+    `build` makes the run, fresh or from its last checkpoint; `again` makes it once more after a fault, by default
+    likewise.
 
     Raises:
         CollectionError: workers failed `ATTEMPTS` times without a barrier reached in between.
@@ -30,6 +31,7 @@ def train_on(build: Callable[[], Run]) -> tuple[Run, str]:
         if failures == ATTEMPTS:
             raise CollectionError(f"{outcome}; {ATTEMPTS} times in a row without a barrier in between")
         print(f"fault: {outcome}; going back to the last barrier with new workers", flush=True)
+        build = (again or build) if run is not None else build
         del run
         gc.collect()  # its replay is as large as the next one's
 

@@ -99,8 +99,9 @@ class Run:
             Finished(reason, steps, angle, self.config).write(self.folder)
         else:
             again = f"; the {steps - self.saved_at} steps since then are done again" if steps > self.saved_at else ""
-            self.line.say(f"saved at {self.saved_at} steps: the same command goes on from there{again}")
-        own = (self.config["env"].get("start") or {}).get("file")  # which no policy's file has read
+            without = " without training.resume=never" if self.config["training"].get("resume") == "never" else ""
+            self.line.say(f"saved at {self.saved_at} steps: the same command{without} goes on from there{again}")
+        own = ((self.config.get("env") or {}).get("start") or {}).get("file")  # which no policy's file has read
         start = f" start=grasps start.file={own}" if own else ""
         self.line.say(f"see it turn: python -m tactile_cube.evaluate policy={self.folder / POLICY}{start}")
 

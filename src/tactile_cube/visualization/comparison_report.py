@@ -8,6 +8,7 @@ from tactile_cube.measurement.units import MILLION, THOUSANDTHS, common_unit, mi
 from tactile_cube.visualization import comparison_figures as figures
 from tactile_cube.visualization.report import Block, Figure, Listing, Report, Section, Table
 
+SUSPICIOUS = 300.0  # times the noise: more than effects usually leave
 MOST_OVERLAYS = 6
 MOST_CORRELATIONS = 8
 MOST_WARNINGS = 4
@@ -66,7 +67,8 @@ def outcome(comparison: Comparison) -> str:
         )
     if comparison.at_the_floor:
         return f"{head} The model is as good as this recording can tell."
-    return f"{head} That is {short(comparison.ratio)} times the noise: {comparison.sentences[0]}."
+    check = " Check signs, units, gains and the order of joints first." if comparison.ratio > SUSPICIOUS else ""
+    return f"{head} That is {short(comparison.ratio)} times the noise: {comparison.sentences[0]}.{check}"
 
 
 def _numbers(error: float, floor: float, raw: float) -> str:

@@ -292,6 +292,20 @@ def test_the_zero_of_ticks_is_where_the_joint_keeps_its_limits_and_else_the_near
         assert unit.zero == zero
 
 
+def test_a_gear_that_is_known_is_said_and_a_feedforward_is_found_by_its_name(tmp_path: Path) -> None:
+    columns = table(0)
+    logged = {
+        "time": columns["time"],
+        "a.command": columns["a.command"],
+        "a_motor_angle": columns["a.position"] * 50.5,
+        "a_link_angle": columns["a.position"],
+        "a.feedforward": np.full(300, 0.2),
+    }
+    trial = imported(tmp_path, {"log.csv": logged}, ONE_JOINT, gear=50.0).trials[0]
+    assert trial.position[:, 0] == pytest.approx(columns["a.position"] * 1.01, abs=1e-5)
+    assert trial.feedforward is not None
+
+
 def test_a_load_is_no_second_encoder(tmp_path: Path) -> None:
     columns = table(0)
     logged = {"time": columns["time"], "Goal Position": columns["a.command"], "Present Position": columns["a.position"]}

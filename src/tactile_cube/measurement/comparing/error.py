@@ -51,12 +51,14 @@ def normalised_fit(trials: Sequence[Trial], errors: Sequence[Array], joints: Seq
     """How much of each joint's motion a simulation follows [%]: 100 (1 - |error| / |position - mean|), as NRMSE fit.
 
     100 is a perfect model, 0 one that predicts the mean, negative a worse one. The mean is each trial's own.
+    0 too where a joint never moves.
     Source: Ljung, System Identification, 1999; `compare` of MATLAB's System Identification Toolbox.
     """
     squares = np.nansum([np.nansum(error**2, axis=0) for error in errors], axis=0)
     moved = [trial.position[trial.valid] - trial.position[trial.valid].mean(axis=0) for trial in trials]
-    motion = np.maximum(np.sum([np.sum(one**2, axis=0) for one in moved], axis=0), np.finfo(float).tiny)
-    return dict(zip(joints, map(float, 100.0 * (1.0 - np.sqrt(squares / motion))), strict=True))
+    motion = np.sum([np.sum(one**2, axis=0) for one in moved], axis=0)
+    fits = 100.0 * (1.0 - np.sqrt(squares / np.where(motion > 0.0, motion, np.inf)))
+    return dict(zip(joints, map(float, np.where(motion > 0.0, fits, 0.0)), strict=True))
 
 
 def free_run_error(recording: Recording, simulated: Sequence[Simulated]) -> ErrorSummary:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
 
+from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.columns import SIGNALS
-from tactile_cube.measurement.recordings.description import Controller, Description, PerJoint, Sensors, TrialEntry
+from tactile_cube.measurement.recordings.description import Description, PerJoint, TrialEntry
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
@@ -82,16 +85,34 @@ def recording_from_arrays(
         >>> trial = TrialArrays(command=q_d, position=q, torque=tau, kind="ramps")
         >>> recording = recording_from_arrays([trial, ...], ["elbow"], "arm.urdf", rate=500.0, kp=3.7, kd=0.25)
     """
+    try:
+        return _recorded(
+            trials, joints, urdf, rate, folder,
+            gravity=gravity, controller={"kp": kp, "kd": kd, "torque_limit": torque_limit, "mode": mode},
+            nominal=dict(nominal or {}), sensors={"read": read, "position_resolution": resolution},
+        )  # fmt: skip
+    except ValidationError as error:
+        raise InputError(describe(error)) from error
+    except OSError as error:
+        raise InputError(f"{error.filename}: {error.strerror}") from error
+
+
+def _recorded(
+    trials: Sequence[TrialArrays],
+    joints: Sequence[str],
+    urdf: str | Path,
+    rate: float,
+    folder: str | Path | None,
+    **described: object,
+) -> Recording:
+    if isinstance(rate, bool) or not (isinstance(rate, Real) and 0 < rate < float("inf")):
+        raise InputError(f"rate is {rate!r}; give the samples per second")
+    if isinstance(trials, TrialArrays) or not all(isinstance(trial, TrialArrays) for trial in trials):
+        raise InputError("trials: expected a list of TrialArrays")
     tables = [_table(trial, number, len(joints), rate) for number, trial in enumerate(trials)]
-    description = Description(
-        format=1,
-        gravity=list(gravity),
-        rate_hz=rate,
-        joints=list(joints),
-        controller=Controller(kp=kp, kd=kd, torque_limit=torque_limit, mode=mode),
-        nominal=dict(nominal or {}),
-        sensors=Sensors(read=read, position_resolution=resolution),
-        trials=[table.entry for table in tables],
+    entries = [table.entry for table in tables]
+    description = Description.model_validate(
+        {"format": 1, "rate_hz": rate, "joints": list(joints), "trials": entries} | described
     )
     recording = RecordingTables(description, _urdf_text(urdf), tables)
     if folder is not None:
@@ -106,8 +127,10 @@ def _table(trial: TrialArrays, number: int, joints: int, rate: float) -> TrialTa
     given = {name: getattr(trial, name) for name in SIGNALS}
     signals = {name: None if one is None else _signal(one, name, number, joints) for name, one in given.items()}
     command, position = signals["command"], signals["position"]
-    assert command is not None
-    assert position is not None
+    if command is None or position is None:
+        raise InputError(
+            f"trials[{number}]: {'command' if command is None else 'position'} is None; give (samples, joints)"
+        )
     for name, signal in signals.items():
         if signal is not None and len(signal) != len(command):
             raise InputError(f"trials[{number}]: {name} has {len(signal)} samples, command has {len(command)}")
@@ -121,7 +144,12 @@ def _table(trial: TrialArrays, number: int, joints: int, rate: float) -> TrialTa
 
 def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[np.float64]:
     """The signal as (n, joints); a flat array will do for one joint."""
-    signal = np.asarray(values, dtype=np.float64)
+    try:
+        signal = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"trials[{number}]: {name} holds no numbers: {error}") from None
+    if not np.isfinite(signal).any():
+        raise InputError(f"trials[{number}]: {name} has no finite number")
     if signal.ndim == 1 and joints == 1:
         signal = signal[:, None]
     if signal.ndim != 2 or signal.shape[1] != joints:

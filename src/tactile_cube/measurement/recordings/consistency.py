@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.drivetrain.model_file import MAY_BE_INFINITE
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
@@ -17,6 +18,8 @@ from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Gains
 
 Array = NDArray[np.float64]
+NOMINAL = ("stiffness", "static_friction", "reflected_inertia", "friction_creep", "reading_delay")
+"""What may be stated of a drive."""
 SLOWER = 0.75  # share of the log's rate that rounding explains
 
 
@@ -87,8 +90,10 @@ def gains_of(description: Description, entry: TrialEntry | None, key: str) -> Ga
 
 
 def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
-    """Refuse nominal values that are no physical constants."""
+    """Refuse nominal values of what no drive has, or that are no physical constants."""
     for key, values in nominal.items():
+        if key not in NOMINAL:
+            raise ValueError(f"key 'nominal.{key}': unknown; known are {', '.join(NOMINAL)}{suggestion(key, NOMINAL)}")
         if (values < 0).any() or (np.isinf(values).any() and key not in MAY_BE_INFINITE):
             raise ValueError(
                 f"key 'nominal.{key}': received {values.tolist()}; expected numbers >= 0 for {list(joints)}"

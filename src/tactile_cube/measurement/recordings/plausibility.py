@@ -100,9 +100,9 @@ def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) 
     warnings: list[str] = []
     for index, joint in enumerate(joints):
         position, command = columns.position[:, index], columns.command[:, index]
-        if np.ptp(command) > 5 * MOVES and np.ptp(position) == 0:
+        if np.ptp(position) == 0:
             warnings.append(
-                f"{path}: column '{joint.name}.position' never changes (row 0: {position[0]:.4g}) although "
+                f"{path}: column '{joint.name}.position' never changes (row 0: {position[0]:.4g}); "
                 f"the command moves by {np.ptp(command):.3g} rad"
             )
         if min(np.ptp(command), np.ptp(position)) < MOVES:

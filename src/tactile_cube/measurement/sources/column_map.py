@@ -145,7 +145,8 @@ def _signal_of(name: str) -> str | None:
         return "time"
     commanded = bool(COMMAND & set(said))
     if FEEDFORWARD & set(said):
-        return "feedforward" if TORQUE & set(said) else None
+        torque = TORQUE & set(said) or (said[-1] == "feedforward" and not NOT_USED & set(said))
+        return "feedforward" if torque else None
     if TORQUE & set(said):
         return "torque_command" if commanded else "torque"
     if LINK & set(said) and ANGLE & set(said) and not commanded:

@@ -45,6 +45,7 @@ class CsvFiles:
     length_unit: str | None = None
     time_unit: str | None = None
     torque_unit: str | None = None
+    gear: float | None = None
     read: str = "after"
     resolution: float = 0.0
     length: float | None = None
@@ -107,7 +108,7 @@ class CsvFiles:
                 ratio = float(np.ptp(values["position"])) / spread
                 found["command"], found["position"] = same_unit(found["command"], found["position"], ratio)
             if "link_position" in entry:
-                found |= geared(found, values, entry)
+                found |= geared(found, values, entry, self.gear)
         return units
 
     def _trial(

@@ -148,7 +148,9 @@ def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
     return Unit(f"ticks, {zero:g} is zero", size, source, zero)
 
 
-def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapping[str, str]) -> dict[str, Unit]:
+def geared(
+    units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapping[str, str], said: float | None = None
+) -> dict[str, Unit]:
     """Units of what is logged on the motor's side of a gear, as it is at the joint.
 
     The motor's angle and the link's tell the gear. Commands are on the motor's side where they reach that far,
@@ -158,14 +160,15 @@ def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapp
         units: of the signals of one joint, `link_position` among them.
         logged: what the columns have.
         columns: their names.
+        said: turns of the motor a turn of its link, if the user says them.
     """
     angles = [signal for signal in units if units[signal].name not in {*TORQUE_UNITS, *FORCE_UNITS}]
     # no joint's limits tell the unit of a motor's angle; its link's is the best guess
     told = {signal: units[signal if units[signal].said else "link_position"] for signal in angles}
     moved = {signal: (logged[signal] - logged[signal].mean()) * told[signal].size for signal in angles}
     link = moved["link_position"]
-    gear = float(link @ moved["position"]) / max(float(link @ link), 1e-30)
-    if 0.0 <= gear < GEARED:
+    gear = said or float(link @ moved["position"]) / max(float(link @ link), 1e-30)
+    if said is None and 0.0 <= gear < GEARED:
         return {}
     beside = [signal for signal in units if signal not in ("position", "link_position") and of_motor(columns[signal])]
     if "command" in angles and np.ptp(moved["command"]) > np.sqrt(abs(gear)) * np.ptp(link):
@@ -174,7 +177,8 @@ def geared(units: Mapping[str, Unit], logged: Mapping[str, Array], columns: Mapp
     for signal in {"position", *beside}:
         unit = told.get(signal, units[signal])
         size = unit.size / gear if signal in angles else unit.size * gear
-        found[signal] = Unit(f"{unit.name} of the motor", size, f"{gear:.5g} turns a turn of its link", unit.zero)
+        by = f"{gear:.5g} turns a turn of its link{', by their motion; source.gear=... if known' if not said else ''}"
+        found[signal] = Unit(f"{unit.name} of the motor", size, by, unit.zero)
     return found
 
 
