@@ -3,7 +3,6 @@
 import multiprocessing
 import os
 import signal
-import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import pytest
 import torch
 
-from tactile_cube.training.collection import CollectionError, MultiSyncCollection
+from tactile_cube.training.collection import Background, CollectionError, MultiSyncCollection
 from tactile_cube.training.recovery import train_on
 from tactile_cube.training.run import Run
 from tests.training.tiny_env import TinyEnv, tiny_environment
@@ -102,7 +101,11 @@ def test_a_run_that_starts_over_does_so_once(tmp_path: Path, reference: torch.Te
 
 
 def test_ctrl_c_while_workers_start_leaves_none_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(MultiSyncCollection, "_build", lambda *_: signal.raise_signal(signal.SIGINT) or time.sleep(2))
+    class Waiting:
+        def result(self, timeout: float) -> None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Background, "submit", lambda self, call: Waiting())
     killed = list[bool]()
     monkeypatch.setattr(MultiSyncCollection, "_kill", lambda self: killed.append(True))
     with pytest.raises(KeyboardInterrupt):
