@@ -44,7 +44,12 @@ def test_an_unstable_machine_is_told_by_short_windows() -> None:
 
 def test_constants_found_far_from_what_was_stated_are_told(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path))  # kp 3, kd 0.2
-    found = {"kp": (3.3, 3.2, 3.4), "kd": (0.3, 0.29, 0.31), "static_friction": (0.02, 0.0, 0.04)}
+    found = {
+        "kp": (3.3, 3.2, 3.4),
+        "kd": (0.3, 0.29, 0.31),
+        "static_friction": (0.02, 0.0, 0.04),
+        "torque_limit": (9.0,) * 3,
+    }
     values = {key: {"a": {"value": v, "low": low, "high": high, "unit": ""}} for key, (v, low, high) in found.items()}
     model = ModelFile.model_validate({"format": 1, "rig": "x", "joints": ["a", "b"], "values": values})
     assert restated(recording, model) == ["kd at a 0.3 [0.29, 0.31], not 0.2, or viscous friction beside it"]

@@ -71,7 +71,13 @@ def restated(recording: Recording, model: ModelFile) -> list[str]:
     for key, by_joint in model.values.items():
         for joint, one in by_joint.items():
             stated = recording.stated(key, joint)
-            if stated is None or one.low <= stated <= one.high or abs(one.value - stated) <= FAR * abs(stated):
+            fitted = one.low < one.high
+            if (
+                not fitted
+                or stated is None
+                or one.low <= stated <= one.high
+                or abs(one.value - stated) <= FAR * abs(stated)
+            ):
                 continue
             also = ", or viscous friction beside it" if key == "kd" else ""
             lines.append(f"{key} at {joint} {one.value:.4g} [{one.low:.4g}, {one.high:.4g}], not {stated:.4g}{also}")
