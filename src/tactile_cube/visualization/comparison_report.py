@@ -28,13 +28,13 @@ def summary(comparison: Comparison) -> str:
     errors, floor, raw = comparison.errors, comparison.floor, comparison.raw[0]
     unit = common_unit(comparison.recording.units.values())
     rows = [
-        f"{joint:<16}{_numbers(error, floor.joints[joint], raw.joints[joint])}{_cell(comparison.fit[joint], 8, 1)} %"
+        f"{joint:<16}{_numbers(error, floor.joints[joint], raw.joints[joint])}{_cell(comparison.fit[joint], 7, 1)} %"
         for joint, error in errors.joints.items()
     ]
     lines = [
         outcome(comparison),
         "",
-        f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor      raw       fit",
+        f"{'joint':<16}{'error':>9}{'floor':>9}  error / floor      raw      fit",
         *rows,
         f"{'all':<16}{_numbers(errors.overall, floor.overall, raw.overall)}",
         f"RMS of free runs from the first state, {THOUSANDTHS[unit]}. error: the joint offsets of each initialisation "
