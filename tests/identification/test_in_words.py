@@ -50,9 +50,9 @@ def test_constants_found_far_from_what_was_stated_are_told(tmp_path: Path) -> No
         "static_friction": (0.02, 0.0, 0.04),
         "torque_limit": (9.0,) * 3,
     }
-    values = {key: {"a": {"value": v, "low": low, "high": high, "unit": ""}} for key, (v, low, high) in found.items()}
+    values = {key: {"a": {"value": v, "low": low, "high": high, "unit": "x"}} for key, (v, low, high) in found.items()}
     model = ModelFile.model_validate({"format": 1, "rig": "x", "joints": ["a", "b"], "values": values})
-    assert restated(recording, model) == ["kd at a 0.3 [0.29, 0.31], not 0.2, or viscous friction beside it"]
+    assert restated(recording, model) == ["kd at a 0.3 [0.29, 0.31], not 0.2 x, or viscous friction beside it"]
 
 
 @pytest.mark.parametrize(("share", "said"), [(0.0, UNRELATED), (0.4, OPENING["unknown_effect"])])

@@ -89,15 +89,16 @@ def test_starting_over_leaves_nothing_of_the_run_before_and_a_refusal_all_of_it(
     with pytest.raises(InputError):
         tiny_run(tmp_path, resume="never", init_from=str(tmp_path / "none.safetensors"))
     assert sorted(path.name for path in tmp_path.rglob("*")) == before
+    (tmp_path / "policy_averaged.safetensors").write_text("mine")
     tiny_run(tmp_path, resume="never").close()
-    assert not [path.name for path in tmp_path.iterdir() if path.name.startswith(("policy", "finished", "checkpoint"))]
+    left = [path.name for path in tmp_path.iterdir() if path.name.startswith(("policy", "finished", "checkpoint"))]
+    assert left == ["policy_averaged.safetensors"]
 
 
 def test_a_folder_in_the_place_of_a_checkpoint_is_damage(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path))
-    for name in (FILE, BEFORE):
-        (tmp_path / name).unlink()
-        (tmp_path / name).mkdir()
+    (tmp_path / FILE).unlink()
+    (tmp_path / FILE).mkdir()
     with pytest.raises(InputError, match=r"checkpoint\.pt: is a folder"):
         tiny_run(tmp_path)
 

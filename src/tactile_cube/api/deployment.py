@@ -87,7 +87,7 @@ def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSet
 
 
 def _simulated(config: Any) -> bool:
-    return str(config.get("robot", {}).get("_target_")).endswith(".SimulatedHand")
+    return str(config.get("robot", {}).get("_target_")) == f"{SimulatedHand.__module__}.{SimulatedHand.__qualname__}"
 
 
 @dataclass(frozen=True)

@@ -79,8 +79,11 @@ def restated(recording: Recording, model: ModelFile) -> list[str]:
                 or abs(one.value - stated) <= FAR * abs(stated)
             ):
                 continue
+            unit = of_joint(one.unit, recording.units[joint])
             also = ", or viscous friction beside it" if key == "kd" else ""
-            lines.append(f"{key} at {joint} {one.value:.4g} [{one.low:.4g}, {one.high:.4g}], not {stated:.4g}{also}")
+            lines.append(
+                f"{key} at {joint} {one.value:.4g} [{one.low:.4g}, {one.high:.4g}], not {stated:.4g} {unit}{also}"
+            )
     return lines
 
 

@@ -24,7 +24,7 @@ from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
 from tactile_cube.training.replay import Replay
-from tactile_cube.training.run import Run
+from tactile_cube.training.run import BEST_POLICY, POLICY, Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 
 POLICY_SUFFIX = ".safetensors"
@@ -99,7 +99,8 @@ def build_run(
 def _clear(folder: Path, checkpoints: Checkpoints) -> None:
     """Delete what an earlier run has left, so that nothing of it is taken for this one's."""
     checkpoints.clear()
-    for path in (folder / LEDGER, folder / FINISHED, *folder.glob(f"policy*{POLICY_SUFFIX}")):
+    policies = (folder / POLICY, folder / BEST_POLICY, *folder.glob(f"policy_[0-9]*{POLICY_SUFFIX}"))
+    for path in (folder / LEDGER, folder / FINISHED, *policies):
         path.unlink(missing_ok=True)
     shutil.rmtree(folder / "tensorboard", ignore_errors=True)
 

@@ -87,8 +87,10 @@ class Checkpoints:
         self.notice = ""
         refusals: list[InputError] = []
         for path in (self.folder / FILE, self.folder / BEFORE):
+            if path.is_dir():
+                raise InputError(f"{path}: is a folder, where a checkpoint of the run belongs; move it away")
             try:
-                state = self._load(path) if path.exists() else None
+                state = self._load(path) if path.is_file() else None
             except InputError as error:
                 refusals.append(error)
                 continue

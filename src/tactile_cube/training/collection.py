@@ -285,7 +285,7 @@ class MultiSyncCollection:
         except Exception as error:
             self._kill()
             raise CollectionError(f"simulation worker failed to {doing}: {error}") from error
-        except BaseException:  # Ctrl-C: workers do not listen to it, and would be waited for
+        except BaseException:  # Ctrl-C: workers ignore it, and would be waited for
             self._kill()
             raise
 

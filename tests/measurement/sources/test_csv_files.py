@@ -365,3 +365,9 @@ def test_a_command_and_a_position_in_ticks_have_one_zero() -> None:
     units = [position_unit(None, f"{name}_ticks", one, joint) for name, one in (("goal", within), ("pos", beyond))]
     assert [one.zero for one in units] == [0.0, 2048.0]
     assert [one.zero for one in same_unit(*units, ratio=180.0)] == [2048.0, 2048.0]
+
+
+@pytest.mark.parametrize("gear", [0.0, 50.0])
+def test_a_gear_without_a_use_is_refused(gear: float, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"source\.gear={gear:g}: give turns, not 0"):
+        imported(tmp_path, {"log.csv": log(NUMBERED)}, gear=gear)

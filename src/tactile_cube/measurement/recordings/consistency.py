@@ -18,8 +18,14 @@ from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Gains
 
 Array = NDArray[np.float64]
-NOMINAL = ("stiffness", "static_friction", "reflected_inertia", "friction_creep", "reading_delay")
-"""What may be stated of a drive."""
+DEFAULTS = {
+    "stiffness": np.inf,
+    "static_friction": 0.0,
+    "reflected_inertia": 0.0,
+    "friction_creep": 0.0,
+    "reading_delay": 0.0,
+}
+"""What may be stated of a drive, and its value where nothing is."""
 SLOWER = 0.75  # share of the log's rate that rounding explains
 
 
@@ -92,8 +98,10 @@ def gains_of(description: Description, entry: TrialEntry | None, key: str) -> Ga
 def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
     """Refuse nominal values of what no drive has, or that are no physical constants."""
     for key, values in nominal.items():
-        if key not in NOMINAL:
-            raise ValueError(f"key 'nominal.{key}': unknown; known are {', '.join(NOMINAL)}{suggestion(key, NOMINAL)}")
+        if key not in DEFAULTS:
+            raise ValueError(
+                f"key 'nominal.{key}': unknown; known are {', '.join(DEFAULTS)}{suggestion(key, DEFAULTS)}"
+            )
         if (values < 0).any() or (np.isinf(values).any() and key not in MAY_BE_INFINITE):
             raise ValueError(
                 f"key 'nominal.{key}': received {values.tolist()}; expected numbers >= 0 for {list(joints)}"

@@ -8,17 +8,11 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.recordings.consistency import DEFAULTS
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, terms_of
 
 Array = NDArray[np.float64]
-DEFAULTS = {
-    "stiffness": np.inf,
-    "static_friction": 0.0,
-    "reflected_inertia": 0.0,
-    "friction_creep": 0.0,
-    "reading_delay": 0.0,
-}
 CONTROLLER = ("kp", "kd", "torque_limit")
 TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
 

@@ -59,6 +59,10 @@ class CsvFiles:
         paths, rig = self._paths(), read_rig(Path(self.urdf))
         tables = {path: read_table(path, only_numbers=False) for path in paths}
         columns = self._columns(tables[paths[0]], paths[0], rig, torque_mode)
+        if self.gear is not None and not (self.gear and any("link_position" in one for one in columns.joints.values())):
+            raise InputError(
+                f"source.gear={self.gear:g}: give turns, not 0, and log both the motor's and the link's angle"
+            )
         for path, table in tables.items():
             refuse_words(path, [name for name in columns.names if np.isnan(table.get(name, 0.0)).any()])
         units = self._units(tables, columns, rig.joints, torque_mode)
