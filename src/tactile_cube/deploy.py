@@ -8,13 +8,16 @@ from tactile_cube.run_folder import INTERRUPTED
 @command("deploy")
 def main(job: Job) -> None:
     """Open the fingers, wait for the object, let the policy decide, stop; write the loop's log as a recording."""
+    import shutil
     import sys
 
     from tactile_cube.api.deployment import run_deployment
 
-    result = run_deployment(job, shown_at_once)
+    log = job.folder / "log"
+    result = run_deployment(job, shown_at_once, log)
     print(result.text)
-    recording = result.write(job.folder / "recording") if job.config.record else None
+    recording = result.write(job.folder / "recording")
+    shutil.rmtree(log, ignore_errors=True)  # it is the recording now
     if recording is not None:
         print(f"log: {recording}")
         if job.config.motion != "policy":  # else fingers touch the object, of which the recording says nothing

@@ -12,6 +12,8 @@ def signals_as_in_a_terminal() -> Iterator[None]:
         signal.SIGINT: signal.default_int_handler,
         signal.SIGTERM: signal.SIG_DFL,
         signal.SIGHUP: signal.SIG_DFL,
+        signal.SIGQUIT: signal.SIG_DFL,
+        signal.SIGTSTP: lambda number, frame: None,  # the tests are not suspended
     }
     before = {number: signal.signal(number, handler) for number, handler in usual.items()}
     yield

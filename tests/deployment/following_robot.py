@@ -3,13 +3,18 @@
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
 from tactile_cube.deployment.limits import JointLimits, StopRules
+from tactile_cube.deployment.loop_log import LoopLog
 from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.run_loop import LoopRun, run_loop
+from tactile_cube.deployment.stop import StopError
 
 TICK = 1e-3  # [s]
 SMALL = 1e-9
@@ -19,9 +24,10 @@ Spoil = Callable[["FollowingRobot"], None]
 
 @dataclass(frozen=True)
 class Sent:
-    """A command, when it was sent, and what the joints were and were believed to be."""
+    """A command, when it was sent by the robot's clock and by ours, and where the joints were and were believed to be."""
 
     time: float
+    elapsed: float
     q_d: np.ndarray
     q: np.ndarray
     accepted: Reading
@@ -31,7 +37,8 @@ class Sent:
 class FollowingRobot:
     """Joints that go a share of the way to the command each tick.
 
-    What stands for a tick in `in_wait`, `in_read` and `in_send` spoils that call.
+    What stands for a tick in `in_wait`, `in_read` and `in_send` spoils that call. `elapsed` is this computer's clock,
+    which a tick takes on by `period`.
     """
 
     def __init__(self, start: np.ndarray, spoil: dict[int, list[Spoil]] | None = None, follow: float = 1.0) -> None:
@@ -40,6 +47,7 @@ class FollowingRobot:
         self.in_read = defaultdict(list, spoil or {})
         self.in_send: dict[int, list[Spoil]] = defaultdict(list)  # once: the hold may come in the same tick
         self.now, self.latest, self.ticks, self.closed = 0.0, 0.0, 0, False
+        self.elapsed, self.period = 0.0, TICK
         self.reading: Reading | None = None
         self.given: list[Reading] = []
         self.sent: list[Sent] = []
@@ -48,14 +56,22 @@ class FollowingRobot:
         self.confirms = True
         self.loop: ControlLoop
 
+    def clock(self) -> float:
+        return self.elapsed
+
+    def sleep(self, seconds: float) -> None:
+        self.elapsed += seconds
+        self.latest += seconds
+
     def wait(self) -> float:
         self.ticks += 1
+        self.elapsed += self.period
         self.now = self.latest + TICK
         try:
             for spoil in self.in_wait[self.ticks]:
                 spoil(self)
         finally:
-            if np.isfinite(self.now):
+            if self.now is not None and np.isfinite(self.now):
                 self.latest = max(self.latest, self.now)
         return self.now
 
@@ -72,7 +88,7 @@ class FollowingRobot:
         for spoil in self.in_send.pop(self.ticks, []):
             spoil(self)
         assert self.loop.accepted is not None
-        self.sent.append(Sent(self.latest, q_d.copy(), self.q.copy(), self.loop.accepted, self.loop.mode))
+        self.sent.append(Sent(self.latest, self.elapsed, q_d.copy(), self.q.copy(), self.loop.accepted, self.loop.mode))
         self.q += self.follow * (q_d - self.q)
         q_d[:] = np.nan  # it is the robot's now
 
@@ -86,32 +102,51 @@ class FollowingRobot:
         self.closed = True
 
 
-def assert_every_command_is_safe(robot: FollowingRobot, limits: JointLimits, rules: StopRules) -> None:
-    """Every command is finite, within range, rate and torque, and measured against the last accepted state."""
-    if not robot.sent:
-        return
-    with np.errstate(over="ignore"):  # of a clock that says 1e308
-        _assert_safe(robot, limits, rules)
+def drive(
+    robot: FollowingRobot,
+    limits: JointLimits,
+    rules: StopRules,
+    say: Callable[[str], None] = lambda line: None,
+    log: LoopLog | None = None,
+) -> LoopRun:
+    """Run the robot's loop; however that ends, every command is safe and the last one presses on nothing."""
+    presses = False
+    try:
+        with mock.patch("tactile_cube.deployment.stop.time", SimpleNamespace(sleep=robot.sleep)):
+            return run_loop(robot.loop, robot, say, log)
+    except StopError:
+        presses = True
+        raise
+    finally:
+        assert robot.closed
+        assert robot.loop.mode is Mode.STOPPED
+        if robot.sent:
+            with np.errstate(over="ignore"):  # of a clock that says 1e308
+                _assert_safe(robot, limits, rules)
+            assert robot.tried is Mode.STOPPED
+            assert presses or torque(robot.sent[-1], limits) <= rules.tolerance
+
+
+def torque(sent: Sent, limits: JointLimits) -> float:
+    """Spring torque of a command against the angles that were believed, within the range [N m]."""
+    return float(np.max(limits.kp * np.abs(sent.q_d - np.clip(sent.accepted.q_m, limits.lower, limits.upper))))
 
 
 def _assert_safe(robot: FollowingRobot, limits: JointLimits, rules: StopRules) -> None:
     q_d, accepted = (np.array(rows) for rows in zip(*((one.q_d, one.accepted.q_m) for one in robot.sent), strict=True))
-    sent, stamped = np.array([(one.time, one.accepted.time) for one in robot.sent]).T
+    sent, ours, stamped = np.array([(one.time, one.elapsed, one.accepted.time) for one in robot.sent]).T
+    stopped = np.array([one.mode is Mode.STOPPED for one in robot.sent])
+    since = np.where(stopped[1:], np.minimum(np.diff(ours), rules.lateness), np.diff(sent))
     assert np.isfinite(q_d).all()
     assert ((limits.lower <= q_d) & (q_d <= limits.upper)).all()
     assert (limits.kp * np.abs(q_d - accepted) <= limits.torque * (1 + SMALL) + SMALL).all()
-    assert (np.abs(np.diff(q_d, axis=0)) <= (limits.rate * (1 + SMALL) * np.diff(sent) + SMALL)[:, None]).all()
+    assert (np.abs(np.diff(q_d, axis=0)) <= (limits.rate * (1 + SMALL) * since + SMALL)[:, None]).all()
     np.testing.assert_array_equal(q_d[0], np.clip(accepted[0], limits.lower, limits.upper))
     assert {one.tobytes() for one in accepted} <= {one.q_m.tobytes() for one in robot.given}
     assert (np.maximum(limits.lower - accepted, accepted - limits.upper) <= rules.margin).all()
-    assert (np.abs(np.diff(accepted, axis=0)) <= (rules.speed * (1 + SMALL) * np.diff(stamped) + SMALL)[:, None]).all()
+    run, moved = ~stopped[1:], np.abs(np.diff(accepted, axis=0))
+    assert (moved[run] <= (rules.speed * (1 + SMALL) * np.diff(stamped)[run] + SMALL)[:, None]).all()
     assert ((stamped <= sent) & (np.diff(stamped, prepend=stamped[0]) >= 0)).all()
-
-
-def assert_left_in_order(robot: FollowingRobot) -> None:
-    """The robot is closed, and what was sent last, or tried to be, is the hold."""
-    assert robot.closed
-    assert robot.loop.mode is robot.tried is Mode.STOPPED
 
 
 def change(**fields: Any) -> Spoil:

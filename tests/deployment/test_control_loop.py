@@ -1,32 +1,29 @@
 """The control loop on joints that follow: its modes, what stops it, and attacks on a robot by one number."""
 
-import contextlib
 import os
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tactile_cube.deployment import run_loop as run_loop_module
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog
 from tactile_cube.deployment.robot import Reading
-from tactile_cube.deployment.run_loop import HOLD_TICKS, LoopRun, run_loop
+from tactile_cube.deployment.loop_log import CHUNK, LoopLog
+from tactile_cube.deployment.run_loop import LoopRun
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 from tests.deployment.following_robot import (
     FollowingRobot,
     Spoil,
-    assert_every_command_is_safe,
-    assert_left_in_order,
     change,
     clock,
+    drive,
     raising,
 )
 
@@ -63,14 +60,13 @@ def run(
     opened: np.ndarray | None = None,
     limits: JointLimits = LIMITS,
     say: Callable[[str], None] = lambda line: None,
+    log: LoopLog | None = None,
 ) -> LoopRun:
-    """Run a loop on a robot; whatever comes of it, every command is safe and the hold is sent last."""
-    robot.loop = ControlLoop(Counting(targets), 0.2, limits, RULES, QUICK, seconds, opened=opened)
-    try:
-        return run_loop(robot.loop, robot, say)
-    finally:
-        assert_every_command_is_safe(robot, limits, RULES)
-        assert_left_in_order(robot)
+    """Run a loop on a robot; see `drive`."""
+    robot.loop = ControlLoop(
+        Counting(targets), 0.2, limits, RULES, QUICK, seconds, opened=opened, clock=robot.clock
+    )
+    return drive(robot, limits, RULES, say, log)
 
 
 # --- modes -----------------------------------------------------------------------------------------------------------
@@ -215,13 +211,13 @@ def test_one_bad_measurement_moves_nothing_and_is_counted(spoil: Spoil, at: int)
     assert at == FIRST or robot.sent[-1].time - sound.sent[-1].time == pytest.approx(late[at])
 
 
-def test_measurements_that_are_lost_now_and_then_stop_nothing_and_leave_gaps_in_the_log() -> None:
+def test_measurements_that_are_lost_now_and_then_stop_nothing_and_leave_gaps_in_the_log(tmp_path: Path) -> None:
     gaps = {tick: [lambda robot: setattr(robot, "reading", None)] for tick in range(20_000) if tick % 10 >= 5}
     robot = FollowingRobot(HOME, gaps)
-    ended = run(robot)
-    assert ended.reason == "time is over"
-    assert 240 <= len(ended.log) <= 260
-    assert np.diff([reading.time for reading, _ in ended.log]).max() == pytest.approx(6e-3)
+    with LoopLog(tmp_path / "log.npy", 12) as log:
+        assert run(robot, log=log).reason == "time is over"
+    assert 240 <= len(log.rows) <= 260
+    assert np.diff(log.rows["time"]).max() == pytest.approx(6e-3)
 
 
 @pytest.mark.parametrize(
@@ -306,8 +302,41 @@ def test_whatever_is_wanted_of_the_guard_a_command_that_keeps_all_limits_comes_o
 ) -> None:
     guard = CommandGuard(LIMITS, RULES, DLR_HAND2.joint_names)
     assert guard.accept(0.0, Reading(0.0, HOME)) == ""
-    np.testing.assert_array_equal(guard.checked(0.0, HOME + 1.0), HOME)
+    np.testing.assert_array_equal(first := guard.checked(np.nan, HOME + 1.0), HOME)
+    guard.sent(0.0, first)
     np.testing.assert_allclose(guard.checked(1e-3, np.full(12, wanted)), sent, atol=1e-12)
+
+
+def test_a_time_stamp_that_is_ahead_counts_as_now_so_the_next_reading_is_not_older() -> None:
+    guard = CommandGuard(LIMITS, RULES, DLR_HAND2.joint_names)
+    assert guard.accept(0.0, Reading(0.015, HOME)) == ""
+    assert guard.accept(1e-3, Reading(1e-3, HOME + 0.01)) == ""
+
+
+@pytest.mark.parametrize("field", ["q_m", "torque"])
+@pytest.mark.parametrize("size", [(3,), (12, 1), ()])
+def test_a_robot_whose_arrays_have_another_shape_is_not_commanded(field: str, size: tuple[int, ...]) -> None:
+    robot = FollowingRobot(HOME, for_good(change(**{field: np.zeros(size)}), FIRST))
+    assert f"of shape {size} for 12 joints" in run(robot).reason
+    assert robot.sent == []
+
+
+def test_the_log_can_be_read_while_it_grows_and_says_what_the_disk_refuses(tmp_path: Path) -> None:
+    with LoopLog(tmp_path / "log.npy", 2) as log:
+        for row in range(3 * CHUNK):
+            log.append(Reading(float(row), np.full(2, row)), np.full(2, -row))
+        wait_until(lambda: len(np.load(tmp_path / "log.npy")) == 3 * CHUNK)
+        log.append(Reading(-1.0, np.zeros(2), np.ones(2)), np.zeros(2))
+    np.testing.assert_array_equal(log.rows["time"], [*range(3 * CHUNK), -1.0])
+    np.testing.assert_array_equal(log.rows["command"][:-1, 1], -log.rows["position"][:-1, 0])
+    assert np.isnan(log.rows["torque"][:-1]).all()
+    with pytest.raises(OSError, match="No space left"), LoopLog(Path("/dev/full"), 2) as log:
+        pass
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    while not true():
+        pass
 
 
 # --- every way out ---------------------------------------------------------------------------------------------------
@@ -335,92 +364,10 @@ def test_an_exception_of_the_robot_sends_the_hold_and_closes(where: str, error: 
 
 def test_an_exception_of_the_policy_sends_the_hold_and_closes() -> None:
     robot = FollowingRobot(HOME)
-    robot.loop = ControlLoop(Raising(HOME[None] + 0.2), 0.2, LIMITS, RULES, QUICK, 1.0)
+    robot.loop = ControlLoop(Raising(HOME[None] + 0.2), 0.2, LIMITS, RULES, QUICK, 1.0, clock=robot.clock)
     with pytest.raises(ZeroDivisionError, match="in the policy"):
-        run_loop(robot.loop, robot, lambda line: None)
-    assert_every_command_is_safe(robot, LIMITS, RULES)
-    assert_left_in_order(robot)
+        drive(robot, LIMITS, RULES)
     assert robot.sent[-1].time > 0.1
-
-
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-def test_a_signal_sends_the_hold_and_closes_and_the_run_is_kept(name: str) -> None:
-    handler = signal.getsignal(signal.Signals[name])
-    robot = FollowingRobot(HOME)
-    robot.in_read[RUNNING].append(lambda robot: os.kill(os.getpid(), signal.Signals[name]))
-    ended = run(robot)
-    assert ended.reason == f"interrupted by {name}"
-    assert ended.interrupted
-    assert ended.log
-    assert signal.getsignal(signal.Signals[name]) is handler
-
-
-def test_the_second_signal_ends_a_policy_that_hangs_and_an_ignored_one_ends_nothing() -> None:
-    robot = FollowingRobot(HOME)
-    robot.in_read[RUNNING] += 2 * [lambda robot: os.kill(os.getpid(), signal.SIGINT)]
-    with pytest.raises(KeyboardInterrupt):
-        run(robot)
-    handler = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    robot = FollowingRobot(HOME)
-    robot.in_read[RUNNING].append(lambda robot: os.kill(os.getpid(), signal.SIGHUP))
-    assert run(robot).reason == "time is over"
-    signal.signal(signal.SIGHUP, handler)
-
-
-@pytest.mark.parametrize("times", [1, 2, 1000])
-def test_a_robot_that_cannot_wait_any_more_gets_the_whole_hold(times: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = FollowingRobot(HOME, follow=0.0)
-    monkeypatch.setattr(time, "sleep", lambda seconds: setattr(robot, "latest", robot.latest + seconds))
-    for tick in range(RUNNING + 100, RUNNING + 100 + times):
-        robot.in_wait[tick].append(raising(OSError("gone")))
-    with pytest.raises(OSError, match="gone"):
-        run(robot)
-    assert np.abs(robot.sent[-HOLD_TICKS - 20].q_d - HOME).max() > 1e-3
-    np.testing.assert_array_equal(robot.sent[-HOLD_TICKS].q_d, HOME)
-
-
-def test_the_hold_ends_only_when_it_rests_however_slow_commands_may_change() -> None:
-    robot = FollowingRobot(HOME, follow=0.0)
-    limits = JointLimits(**vars(LIMITS) | {"rate": 0.1})
-    assert run(robot, limits=limits).reason == "time is over"
-    held = [one.q_d for one in robot.sent if one.mode is Mode.STOPPED]
-    assert len(held) > 2 * HOLD_TICKS
-    np.testing.assert_array_equal(held[-HOLD_TICKS], HOME)
-
-
-def test_a_second_signal_neither_shortens_the_hold_nor_keeps_the_robot_from_being_closed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def interrupt(robot: FollowingRobot) -> None:
-        os.kill(os.getpid(), signal.SIGINT)
-
-    class Closing(FollowingRobot):
-        def close(self) -> None:
-            interrupt(self)
-            super().close()
-
-    robot = Closing(HOME, follow=0.0)
-    for tick in (RUNNING + 100, RUNNING + 110, RUNNING + 120):
-        robot.in_wait[tick].append(interrupt)
-    assert run(robot).reason == "interrupted by SIGINT"
-    np.testing.assert_array_equal(robot.sent[-HOLD_TICKS].q_d, HOME)
-    monkeypatch.setattr(run_loop_module, "PATIENCE", 0.0)
-    robot = FollowingRobot(HOME)
-    for tick in (RUNNING, RUNNING + 10):
-        robot.in_wait[tick].append(interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        run(robot)
-
-
-def test_a_hold_that_is_lost_is_sent_again_and_a_link_that_stays_broken_is_said() -> None:
-    for lost in (3, 1000):
-        robot = FollowingRobot(HOME)
-        robot.in_read[RUNNING].append(lambda robot: os.kill(os.getpid(), signal.SIGTERM))
-        for tick in range(RUNNING + 1, RUNNING + 1 + lost):
-            robot.in_send[tick].append(raising(OSError("gone")))
-        with contextlib.nullcontext() if lost == 3 else pytest.raises(OSError, match="gone"):
-            assert run(robot).reason == "interrupted by SIGTERM"
-        assert sum(one.mode is Mode.STOPPED for one in robot.sent) >= (HOLD_TICKS if lost == 3 else 1)
 
 
 # --- settings --------------------------------------------------------------------------------------------------------

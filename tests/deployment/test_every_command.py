@@ -8,7 +8,6 @@ import os
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 import numpy as np
 from hypothesis import given, settings
@@ -16,14 +15,13 @@ from hypothesis import strategies as st
 
 from tactile_cube.deployment.control_loop import ControlLoop, Homing
 from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.run_loop import run_loop
+from tactile_cube.deployment.stop import StopError
 from tests.deployment.following_robot import (
     FollowingRobot,
     Spoil,
-    assert_every_command_is_safe,
-    assert_left_in_order,
     change,
     clock,
+    drive,
     raising,
 )
 
@@ -149,13 +147,8 @@ def test_every_command_is_safe_whatever_is_read_answered_raised_and_set(
             getattr(robot, where)[tick].append(spoil)
             tick += 1
     robot.in_wait[TICKS].append(raising(TooLongError()))
-    robot.loop = ControlLoop(Answers(answers), time_constant, limits, rules, homing, seconds, HAND, opened)
-
-    def sleep(seconds: float) -> None:
-        robot.latest += seconds
-
-    quiet = contextlib.suppress(TooLongError, *map(type, ERRORS))
-    with mock.patch("time.sleep", sleep), np.errstate(all="ignore"), quiet:
-        run_loop(robot.loop, robot, lambda line: None)
-    assert_every_command_is_safe(robot, limits, rules)
-    assert_left_in_order(robot)
+    robot.loop = ControlLoop(
+        Answers(answers), time_constant, limits, rules, homing, seconds, HAND, opened, robot.clock
+    )
+    with np.errstate(all="ignore"), contextlib.suppress(TooLongError, StopError, *map(type, ERRORS)):
+        drive(robot, limits, rules)

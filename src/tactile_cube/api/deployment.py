@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,8 @@ from tactile_cube.deployment.controller import Network, PlayedTargets, PolicyCon
 from tactile_cube.deployment.export import export_policy
 from tactile_cube.deployment.limits import JointLimits
 from tactile_cube.deployment.robot import Robot
-from tactile_cube.deployment.run_loop import LoopRun, run_loop, write_runs
+from tactile_cube.deployment.loop_log import LoopLog, Rows, write_runs
+from tactile_cube.deployment.run_loop import LoopRun, run_loop
 from tactile_cube.deployment.simulated_hand import SimulatedHand
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
@@ -95,12 +98,14 @@ class DeploymentResult:
     """What came of the control loop.
 
     Attributes:
-        runs: how each run ended, its log and its tick times.
+        runs: how each run ended and its tick times.
+        logs: of the time in which the policy decided, one a run, on disk; see `Rows`.
         turned: how far the simulated hand turned the object the wanted way in each run [rad]; empty on another hand.
         hand: the one that the policy was trained on.
     """
 
     runs: list[LoopRun]
+    logs: list[Rows]
     turned: list[float]
     limits: JointLimits
     job: Job
@@ -122,7 +127,7 @@ class DeploymentResult:
 
     def write(self, folder: PathLike) -> Path | None:
         """Write the log of every run in which the policy decided as one recording; None if there is none."""
-        logs = [run.log for run in self.runs if run.log]
+        logs = [log for log in self.logs if len(log)]
         resolution = float(self.job.config.robot.get("resolution", 0.0))
         return write_runs(logs, Path(folder), self.limits, self.rate, resolution, self.hand) if logs else None
 
@@ -142,25 +147,38 @@ def deploy(policy: PathLike | None = None, *settings: str, say: Say = print) -> 
     return run_deployment(called_job("deploy", settings, policy=policy), say)
 
 
-def run_deployment(job: Job, say: Say) -> DeploymentResult:
-    """Home, run, stop, as often as the job says; every run with a new loop."""
+def run_deployment(job: Job, say: Say, folder: Path | None = None) -> DeploymentResult:
+    """Home, run, stop, as often as the job says; every run with a new loop.
+
+    Args:
+        job: what to do.
+        say: takes a line at each change of mode.
+        folder: where the logs grow; they stay there if a run fails. None: a temporary one.
+    """
+    with tempfile.TemporaryDirectory(prefix="tactile_cube-") if folder is None else nullcontext(folder) as place:
+        return _run_all(job, say, Path(place))
+
+
+def _run_all(job: Job, say: Say, folder: Path) -> DeploymentResult:
     config, network = job.config, load_policy(job.config.policy)
     setting = _setting(config, network, config.motion == "policy")
     limits = robot_limits(setting, config.rate_limit)
     target, simulated = str(config.robot._target_), _simulated(config)
     own = {"setting": setting} if simulated else {"hand": setting.hand} if target.startswith("tactile_cube.") else {}
-    runs, turned = [], []
+    runs, logs, turned = [], [], []
     for number in range(config.runs):
         seed = {"seed": config.seed + number} if simulated else {}
         loop = _control_loop(config, network, setting, limits)
         # partial: hydra would make a dictionary of a hand that it is given
         robot: Robot = instantiate(config.robot, _partial_=True, **seed)(**own)
-        runs.append(run_loop(loop, robot, say))
+        with LoopLog(folder / f"run_{number}.npy", setting.hand.joints) if config.record else nullcontext() as log:
+            runs.append(run_loop(loop, robot, say, log))
+        logs += [log.rows] if log is not None else []
         if isinstance(robot, SimulatedHand) and robot.cube:
             turned.append(robot.turned(runs[-1].ended))
         if runs[-1].interrupted:
             break
-    return DeploymentResult(runs, turned, limits, job, setting.hand)
+    return DeploymentResult(runs, logs, turned, limits, job, setting.hand)
 
 
 def _control_loop(config: Any, network: Network, setting: TrainingSetting, limits: JointLimits) -> ControlLoop:

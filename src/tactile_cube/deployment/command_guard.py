@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import inf, nan
+import time
+from collections.abc import Callable
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +24,31 @@ class CommandGuard:
     Every command is finite, within the range, at most rate * dt away from the one before, and at most torque / K_P
     away from the last accepted angles. A reading around which no such command exists is not accepted.
 
+    Args:
+        limits: of every command.
+        rules: what a measurement may be.
+        names: of the joints.
+        clock: monotonic, of this computer [s].
+
     Attributes:
         state: last accepted reading; before the first command the newest of those that agree.
-        command: last command `(joints,)` [rad].
+        command: last command that the robot took `(joints,)` [rad].
+        sent_at: when it did so, by `clock` [s].
     """
 
-    def __init__(self, limits: JointLimits, rules: StopRules, names: tuple[str, ...]) -> None:
-        self._limits, self._rules, self._names = limits, rules, names
+    def __init__(
+        self,
+        limits: JointLimits,
+        rules: StopRules,
+        names: tuple[str, ...],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.limits, self.rules, self.names, self.clock = limits, rules, names, clock
         self._reach = limits.reach
         self.state: Reading | None = None
         self.command: Array | None = None
-        self._sent, self._newest, self._agreeing = nan, -inf, 0
+        self.sent_at = self._sent = nan
+        self._agreeing = 0
 
     @property
     def ready(self) -> bool:
@@ -43,71 +59,86 @@ class CommandGuard:
     def saturated(self) -> NDArray[np.bool_]:
         """Joints whose command demands all the torque there is `(joints,)`."""
         if self.state is None or self.command is None:
-            return np.zeros(len(self._names), dtype=bool)
+            return np.zeros(len(self.names), dtype=bool)
         return np.asarray(np.abs(self.command - self.state.q_m) > 0.99 * self._reach)
 
     def accept(self, now: float, reading: Reading) -> str:
-        """Take a reading over as the state; return "" or why it is not believed."""
-        doubt = self._doubt(now, reading)
+        """Take a reading over as the state; return "" or why it is not believed; `now` is on the robot's clock [s]."""
+        q_m = np.array(reading.q_m, dtype=np.float64)  # the robot may use its arrays again
+        torque = None if reading.torque is None else np.array(reading.torque, dtype=np.float64)
+        taken = Reading(min(reading.time, now), q_m, torque)
+        doubt = self._doubt(now, reading.time, taken)
         if not doubt:
-            torque = None if reading.torque is None else np.array(reading.torque)  # the robot may use its arrays again
-            self.state = Reading(min(reading.time, now), np.array(reading.q_m, dtype=np.float64), torque)
+            self.state = taken
             self._agreeing += 1
-        elif self.command is None:
+        elif not self.ready:
             self.state, self._agreeing = None, 0
         return doubt
 
-    def checked(self, now: float, wanted: Array) -> Array:
+    def since_sent(self, now: float) -> float:
+        """Time since the last command by the robot's clock [s]; nan before the first."""
+        return now - self._sent
+
+    def checked(self, dt: float, wanted: Array) -> Array:
         """Return the command to send `(joints,)` [rad]: the nearest to the wanted one that keeps every limit.
 
-        Where what is wanted is no number, the command stays.
+        Where what is wanted is no number, the command stays. Where commands failed for so long that none keeps rate
+        and torque, it keeps the torque.
+
+        Args:
+            dt: time since the last command [s].
+            wanted: `(joints,)` [rad].
         """
         if self.state is None:
             raise RuntimeError("no command before an accepted reading")
-        low, high = self._room(now, self.state.q_m)
-        self.command = np.clip(np.where(np.isfinite(wanted), wanted, self._before(self.state.q_m)), low, high)
-        self._sent = now if now > self._newest else nan  # a clock that goes back gives no room until it has caught up
-        self._newest = max(self._newest, now)
-        return self.command.copy()
+        q_m, limits = self.state.q_m, self.limits
+        before, step = self._before(q_m), self._step(dt)
+        near = np.clip(np.where(np.isfinite(wanted), wanted, before), before - step, before + step)
+        pressing = np.clip(near, q_m - self._reach, q_m + self._reach)
+        return np.asarray(np.clip(pressing, limits.lower, limits.upper))
 
-    def _room(self, now: float, q_m: Array) -> tuple[Array, Array]:
-        """Lowest and highest command that every limit allows at measured angles; crossed where there is none."""
-        limits, before, dt = self._limits, self._before(q_m), now - self._sent
-        step = limits.rate * dt if 0 < dt <= self._rules.lateness else 0.0
-        low = np.maximum(np.maximum(limits.lower, q_m - self._reach), before - step)
-        high = np.minimum(np.minimum(limits.upper, q_m + self._reach), before + step)
-        return low, high
+    def sent(self, now: float, command: Array) -> None:
+        """Take note of a command that the robot took, at `now` of its clock [s]; one that failed has not been sent."""
+        self.command, self._sent, self.sent_at = command, now, self.clock()
+
+    def _step(self, dt: float) -> float:
+        """How far a command may be from the one before [rad]."""
+        return self.limits.rate * min(dt, self.rules.lateness) if dt > 0 else 0.0
 
     def _before(self, q_m: Array) -> Array:
         """The last command; at first the fingers stay where they are."""
-        return np.clip(q_m, self._limits.lower, self._limits.upper) if self.command is None else self.command
+        return np.clip(q_m, self.limits.lower, self.limits.upper) if self.command is None else self.command
 
-    def _doubt(self, now: float, reading: Reading) -> str:
-        limits, rules, q_m = self._limits, self._rules, np.asarray(reading.q_m, dtype=np.float64)
-        if not abs(now - reading.time) <= rules.silence:
-            return f"time stamp {reading.time:.3f} s, the clock says {now:.3f} s"
-        if q_m.shape != limits.lower.shape:
-            return f"angles of shape {q_m.shape} for {len(self._names)} joints"
+    def _doubt(self, now: float, stamp: float, reading: Reading) -> str:
+        limits, rules, q_m, names = self.limits, self.rules, reading.q_m, self.names
+        if not abs(now - stamp) <= rules.silence:
+            return f"time stamp {stamp:.3f} s, the clock says {now:.3f} s"
+        for what, values in (("angles", q_m), ("torques", reading.torque)):
+            if values is not None and values.shape != limits.lower.shape:
+                return f"{what} of shape {values.shape} for {len(names)} joints"
         wrong = ~(np.maximum(limits.lower - q_m, q_m - limits.upper) <= rules.margin)  # so no number is wrong too
         if wrong.any():
             at = int(np.argmax(wrong))
-            return f"{self._names[at]} at {q_m[at]:.4g} rad, range {limits.lower[at]:.2f} to {limits.upper[at]:.2f} rad"
-        return self._jump(now, reading.time, q_m) or self._without_room(now, q_m)
+            return f"{names[at]} at {q_m[at]:.4g} rad, range {limits.lower[at]:.2f} to {limits.upper[at]:.2f} rad"
+        return self._jump(reading) or self._without_room(self.since_sent(now), q_m)
 
-    def _jump(self, now: float, time: float, q_m: Array) -> str:
+    def _jump(self, reading: Reading) -> str:
         """Say which joint has moved further than it can since the last accepted reading."""
         if self.state is None:
             return ""
-        since, moved = min(time, now) - self.state.time, np.abs(q_m - self.state.q_m)
+        since, moved = reading.time - self.state.time, np.abs(reading.q_m - self.state.q_m)
         at = int(np.argmax(moved))
-        if moved[at] <= self._rules.speed * since + ROUNDING:
+        if moved[at] <= self.rules.speed * since + ROUNDING:
             return ""
-        allowed = f"{self._rules.speed:g} rad/s allowed"
-        return f"{self._names[at]} moved by {moved[at]:.4f} rad in {1e3 * since:.1f} ms, {allowed}"
+        allowed = f"{self.rules.speed:g} rad/s allowed"
+        return f"{self.names[at]} moved by {moved[at]:.4f} rad in {1e3 * since:.1f} ms, {allowed}"
 
-    def _without_room(self, now: float, q_m: Array) -> str:
-        low, high = self._room(now, q_m)
+    def _without_room(self, dt: float, q_m: Array) -> str:
+        """Say around which joint no command keeps all limits."""
+        limits, before, step = self.limits, self._before(q_m), self._step(dt)
+        low = np.maximum(np.maximum(limits.lower, q_m - self._reach), before - step)
+        high = np.minimum(np.minimum(limits.upper, q_m + self._reach), before + step)
         at = int(np.argmax(low - high))
         if low[at] <= high[at]:
             return ""
-        return f"{self._names[at]} at {q_m[at]:.4g} rad, where no command keeps all limits"
+        return f"{self.names[at]} at {q_m[at]:.4g} rad, where no command keeps all limits"

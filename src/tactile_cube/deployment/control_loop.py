@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from math import inf, isfinite
@@ -13,6 +15,7 @@ from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.stop import Stop
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.drivetrain.control_law import low_pass
 from tactile_cube.errors import InputError
@@ -31,7 +34,7 @@ class Mode(StrEnum):
     WAIT_FOR_OBJECT = "wait for object"  # until somebody confirms that it is there
     CLOSING = "closing"  # the fingers go to the start angles around the object
     RUNNING = "running"  # the policy decides
-    STOPPED = "stopped"  # the fingers hold position; only a new loop starts again
+    STOPPED = "stopped"  # `stop` gives the last commands; only a new loop starts again
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,8 @@ class Move:
 class ControlLoop:
     """One call of `tick` is one period of the fast loop, at 1 kHz on the robot; it never waits.
 
-    What it sends passes `CommandGuard` last.
+    What it sends passes `CommandGuard` last. Whoever drives it says by `sent` that the robot took a command, and
+    drives what `stop` returns once the loop is stopped; see `let_go`.
 
     Args:
         decides: gives q_n at 10 Hz.
@@ -102,6 +106,7 @@ class ControlLoop:
         seconds: how long the policy decides; then the loop stops.
         hand: whose start angles these are.
         opened: angles at which the fingers wait for the object `(joints,)` [rad]; None: there is none to wait for.
+        clock: monotonic, of this computer, whatever the robot's says [s].
 
     Attributes:
         reason: why it stopped; "" before.
@@ -122,6 +127,7 @@ class ControlLoop:
         seconds: float,
         hand: Hand = DLR_HAND2,
         opened: Array | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         require_positive({"seconds": seconds})
         if not (isinstance(time_constant, (int, float)) and 0 <= time_constant < inf):
@@ -129,12 +135,13 @@ class ControlLoop:
         self._decides, self._limits, self._homing, self._seconds = decides, limits, homing, seconds
         self._home, self._opened = np.array(hand.start_angles, dtype=np.float64), opened
         self._time_constant, self._filtered = time_constant, self._home.copy()
-        self._guard = CommandGuard(limits, rules, hand.joint_names)
+        self._guard = CommandGuard(limits, rules, hand.joint_names, clock)
         self._watchdog = Watchdog(rules, hand.joint_names)
         self.mode, self.reason, self.time = Mode.WAITING, "", -inf
         self.doubted, self.doubt = 0, ""
         self.q_n = self.q_f = self._home
         self._since = self._asked = 0.0
+        self._offered: Array | None = None
 
     @property
     def doing(self) -> str:
@@ -172,31 +179,37 @@ class ControlLoop:
         if doubt:
             self.doubted, self.doubt = self.doubted + 1, doubt
         last = self.accepted
-        if last is None or (self._guard.command is None and (self.mode is Mode.STOPPED or not self._guard.ready)):
+        if last is None or (self.mode is Mode.WAITING and not self._guard.ready):
             return None
         if self.mode is Mode.WAITING:
             goal = self._home if self._opened is None else self._opened
             self._move, self.mode = Move(self._homing, now, last.q_m, goal), Mode.HOMING
-        elif self.mode is not Mode.STOPPED and (
-            why := self._watchdog.judge(dt, now - last.time, self._guard.saturated)
-        ):
+        elif why := self._watchdog.judge(dt, now - last.time, self._guard.saturated):
             self.stop(why)
         if not doubt:
             self._go_on(now, dt, last.q_m.copy())
-        return self._guard.checked(now, self.q_f)
+        if self.mode is Mode.STOPPED:
+            return None
+        self._offered = self._guard.checked(self._guard.since_sent(now), self.q_f)
+        return self._offered.copy()
+
+    def sent(self) -> None:
+        """Take note that the robot took the command of the last tick."""
+        if self._offered is not None:
+            self._guard.sent(self.time, self._offered)
 
     def confirm_object(self) -> None:
         """Close the fingers around the object, which somebody has put between them."""
         if self.mode is Mode.WAIT_FOR_OBJECT:
             self._move, self.mode = Move(self._homing, self.time, self.q_f, self._home), Mode.CLOSING
 
-    def stop(self, reason: str) -> None:
-        """Hold position from now on, at the last accepted angles."""
+    def stop(self, reason: str) -> Stop:
+        """Let the policy decide no more; return what has the commands from now on."""
         if self.mode is not Mode.STOPPED:
             doubts = f"; {self.doubted} measurement(s) not believed, the last: {self.doubt}" if self.doubted else ""
             self.mode, self.reason = Mode.STOPPED, reason + doubts
-            if self.accepted is not None:
-                self.q_f = self.accepted.q_m
+            self._stopping = Stop(self._guard)
+        return self._stopping
 
     def _clock(self, now: float) -> float:
         """Time since the tick before [s]; a clock that does not go forward stops the loop."""

@@ -81,10 +81,11 @@ def interface_contract(network: Network, setting: TrainingSetting | None = None)
         },
         "stop": {
             "rules": asdict(StopRules()),
-            "unit": {"silence": "s", "lateness": "s", "margin": "rad", "speed": "rad/s", "saturation": "s"},
+            "unit": {"margin": "rad", "speed": "rad/s", "tolerance": "N m", "all others": "s"},
             "accepted": "a q_m stamped within silence of now, in range by margin, no further from the last than speed "
             "allows, around which a q_d keeps all limits; else q_f stays for this tick",
-            "then": "hold the last accepted angles, within the limits; start again from homing",
+            "then": "q_d to the last accepted angles, within the limits, until K_P |q_d - q_m| is below tolerance",
+            "robot_side": "without a q_d for timeout, the robot's own controller takes q_m for q_d",
         },
         "test_vector": _test_vector(network, hand) | {"tolerance": TOLERANCE},
         "sha256": {"weights": weights_hash(network), "of": "weight0, bias0, weight1, ... as little-endian float32"},

@@ -56,13 +56,16 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class StopRules:
-    """What a measurement may be, and bounds beyond which the loop stops: `stop` of conf/deploy.yaml [s, rad, rad/s]."""
+    """What a measurement may be, when the loop stops and how: `stop` of conf/deploy.yaml [s, rad, rad/s, N m]."""
 
     silence: float = 0.02
     lateness: float = 0.02
     margin: float = 0.1
     speed: float = 15.0
     saturation: float = 1.0
+    tolerance: float = 0.01
+    patience: float = 5.0
+    timeout: float = 0.1
 
     def __post_init__(self) -> None:
         """Refuse bounds that no hand can keep."""

@@ -27,7 +27,10 @@ class Reading:
 
 
 class Robot(Protocol):
-    """A hand under an impedance controller tau = K_P (q_d - q_m) - K_D dq that keeps the last q_d it was sent."""
+    """A hand under an impedance controller tau = K_P (q_d - q_m) - K_D dq that keeps the last q_d it was sent.
+
+    Its own controller has to take q_m for q_d once no command has come for `stop.timeout`: a program can be killed.
+    """
 
     def wait(self) -> float:
         """Wait for the next tick of the fast loop; return its time on a monotonic clock [s]."""

@@ -43,10 +43,11 @@ class SimulatedHand:
         resolution: float = 1e-4,
         opened: float = 0.1,
         link: Disturbed | None = None,
+        timeout: float = 0.1,
         seed: int = 0,
         setting: TrainingSetting | None = None,
     ) -> None:
-        require_positive({"robot.rate": rate})
+        require_positive({"robot.rate": rate, "robot.timeout": timeout})
         self._setting = setting or TrainingSetting.of(DLR_HAND2)
         hand = self._setting.hand
         self._world = World(hand, options=SimulationOptions(dt=1.0 / rate, substeps=1))
@@ -54,7 +55,7 @@ class SimulatedHand:
         self.cube, self._link = cube, link or Disturbed()
         self._rng = np.random.default_rng(seed)
         self._given = self._setting.constants
-        self._ticks, self._late = 0, 0
+        self._ticks, self._sent, self._timeout = 0, 0, round(timeout * rate)
         home = np.asarray(hand.start_angles)
         away = home - opened * np.tile([0.0, *[1.0] * (hand.joints_per_finger - 1)], len(hand.fingers))
         empty = replace(self._given, filter_time=NO_FILTER, gravity_scale=0.0, gravity_onset=0, table_height=None)
@@ -70,6 +71,8 @@ class SimulatedHand:
         """Let the world go on by a period, by more where the tick is late."""
         late = self._rng.random() < self._link.jitter
         for _ in range(1 + (int(self._rng.integers(1, 6)) if late else 0)):
+            if self._ticks - self._sent == self._timeout:  # nobody commands any more
+                self._q_d = np.array(self._world.q_m)
             self._world.step(self._q_d)
             self._ticks += 1
             self._follow_object()
@@ -86,7 +89,7 @@ class SimulatedHand:
 
     def send(self, q_d: Array) -> None:
         """The world's impedance controller takes these angles from the next physics step on."""
-        self._q_d = np.array(q_d)
+        self._q_d, self._sent = np.array(q_d), self._ticks
 
     def wait_for_object(self) -> bool:
         """Nobody has to confirm: `release` puts the object where somebody would have held it."""
