@@ -13,8 +13,8 @@ from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog
-from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.loop_log import CHUNK, LoopLog
+from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.run_loop import LoopRun
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
@@ -63,9 +63,7 @@ def run(
     log: LoopLog | None = None,
 ) -> LoopRun:
     """Run a loop on a robot; see `drive`."""
-    robot.loop = ControlLoop(
-        Counting(targets), 0.2, limits, RULES, QUICK, seconds, opened=opened, clock=robot.clock
-    )
+    robot.loop = ControlLoop(Counting(targets), 0.2, limits, RULES, QUICK, seconds, opened=opened, clock=robot.clock)
     return drive(robot, limits, RULES, say, log)
 
 

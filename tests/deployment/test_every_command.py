@@ -147,8 +147,6 @@ def test_every_command_is_safe_whatever_is_read_answered_raised_and_set(
             getattr(robot, where)[tick].append(spoil)
             tick += 1
     robot.in_wait[TICKS].append(raising(TooLongError()))
-    robot.loop = ControlLoop(
-        Answers(answers), time_constant, limits, rules, homing, seconds, HAND, opened, robot.clock
-    )
+    robot.loop = ControlLoop(Answers(answers), time_constant, limits, rules, homing, seconds, HAND, opened, robot.clock)
     with np.errstate(all="ignore"), contextlib.suppress(TooLongError, StopError, *map(type, ERRORS)):
         drive(robot, limits, rules)

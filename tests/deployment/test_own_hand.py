@@ -82,7 +82,7 @@ def test_a_hand_moves_without_a_policy_but_not_with_that_of_another() -> None:
 
     done = tactile_cube.deploy(None, "hand=three_finger", "motion=holds", "filter_time=0.1", "seconds=0.2", say=quiet)
     assert done.hand.name == "three_finger"
-    assert done.runs[0].log
+    assert len(done.logs[0])
     with pytest.raises(InputError, match="hand=three_finger: the policy was trained on dlr_hand2"):
         tactile_cube.deploy(None, "hand=three_finger", say=quiet)
 
@@ -129,6 +129,14 @@ def test_a_robot_is_not_driven_by_limits_that_only_the_policy_states(policy: Pat
 def test_a_file_cannot_widen_the_limits_of_a_hand(drives: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=rf"env\.constants\.{next(iter(drives))} is .*, the hand's is"):
         training_setting({"config": {"env": ENV | {"constants": ENV["constants"] | drives}}})
+
+
+@pytest.mark.parametrize("size", [5.0, [0.08, 5.0, 0.08], 0.3])
+def test_an_object_out_of_the_fingers_reach_is_refused(size: Any) -> None:
+    env: dict[str, Any] = {"constants": {"object": {"size": size}}}
+    with pytest.raises(InputError, match=r"the object is .* m; .* mm off its side, allowed 10 mm"):
+        training_setting({"config": {"env": env}})
+    assert training_setting({"config": {"env": {"constants": {"object": {"size": 0.15}}}}}).constants is not None
 
 
 def test_the_limits_of_a_softer_training_are_the_hands() -> None:

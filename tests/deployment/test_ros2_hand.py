@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ import pytest
 from tactile_cube.deployment.control_loop import ControlLoop, Homing
 from tactile_cube.deployment.controller import PlayedTargets
 from tactile_cube.deployment.limits import JointLimits, StopRules
+from tactile_cube.deployment.loop_log import LoopLog
 from tactile_cube.deployment.ros2_hand import Ros2Hand
 from tactile_cube.deployment.run_loop import LoopRun, run_loop
+from tactile_cube.deployment.stop import REPEATS
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 from tests.deployment.fake_rclpy import Empty, JointState, Node, Stamp, node
@@ -108,16 +111,17 @@ class Loopback:
         return self.hand.read()
 
 
-def run(robot: Loopback, opened: bool = False) -> LoopRun:
+def run(robot: Loopback, opened: bool = False, log: LoopLog | None = None) -> LoopRun:
     limits = JointLimits(DLR_HAND2.lower, DLR_HAND2.upper, 6.28, 1.0, np.full(12, 3.69), np.full(12, 0.25))
     homing, waits = Homing(speed=1.0, settle=0.05), HOME - 0.1 if opened else None
     loop = ControlLoop(PlayedTargets(HOME[None] + 0.1), 0.2, limits, StopRules(), homing, 0.5, opened=waits)
-    return run_loop(loop, robot, lambda line: None)
+    return run_loop(loop, robot, lambda line: None, log)
 
 
-def test_the_loop_runs_to_its_end_on_the_node(node: Node) -> None:
-    ended = run(Loopback(node))
-    assert (ended.reason, len(ended.log)) == ("time is over", 500)
+def test_the_loop_runs_to_its_end_on_the_node(node: Node, tmp_path: Path) -> None:
+    with LoopLog(tmp_path / "log.npy", 12) as log:
+        assert run(Loopback(node), log=log).reason == "time is over"
+    assert len(log.rows) == 499
     assert node.destroyed
     assert not node.open
 
@@ -154,7 +158,7 @@ def test_ctrl_c_publishes_the_hold_before_the_context_is_closed(node: Node) -> N
     robot = Loopback(node, interrupt)
     assert signal.getsignal(signal.SIGINT) is handler  # rclpy's own would close the context
     assert run(robot).reason == "interrupted by SIGINT"
-    assert len(node.published) > 300
+    assert len(node.published) >= 195 + REPEATS
     assert not node.open
 
 

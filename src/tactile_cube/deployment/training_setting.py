@@ -13,11 +13,15 @@ from tactile_cube.agent.policy_parts import making, require_parts
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.hand.kinematics import tip_positions
+from tactile_cube.hand.object_shape import tip_centres
 from tactile_cube.randomization import StartStates
 from tactile_cube.simulation import EpisodeConstants, constants_of
 
 DRIVES = {"kp": (0.5, 2.0), "kd": (0.5, 2.0), "torque_limit": (0.0, 1.0)}
 """Between which multiples of the hand's own the gains and the torque limit of a training may lie."""
+MISS = 0.01
+"""How far a fingertip may be off the place that it is to have at the object [m]; more is out of the hand's reach."""
 CONSTANTS = {"object", *(field.name for field in fields(EpisodeConstants))}
 
 
@@ -70,7 +74,9 @@ def training_setting(
         task = _values(env, "task", {field.name for field in fields(Task)}, label)
         made = constants_of(hand, **constants)
         _require_drives(made, constants_of(hand), label)
-        return TrainingSetting.of(hand, made, Task(**task) if task else None)
+        setting = TrainingSetting.of(hand, made, Task(**task) if task else None)
+    _require_reach(setting, label)
+    return setting
 
 
 def _require_trained(hand: Hand, named: Mapping[str, Any]) -> None:
@@ -95,6 +101,20 @@ def _require_drives(trained: EpisodeConstants, own: EpisodeConstants, label: str
             raise InputError(
                 f"{label}: env.constants.{key} is {stated.max():g}, the hand's is {known.max():g}; describe a hand "
                 "with such drives and name it: hand=..."
+            )
+
+
+def _require_reach(setting: TrainingSetting, label: str) -> None:
+    """Refuse an object around which the fingers cannot stand: by its size the start angles are chosen."""
+    hand, size = setting.hand, np.asarray(setting.constants.cube_size)
+    tips = tip_positions(hand, np.asarray(hand.start_angles))
+    for finger, tip in zip(hand.fingers, tips, strict=True):
+        wanted = tip_centres(setting.constants.object_shape, finger.face, 0.5 * size, hand.tip_radius, 1e-3)
+        off = float(np.linalg.norm(wanted - tip, axis=1).min())
+        if not off <= MISS:
+            raise InputError(
+                f"{label}: the object is {' x '.join(f'{edge:g}' for edge in size)} m; {finger.name} would start "
+                f"{1e3 * off:.0f} mm off its side, allowed {1e3 * MISS:.0f} mm; give an object within the hand's reach"
             )
 
 
