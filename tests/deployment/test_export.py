@@ -112,9 +112,11 @@ def test_a_loop_written_from_the_contract_alone_sends_what_ours_sends(network: N
     loop = ControlLoop(PolicyController(network), 0.5, limits, StopRules(), Homing(settle=1e-3), seconds=1.0)
     for tick in range(-4, 1):  # five that agree before the first command
         loop.tick(1e-3 * tick, Reading(1e-3 * tick, home))
+        loop.sent()
     stack, q_f, q_d, q_m = None, home, home, home
     for tick in range(1, 500):
         ours = loop.tick(1e-3 * tick, Reading(1e-3 * tick, q_m))
+        loop.sent()
         if (tick - 1) % 100 == 0:
             reading = np.concatenate([q_m, q_f - q_m])
             stack = np.tile(reading, readings) if stack is None else np.concatenate([stack[24:], reading])
