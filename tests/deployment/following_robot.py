@@ -173,9 +173,9 @@ def clock(change: Callable[[float], float]) -> Spoil:
 
 
 def raising(error: BaseException) -> Spoil:
-    """Raise an error."""
+    """Raise an error, each time a new one: a kept one would keep every traceback."""
 
     def spoil(robot: FollowingRobot) -> None:
-        raise error
+        raise type(error)(*error.args)
 
     return spoil
