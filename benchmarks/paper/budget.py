@@ -1,6 +1,6 @@
-"""What a gait earns and pays under the published reward: per radian, after the first second, in other worlds and readings.
+"""What a gait earns and pays a radian under the published reward, in other worlds and by other readings of the text.
 
-python -m benchmarks.paper.budget                 # docs/results/data/paper_budget.json, and the table on the screen
+python -m benchmarks.paper.budget  # docs/results/data/paper_budget.json, and the table on the screen
 """
 
 from __future__ import annotations
@@ -104,11 +104,14 @@ def section() -> list[str]:
     held = [row for row in rows if row["turned"] > 1.0 and row["held"] == 1.0]
     tilt = [-row["tilt"] / row["turned"] for row in held]
     path = [row["tilt_path"] / row["tilt"] for row in held]
+    first = -min(row["first"] for row in held)
     words = (
-        "Three episodes of 10 s under the published weights (`python -m benchmarks.paper.budget`). In every engine, time step, compliance, "
-        f"friction, sign of K_e and filter in which no cube is lost a radian pays {min(tilt):.0f} to {max(tilt):.0f} for tilting alone and earns at most 16; "
-        f"the first second is {-min(row['first'] for row in held):.0f} at most. Paying the path of every 2 ms costs {min(path):.2f} to {max(path):.2f} times "
-        "the net change of a step: it is the gait, not noise of the contact. None of these policies was trained to the end under these weights."
+        "Three episodes of 10 s under the published weights (`python -m benchmarks.paper.budget`). Over two engines, "
+        "time steps, compliances, frictions, both signs of K_e and both readings of the filter, where no cube is "
+        f"lost, a radian pays {min(tilt):.0f} to {max(tilt):.0f} for tilting alone and earns at most 16. The first "
+        f"second pays at most {first:.0f}. If the path of every 2 ms were paid and not the net change of a step, "
+        f"tilting would cost {min(path):.2f} to {max(path):.2f} times as much: it is the gait, not noise of the "
+        "contact. None of these policies was trained under these weights."
     )
     return ["## What a gait earns and pays", words, table([row for row in rows if row["world"] in tuple(WORLDS)[:2]])]
 
