@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.paper import budget
 from benchmarks.paper.rows import EVALUATE, HEAD, newest, paper_rows, typed
 from tactile_cube.evaluation.evaluation import read_results
 
@@ -31,6 +32,7 @@ def paper_page(
     introduction, _, rest = written.partition(f"\n\n{HEAD}")
     differences = rest.partition(DIFFERENCES)[2].partition("\n\n## ")[0]
     parts = [introduction.strip(), rows, *([DIRTY] if "-dirty |" in rows else []), DIFFERENCES + differences]
+    parts += budget.section()
     parts += _variant_section("Robustness", "perturbations", results)
     parts += [ROBUSTNESS_MAP] if any(one["protocol"] == "perturbations" for one in results) else []
     parts += _variant_section("Other simulations", "sim_to_sim", results)
