@@ -78,6 +78,9 @@ def written_together(folder: Path, index: str) -> Iterator[Path]:
         for file in sorted(files, key=lambda one: one == Path(index)):
             (aside / file).replace(folder / file)
         sync_folder(folder)
+    except OSError as error:
+        error.filename = str(error.filename or folder).replace(str(aside), str(folder), 1)
+        raise
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 
