@@ -1,7 +1,13 @@
 """Files that are there whole or not at all, whatever happens while they are written."""
 
+import contextlib
+import io
+import json
 import os
+import shutil
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 
 def write_whole(path: Path, *parts: bytes | memoryview) -> None:
@@ -12,7 +18,7 @@ def write_whole(path: Path, *parts: bytes | memoryview) -> None:
         parts: its contents, one after the other.
 
     Raises:
-        OSError: it cannot be written; a file of that name stays as it was.
+        OSError: it cannot be written, with `path` as its file; a file of that name stays as it was.
     """
     partial = path.with_name(f"{path.name}.partial")
     try:
@@ -23,10 +29,60 @@ def write_whole(path: Path, *parts: bytes | memoryview) -> None:
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+        if isinstance(error, OSError):  # a full disk does not say which file it had no room for
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
         raise
     sync_folder(path.parent)
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write plain data; raises as `write_whole`."""
+    write_whole(path, json.dumps(data, indent=1).encode())
+
+
+def write_npz(path: Path, arrays: Mapping[str, Any], compressed: bool = True) -> None:
+    """Write arrays as one NumPy archive; raises as `write_whole`."""
+    import numpy as np  # slow, and --help does without
+
+    content = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(content, allow_pickle=False, **arrays)
+    write_whole(path, content.getbuffer())
+
+
+@contextlib.contextmanager
+def written_together(folder: Path, index: str) -> Iterator[Path]:
+    """Give a folder to write into, whose files appear in `folder` when all are written; `index` appears last.
+
+    While the names change, a few system calls, there is no index: where there is one, all files are of one writing.
+
+    Args:
+        folder: where they belong; made if it is not there. Its other files stay.
+        index: the file by which a reader knows that the others are there.
+
+    Raises:
+        OSError: what the body raises, and then `folder` stays as it was; or a name that something else has.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    aside = folder / ".partial"
+    shutil.rmtree(aside, ignore_errors=True)  # one left behind
+    try:
+        aside.mkdir()
+        yield aside
+        files = [path.relative_to(aside) for path in aside.rglob("*") if path.is_file()]
+        for place in (folder / file for file in files):
+            place.parent.mkdir(parents=True, exist_ok=True)
+        (folder / index).unlink(missing_ok=True)
+        for file in sorted(files, key=lambda one: one == Path(index)):
+            (aside / file).replace(folder / file)
+        sync_folder(folder)
+    except OSError as error:
+        error.filename = str(error.filename or folder).replace(str(aside), str(folder), 1)
+        raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def sync_folder(folder: Path) -> None:
@@ -36,5 +92,7 @@ def sync_folder(folder: Path) -> None:
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from error
     finally:
         os.close(handle)

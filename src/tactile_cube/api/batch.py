@@ -15,7 +15,7 @@ from tactile_cube.api.diagnosis import diagnose
 from tactile_cube.api.job import PathLike
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.whole_file import write_whole
+from tactile_cube.whole_file import write_whole, written_together
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -80,9 +80,9 @@ def diagnose_each(
         if isinstance(found, InputError):
             yield folders[name], found
             continue
-        (Path(out) / name).mkdir(parents=True, exist_ok=True)
-        for file, content in found.files.items():
-            write_whole(Path(out) / name / file, content)
+        with written_together(Path(out) / name, "diagnosis.json") as aside:
+            for file, content in found.files.items():
+                write_whole(aside / file, content)
         yield folders[name], found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from tactile_cube.measurement.bench import has_free_motion, with_object, without
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.whole_file import write_json, written_together
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,14 @@ class ComparisonResult:
         from tactile_cube.visualization.comparison_report import comparison_report
         from tactile_cube.visualization.report import write_report
 
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "comparison.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
-        page = comparison_report(self.comparison, self.job.command, self.job.config.model)
-        write_report(page, folder / "report.html")
-        if rerun:
-            from tactile_cube.visualization.comparison_episode import write_comparison
+        with written_together(Path(folder), "comparison.json") as aside:
+            write_json(aside / "comparison.json", self.data)
+            page = comparison_report(self.comparison, self.job.command, self.job.config.model)
+            write_report(page, aside / "report.html")
+            if rerun:
+                from tactile_cube.visualization.comparison_episode import write_comparison
 
-            write_comparison(self.comparison, folder / "comparison.rrd")
+                write_comparison(self.comparison, aside / "comparison.rrd")
 
 
 @as_input_errors

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from tactile_cube.measurement.bench import has_free_motion, with_object, without
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import require_same_joints
+from tactile_cube.whole_file import write_json, written_together
 
 SHAPES = 3  # of the missing torque of one joint, most telling first
 
@@ -66,21 +66,20 @@ class DiagnosisResult:
         """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""
         from tactile_cube.visualization.report import write_report
 
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_model(self.model, folder / "model.yaml")
-        (folder / "diagnosis.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
-        page = self._contact_page(folder) if self.free is None else self._free_page(folder, self.free)
-        write_report(page, folder / "report.html")
+        path = str(Path(folder) / "model.yaml")
+        with written_together(Path(folder), "diagnosis.json") as aside:
+            write_model(self.model, aside / "model.yaml")
+            write_json(aside / "diagnosis.json", self.data)
+            page = self._contact_page(path) if self.free is None else self._free_page(aside, path, self.free)
+            write_report(page, aside / "report.html")
 
-    def _contact_page(self, folder: Path) -> Any:
+    def _contact_page(self, path: str) -> Any:
         from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
 
         made = self.model.provenance
-        path = str(folder / "model.yaml")
         return contact_diagnosis_report(self.data, self.model.rig, made.command, made.recording, path)
 
-    def _free_page(self, folder: Path, found: Diagnosis) -> Any:
+    def _free_page(self, folder: Path, path: str, found: Diagnosis) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
         from tactile_cube.visualization.diagnosis_report import diagnosis_report
 
@@ -90,7 +89,6 @@ class DiagnosisResult:
         after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
         write_comparison(after, folder / "diagnosis.rrd")
         shapes = [shape for one in found.unexplained for shape in one.shapes[:SHAPES]]
-        path = str(folder / "model.yaml")
         return diagnosis_report(self.data, before, after, self.job.command, path, shapes, found.experiment)
 
 

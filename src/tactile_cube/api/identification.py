@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from tactile_cube.identification.model_files import model_file, stated_model
 from tactile_cube.measurement.bench import has_free_motion, touch_offsets, without_touches
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.whole_file import write_json, written_together
 
 
 @dataclass(frozen=True)
@@ -59,18 +59,17 @@ class IdentificationResult:
         from tactile_cube.visualization.diagnosis_report import contact_report
         from tactile_cube.visualization.report import write_report
 
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / "model.yaml"
-        write_model(self.model, path)
-        (folder / "identification.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
-        if self.free is not None:
-            write_report(self._free_page(folder, self.free), folder / "report.html")
-        elif self.contact is not None:
-            page = contact_report(self.contact, self.model.rig, self.job.command, str(path))
-            write_report(page, folder / "report.html")
+        path = str(Path(folder) / "model.yaml")
+        with written_together(Path(folder), "identification.json") as aside:
+            write_model(self.model, aside / "model.yaml")
+            write_json(aside / "identification.json", self.data)
+            if self.free is not None:
+                write_report(self._free_page(aside, path, self.free), aside / "report.html")
+            elif self.contact is not None:
+                page = contact_report(self.contact, self.model.rig, self.job.command, path)
+                write_report(page, aside / "report.html")
 
-    def _free_page(self, folder: Path, found: Identification) -> Any:
+    def _free_page(self, folder: Path, path: str, found: Identification) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
         from tactile_cube.visualization.diagnosis_report import contact_sections, identification_report
 
@@ -78,8 +77,8 @@ class IdentificationResult:
         after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
         held = contact_sections(self.contact, alone=False) if self.contact else []
-        stages, path = self.data["error"], str(folder / "model.yaml")
-        return identification_report(after, stages, self.data["joints"], self.job.command, path, held)
+        stages, joints = self.data["error"], self.data["joints"]
+        return identification_report(after, stages, joints, self.job.command, path, held)
 
 
 @as_input_errors

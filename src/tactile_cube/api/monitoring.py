@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from tactile_cube.identification.search.evidence import worse
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import require_same_joints
+from tactile_cube.whole_file import write_json, written_together
 
 
 @dataclass(frozen=True)
@@ -93,11 +93,11 @@ class MonitorResult:
     def write(self, folder: PathLike) -> None:
         """Write monitor.json and model.yaml, the refitted model; with a diagnosis its files in diagnosis/."""
         folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "monitor.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
-        write_model(self.refitted.model, folder / "model.yaml")
         if self.diagnosis is not None:
             self.diagnosis.write(folder / "diagnosis")
+        with written_together(folder, "monitor.json") as aside:
+            write_json(aside / "monitor.json", self.data)
+            write_model(self.refitted.model, aside / "model.yaml")
 
 
 @as_input_errors

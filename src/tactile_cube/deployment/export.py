@@ -16,6 +16,7 @@ from tactile_cube.deployment.limits import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
+from tactile_cube.whole_file import write_json, write_npz, write_whole, written_together
 
 FORMAT = "tactile_cube contract 3"
 FINGER = {
@@ -180,12 +181,13 @@ def export_policy(network: Network, path: Path, setting: TrainingSetting | None 
     writers = {".npz": _write_npz, ".onnx": _write_onnx}
     if path.suffix not in writers:
         raise InputError(f"output={path}: ending {path.suffix!r} is unknown; choose one of {', '.join(writers)}")
-    path.parent.mkdir(parents=True, exist_ok=True)
     contract = interface_contract(network, setting)
-    writers[path.suffix](network, contract, path)
-    contract["sha256"] |= {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}
     beside = path.with_name(f"{path.name}.contract.json")
-    beside.write_text(json.dumps(contract, indent=1), encoding="utf-8")
+    with written_together(path.parent, beside.name) as aside:
+        file = aside / path.name
+        writers[path.suffix](network, contract, file)
+        contract["sha256"] |= {path.name: hashlib.sha256(file.read_bytes()).hexdigest()}
+        write_json(aside / beside.name, contract)
     return beside
 
 
@@ -194,7 +196,7 @@ def _write_npz(network: Network, contract: Contract, path: Path) -> None:
     arrays: dict[str, Any] = {"contract": np.array(json.dumps(contract))}
     for index, (weight, bias) in enumerate(network.deterministic_layers()):
         arrays |= {f"weight{index}": weight, f"bias{index}": bias}
-    np.savez(path, **arrays)
+    write_npz(path, arrays, compressed=False)
 
 
 def _write_onnx(network: Network, contract: Contract, path: Path) -> None:
@@ -221,4 +223,4 @@ def _write_onnx(network: Network, contract: Contract, path: Path) -> None:
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     helper.set_model_props(model, {"tactile_cube.contract": json.dumps(contract)})
     onnx.checker.check_model(model)
-    onnx.save(model, path)
+    write_whole(path, model.SerializeToString())

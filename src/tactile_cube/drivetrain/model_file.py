@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import describe, read_schema
 from tactile_cube.errors import InputError
+from tactile_cube.whole_file import write_whole
 
 OBJECT_EFFECTS = (
     "lateral_friction",
@@ -206,7 +207,7 @@ def as_model(given: ModelFile | Mapping[str, Any] | str | Path) -> ModelFile:
 
 def write_model(model: ModelFile, path: str | Path) -> None:
     """Write `model` as plain YAML, keys in the order of the schema."""
-    Path(path).write_text(yaml.safe_dump(model.model_dump(), sort_keys=False), encoding="utf-8")
+    write_whole(Path(path), yaml.safe_dump(model.model_dump(), sort_keys=False).encode())
 
 
 def _plain(value: Any) -> Any:

@@ -17,6 +17,7 @@ from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import ObjectShape
 from tactile_cube.untrusted_file import read_npz
+from tactile_cube.whole_file import write_npz
 
 Array = NDArray[np.float64]
 
@@ -119,7 +120,7 @@ class EpisodeRecord:
         for group, columns in groups.items():
             arrays |= {f"{group}.{name}": values for name, values in columns.items()}
         meta = [self.ending, self.direction, self.constants, self.fingers, str(shape), self.axis]
-        np.savez_compressed(path, meta=np.array(json.dumps(meta)), **arrays)
+        write_npz(path, {"meta": np.array(json.dumps(meta))} | arrays)
 
     @classmethod
     def load(cls, path: Path) -> EpisodeRecord:

@@ -28,6 +28,7 @@ from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
 from tactile_cube.simulation import Start
 from tactile_cube.simulation.health import unresolved_among
 from tactile_cube.transforms import EnvConfig, make_env
+from tactile_cube.whole_file import write_whole
 
 Report = Callable[[str, EpisodeResult], None]
 """Told the variant's name and the result of each episode as it ends."""
@@ -223,10 +224,8 @@ def write_results(path: Path, run: EvaluationRun, variants: list[VariantResult])
         "commit": current_commit(),
         "variants": [variant.as_dict() for variant in variants],
     }
-    path.write_text(
-        json.dumps(data, indent=1, default=lambda one: one.tolist() if hasattr(one, "tolist") else str(one)),
-        encoding="utf-8",
-    )
+    text = json.dumps(data, indent=1, default=lambda one: one.tolist() if hasattr(one, "tolist") else str(one))
+    write_whole(path, text.encode())
 
 
 def read_results(path: Path) -> dict[str, Any]:

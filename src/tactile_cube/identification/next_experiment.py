@@ -27,6 +27,7 @@ from tactile_cube.identification.safe_commands import PossibleMotions, Safety, c
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.model import Model
+from tactile_cube.whole_file import write_whole
 
 Array = NDArray[np.float64]
 FILE = "next_experiment.csv"
@@ -69,7 +70,7 @@ class Experiment:
         columns = {"time": self.time}
         columns |= {f"{name}.command": self.commands[:, j] for j, name in enumerate(self.joints)}
         path = folder / FILE
-        pl.DataFrame(columns).write_csv(path, float_precision=8)
+        write_whole(path, pl.DataFrame(columns).write_csv(float_precision=8).encode())
         return path
 
 

@@ -21,6 +21,7 @@ from tactile_cube.randomization.distributions import sample
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants, Start
 from tactile_cube.untrusted_file import read_npz
+from tactile_cube.whole_file import write_npz
 
 Array = NDArray[np.float64]
 MOST = 10_000
@@ -127,7 +128,7 @@ class Grasps:
         path.parent.mkdir(parents=True, exist_ok=True)
         columns = {name: getattr(self, name).astype(np.float32) for name in COLUMNS}
         rest = {key: value for key, value in asdict(self).items() if key not in COLUMNS}
-        np.savez_compressed(path, description=np.array(json.dumps(rest)), **columns)
+        write_npz(path, {"description": np.array(json.dumps(rest))} | columns)
 
     @classmethod
     def load(cls, path: Path) -> Grasps:

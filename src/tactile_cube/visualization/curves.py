@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 
 from tactile_cube.evaluation.evaluation import VariantResult
 from tactile_cube.evaluation.training_curve import ANGLE, CURRICULUM, REGRASPING, STEPS, Curve
+from tactile_cube.whole_file import write_whole
 
 MAP_COLUMNS = 3
 
@@ -33,7 +35,7 @@ def write_learning_curves(curve: Curve, path: Path) -> None:
     angle.set(title=curve.label)
     schedule.set(xlabel="environment steps [million]", ylabel="T_s [s] (solid),\ngravity (dotted)", ylim=(0, None))
     schedule.grid(alpha=0.3)
-    figure.savefig(path, dpi=110)
+    _write(figure, path)
 
 
 def write_sweep_curves(runs: Mapping[str, Mapping[int, Curve]], path: Path, title: str) -> None:
@@ -57,7 +59,13 @@ def write_sweep_curves(runs: Mapping[str, Mapping[int, Curve]], path: Path, titl
     _mark_regrasping(axis)
     axis.set(xlabel="environment steps [million]", title=title)
     figure.legend(loc="outside lower center", fontsize=7, ncols=1 if len(runs) < 5 else 2)
-    figure.savefig(path, dpi=110)
+    _write(figure, path)
+
+
+def _write(figure: Figure, path: Path) -> None:
+    picture = BytesIO()
+    figure.savefig(picture, format=path.suffix.removeprefix("."), dpi=110)
+    write_whole(path, picture.getbuffer())
 
 
 def _mark_regrasping(axis: Axes) -> None:
@@ -97,4 +105,4 @@ def write_robustness_map(variants: Sequence[VariantResult], nominal_values: Mapp
     for panel in panels[len(names) :]:
         panel.set_visible(False)
     figure.supylabel("mean final angle [rad]; label: episodes that kept the cube")
-    figure.savefig(path, dpi=110)
+    _write(figure, path)

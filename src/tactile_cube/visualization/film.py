@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from tactile_cube.evaluation.touch import touching
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.visualization.episode_recording import description, write_episode
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
+from tactile_cube.whole_file import write_whole
 
 MAX_BYTES = 3_000_000
 MAX_FRAMES = 200
@@ -53,10 +55,13 @@ def write_film(record: EpisodeRecord, path: Path, *, view: int = 256, hand: Hand
     frames = _frames(record, samples, view, hand)
     duration = STRIDE * float(record.time[1] - record.time[0])
     for colours in (96, 48, 24):
-        _save_gif(frames, path, duration, colours)
-        if path.stat().st_size <= MAX_BYTES:
-            return
-    _save_gif([frame.resize((frame.width * 2 // 3, frame.height * 2 // 3)) for frame in frames], path, duration, 24)
+        film = _gif(frames, duration, colours)
+        if len(film) <= MAX_BYTES:
+            break
+    else:
+        small = [frame.resize((frame.width * 2 // 3, frame.height * 2 // 3)) for frame in frames]
+        film = _gif(small, duration, 24)
+    write_whole(path, film)
 
 
 def _frames(record: EpisodeRecord, samples: list[int], view: int, hand: Hand) -> list[Image.Image]:
@@ -85,14 +90,14 @@ def _caption(frame: Image.Image, time: float, angle: float, fingers: Sequence[st
         draw.text((left + 3, 5), finger[:6], fill="white" if on else "black")
 
 
-def _save_gif(frames: list[Image.Image], path: Path, duration: float, colours: int) -> None:
-    """Save with one palette for all frames, taken from a few of them, so that nothing flickers."""
+def _gif(frames: list[Image.Image], duration: float, colours: int) -> bytes:
+    """Return a GIF with one palette for all frames, taken from a few of them, so that nothing flickers."""
     few = frames[:: max(1, len(frames) // PALETTE_FRAMES)]
     strip = Image.new("RGB", (frames[0].width, len(few) * frames[0].height))
     for index, frame in enumerate(few):
         strip.paste(frame, (0, index * frame.height))
     palette = strip.quantize(colours)
     indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    indexed[0].save(
-        path, save_all=True, append_images=indexed[1:], duration=round(1000 * duration), loop=0, optimize=False
-    )
+    film, lasts = BytesIO(), round(1000 * duration)
+    indexed[0].save(film, "GIF", save_all=True, append_images=indexed[1:], duration=lasts, loop=0, optimize=False)
+    return film.getvalue()

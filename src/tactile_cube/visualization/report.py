@@ -8,6 +8,8 @@ from typing import Literal
 
 from jinja2 import Environment
 
+from tactile_cube.whole_file import write_whole
+
 Tone = Literal["good", "warn", "plain"]
 
 
@@ -72,4 +74,4 @@ def write_report(report: Report, path: Path) -> None:
     """Write the page; it needs no network and no other file."""
     template = resources.files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    path.write_text(environment.from_string(template).render(report=report), encoding="utf-8")
+    write_whole(path, environment.from_string(template).render(report=report).encode())

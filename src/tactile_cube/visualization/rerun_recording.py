@@ -16,6 +16,7 @@ import rerun_bindings
 from rerun.urdf import UrdfTree
 
 from tactile_cube.evaluation.episode_record import Array
+from tactile_cube.whole_file import write_whole
 
 APPLICATION = "tactile_cube"
 TIMELINE = "time"
@@ -76,16 +77,17 @@ def recording_file(
     """
     rerun_bindings.flush_and_cleanup_orphaned_recordings()
     stream = rr.RecordingStream(application, recording_id=path.stem)
-    _save(stream, path, blueprint, application)
+    written = rr.binary_stream(stream)  # a file of Rerun's own would be cut short by a full disk
+    _arrange(stream, blueprint, application)
     try:
         yield stream
+        write_whole(path, written.read() or b"")
     finally:
-        stream.flush()
         stream.disconnect()
 
 
-def _save(stream: rr.RecordingStream, path: Path, blueprint: rrb.Blueprint, application: str) -> None:
-    """What `stream.save(path, default_blueprint=blueprint)` does, but the blueprint's own stream is closed after it.
+def _arrange(stream: rr.RecordingStream, blueprint: rrb.Blueprint, application: str) -> None:
+    """What `stream.send_blueprint(blueprint)` does, but the blueprint's own stream is closed after it.
 
     Rerun's keeps that stream, two threads, for good: its memory refers to it, and it to its memory (rerun-sdk 0.41.0).
     """
@@ -95,9 +97,8 @@ def _save(stream: rr.RecordingStream, path: Path, blueprint: rrb.Blueprint, appl
     layout = rr.RecordingStream._from_native(native)
     layout.set_time("blueprint", sequence=0)
     blueprint._log_to_stream(layout)
-    rerun_bindings.save(
-        path=str(path), default_blueprint=layout.memory_recording().storage, recording=stream.to_native()
-    )
+    arranged = layout.memory_recording().storage
+    rerun_bindings.send_blueprint(arranged, make_active=False, make_default=True, recording=stream.to_native())
     layout.disconnect()
 
 

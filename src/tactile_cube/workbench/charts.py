@@ -17,6 +17,7 @@ from tactile_cube.measurement.comparing.error import residuals
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.units import THOUSANDTHS, of_joint
 from tactile_cube.visualization.charts import BEFORE, ERROR, FAILING, FLOOR, GRID, MEASURED, PALETTE, SIMULATED
+from tactile_cube.workbench.text import label, plain
 
 Array = NDArray[np.float64]
 TOOLS = "xpan,xwheel_zoom,box_zoom,reset,save"
@@ -25,7 +26,9 @@ CONTEXT = 0.5  # [s] shown on either side of a failing interval
 
 
 def _figure(height: int, x: str, y: str, tools: str = TOOLS, **more: object) -> figure:
-    made = figure(height=height, sizing_mode="stretch_width", tools=tools, x_axis_label=x, y_axis_label=y, **more)
+    made = figure(height=height, sizing_mode="stretch_width", tools=tools, **more)
+    label(made.xaxis[0], x)
+    label(made.yaxis[0], y)
     made.toolbar.logo = None
     made.grid.grid_line_color = GRID
     made.outline_line_color = None
@@ -77,8 +80,8 @@ class TimeChart:
         if self._trial is not trial:
             self.x.update(start=0.0, end=trial.duration, reset_start=0.0, reset_end=trial.duration)
         self._trial, self._joint = trial, joint
-        self.angle.yaxis.axis_label = f"position [{unit}]"
-        self.error.yaxis.axis_label = f"error [{THOUSANDTHS[unit]}]"
+        label(self.angle.yaxis[0], f"position [{unit}]")
+        label(self.error.yaxis[0], f"error [{THOUSANDTHS[unit]}]")
         rows = self._rows()
         command = (
             trial.command[rows, joint] if not recording.torque_controlled else np.full(len(trial.time[rows]), np.nan)
@@ -133,9 +136,9 @@ class MissingChart:
 
     def show(self, missing: Missing, signal: str, law: Missing | None, unit: str) -> None:
         """Draw it over one of its signals."""
-        self.figure.xaxis.axis_label = of_joint(signal, unit)
-        label = of_joint("missing torque [N m]", unit)
-        self.figure.yaxis.axis_label = label.replace("torque", "force") if label.endswith("[N]") else label
+        label(self.figure.xaxis[0], of_joint(signal, unit))
+        lacks = of_joint("missing torque [N m]", unit)
+        label(self.figure.yaxis[0], lacks.replace("torque", "force") if lacks.endswith("[N]") else lacks)
         some = slice(None, None, max(1, len(missing.torque) // POINTS))
         self.points.data = {"x": missing.signals[signal][some], "y": missing.torque[some]}
         self.mean.data = _curves(missing, signal)
@@ -168,12 +171,12 @@ class ExperimentChart:
     def show(self, experiment: Experiment, units: Sequence[str]) -> None:
         """Draw the commands of all joints, and what the limits less the margin allow as dashed lines."""
         self.figure.renderers, self.figure.center = [], [one for one in self.figure.center if not isinstance(one, Span)]
-        self.figure.yaxis.axis_label = f"command [{' or '.join(dict.fromkeys(units))}]"
+        label(self.figure.yaxis[0], f"command [{' or '.join(dict.fromkeys(units))}]")
         allowed = experiment.safety.allowed
         low, high = float(allowed.low.min()), float(allowed.high.max())
         self.range.update(start=low - 0.1 * (high - low), end=high + 0.1 * (high - low))
         for j, joint in enumerate(experiment.joints):
             color = PALETTE[j % len(PALETTE)]
-            self.figure.line(experiment.time, experiment.commands[:, j], color=color, legend_label=joint)
+            self.figure.line(experiment.time, experiment.commands[:, j], color=color, legend_label=plain(joint))
             for bound in (allowed.low[j], allowed.high[j]):
                 self.figure.add_layout(Span(location=bound, dimension="width", line_color=color, line_dash="dashed"))

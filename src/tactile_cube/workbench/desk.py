@@ -18,11 +18,13 @@ from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.identification.search.screening import Score
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.usage_error import usage_error
 from tactile_cube.workbench.background import Diagnosing, Found
 from tactile_cube.workbench.importing import RIGS, Preview, import_logs, kept, preview, require_known
 from tactile_cube.workbench.state import Workbench
 
 PROGRESS = 12  # lines of a diagnosis that are kept
+LABEL = 60  # characters of a wrong name that an error repeats
 
 
 class Desk:
@@ -84,11 +86,12 @@ class Desk:
             self.say(words)
             try:
                 work()
-            except InputError as error:
-                self.problem = str(error).replace(f"{self.folder}/", "")
             except Exception as error:
-                traceback.print_exc(file=sys.stderr)
-                self.problem = f"{type(error).__name__}: {error}; that is a defect of the workbench, see the terminal"
+                said = usage_error(error)
+                if said is None:
+                    traceback.print_exc(file=sys.stderr)
+                    said = f"{type(error).__name__}: {error}; that is a defect of the workbench, see the terminal"
+                self.problem = said.replace(f"{self.folder}/", "")
             self.say("")
 
         self._worker.submit(run)
@@ -115,7 +118,7 @@ class Desk:
         """Take what somebody named: a recording's folder, a model.yaml, logs (a pattern too) or a URDF."""
 
         def run() -> None:
-            path = Path(text.strip()).expanduser()
+            path = _path(text)
             if (path / DESCRIPTION).is_file():
                 self._load(path)
             elif path.name.endswith((".yaml", ".yml")):
@@ -267,14 +270,31 @@ class Desk:
 
         def run() -> None:
             if self.bench is not None:
-                self.bench.save(folder)
-                model = Path(folder) / "model.yaml"
+                self.bench.save(_path(folder))
+                model = _path(folder) / "model.yaml"
                 self.notes = [
                     f"saved {model} and report.html",
                     f"train in it: python -m tactile_cube.train +experiment=adapt model={model}",
                 ]
 
         self.do("saving", run)
+
+
+def _path(text: str) -> Path:
+    """What somebody typed, as a path.
+
+    Raises:
+        InputError: no file can have this name.
+    """
+    try:
+        path = Path(text.strip()).expanduser()
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return path
+    except (OSError, RuntimeError, ValueError) as error:  # a NUL, 10 000 characters, nobody's home
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{text[:LABEL]!r}: no name of a file here: {reason}; type another one") from None
+    return path
 
 
 def _number(key: str, text: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,9 +25,12 @@ from tactile_cube.measurement.recordings.writing import (
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
 from tactile_cube.measurement.sources.csv_files import CsvFiles, kinds_of
 from tactile_cube.untrusted_file import below
+from tactile_cube.whole_file import write_whole
 
 LARGEST = 100_000_000
 """Bytes of one file that a browser hands over; larger ones are named by their path."""
+NAME = 200
+"""Bytes of a file's name; the system allows some more."""
 TABLES, RIGS = (".csv", ".txt", ".parquet", ".npz"), (".urdf", ".xml")
 BAGS = (".mcap", ".bag", ".db3")
 SHOWN = 5  # rows
@@ -55,14 +59,16 @@ def kept(folder: Path, name: str, content: bytes) -> Path:
     """Write a file that a browser handed over and return its path; of its name only the last part counts.
 
     Raises:
-        InputError: it is too large, or neither a log nor a URDF.
+        InputError: it is too large, neither a log nor a URDF, or has a name that no file can have here.
     """
     name = Path(name.replace("\\", "/")).name
+    if not name.isprintable() or len(os.fsencode(name)) > NAME:
+        raise InputError(f"{name[:NAME]!r}: no name of a file here; give it one of at most {NAME} printable characters")
     require_known(Path(name))
     if len(content) > LARGEST:
         raise InputError(f"{name}: {len(content) / 1e6:.0f} MB, more than {LARGEST / 1e6:.0f}; name its path instead")
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / name).write_bytes(content)
+    write_whole(folder / name, content)
     return folder / name
 
 

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import base64
 import functools
-from html import escape
-from typing import Any
 
 from bokeh.document import Document
 from bokeh.models import (
-    Button,
-    CustomJS,
-    Div,
     FileInput,
     LayoutDOM,
     PrintfTickFormatter,
@@ -31,25 +26,12 @@ from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeCha
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import RIGS, TABLES
 from tactile_cube.workbench.state import ModelStage, Value, Workbench
-from tactile_cube.workbench.widgets import NONE, RED, YELLOW, ImportForm, button, column_of, listed, row_of, text_of
+from tactile_cube.workbench.text import Html, choose, html, listed, plain, show
+from tactile_cube.workbench.widgets import NONE, RED, YELLOW, ImportForm, button, column_of, row_of, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
-SAVE_CSV = """
-const link = document.createElement("a");
-link.href = URL.createObjectURL(new Blob([text.text], {type: "text/csv"}));
-link.download = "next_experiment.csv";
-link.click();
-"""
+DOWNLOAD = Html('<a href="next_experiment.csv" download>Download CSV</a>')
 LINE = {"border-top": "1px solid #d0d7de"}
-
-
-def _choose(select: Select, options: list[Any], keep: str = "") -> None:
-    """Give a select other options; it keeps its value where that is still one of them."""
-    values = [one if isinstance(one, str) else one[0] for one in options]
-    wanted = keep or select.value
-    if select.options != options:
-        select.options = options
-    select.value = wanted if wanted in values else (values[0] if values else "")
 
 
 class Page:
@@ -85,7 +67,7 @@ class Page:
         ]
 
     def _section(self, name: str, title: str, part: LayoutDOM) -> LayoutDOM:
-        head = text_of(text=f'<h2 style="font-size:16px;margin:8px 0 0">{title}</h2>', styles=LINE)
+        head = text_of(Html('<h2 style="font-size:16px;margin:8px 0 0">{}</h2>').format(title), styles=LINE)
         return column_of(head, part, name=name, visible=False)
 
     def _open_part(self) -> LayoutDOM:
@@ -141,12 +123,9 @@ class Page:
         return column_of(self.sliders, row_of(self.present, self.remove))
 
     def _next_part(self) -> LayoutDOM:
-        self.csv, self.proposal = Div(visible=False), text_of()
-        self.download = Button(label="Download CSV", width=140)
-        self.download.js_on_event("button_click", CustomJS(args={"text": self.csv}, code=SAVE_CSV))
+        self.proposal = text_of()
         self.experiment.figure.visible = False
-        buttons = row_of(button("Propose", self.desk.propose), self.download, self.csv)
-        return column_of(buttons, self.proposal, self.experiment.figure)
+        return column_of(row_of(button("Propose", self.desk.propose)), self.proposal, self.experiment.figure)
 
     def _save_part(self) -> LayoutDOM:
         self.folder = TextInput(title="folder", value=str(self.desk.folder / "model"), width=300)
@@ -165,7 +144,7 @@ class Page:
 
     def _zoom(self) -> None:
         if not self.showing and self.where.value != NONE:
-            _, start, end = self.where.value.split("|")
+            start, end = self.where.value.split("|")
             self.time.zoom(float(start), float(end))
 
     def _look_closer(self) -> None:
@@ -236,8 +215,9 @@ class Page:
         self.start.label = "Diagnose" if desk.diagnosing is None else "Stop"
         known = bench.effects if bench else []
         self.accept.disabled = not (desk.found and set(desk.found.effects) - set(known))
-        answer = f'<pre style="white-space:pre-wrap">{escape(desk.found.text)}</pre>' if desk.found else ""
-        self.progress.text = answer or listed(desk.progress)
+        answer = Html('<pre style="white-space:pre-wrap">{}</pre>')
+        lines = desk.found.text.splitlines() if desk.found else []
+        show(self.progress, answer.format(Html("\n").join(lines)) if lines else listed(desk.progress))
         if bench is None:
             return
         for part in self.parts:
@@ -252,23 +232,24 @@ class Page:
 
     def _show_status(self) -> None:
         desk = self.desk
-        busy = f'<div style="color:{SIMULATED}">&#9679; {escape(desk.busy)} ...</div>' if desk.busy else ""
-        problem = listed([desk.problem], RED) if desk.problem else ""
+        busy = listed([f"\u25cf {desk.busy} ..."] if desk.busy else [], f"color:{SIMULATED}")
+        problem = listed([desk.problem] if desk.problem else [], RED)
         doubts = [one for one in desk.notes if one.startswith(("warning: ", "guess: "))]
-        notes = listed(doubts, YELLOW) + listed(one for one in desk.notes if one not in doubts)
+        notes = html(listed(doubts, YELLOW), listed(one for one in desk.notes if one not in doubts))
         hint = "" if desk.bench or desk.logs else "Open a recording, or drop logs and the URDF of their rig."
-        self.status.text = f'<div role="status" aria-live="polite">{busy}{problem}{notes}{hint}</div>'
+        live = Html('<div role="status" aria-live="polite">{}</div>')
+        show(self.status, live.format(html(busy, problem, notes, hint)))
 
     def _show_model(self, bench: Workbench) -> None:
         recording = bench.recording
         trials = [t.name for t in recording.trials if t.name in bench.never_fitted]
         others = [t.name for t in recording.trials if t.name not in bench.never_fitted]
-        _choose(self.trial, [(name, f"{name} (never fitted)") for name in trials] + [(name, name) for name in others])
-        _choose(self.joint, list(recording.joints), "" if self.joint.value else recording.joints[-1])
-        _choose(self.other, [NONE, *(f"{k}: {one.label}" for k, one in enumerate(bench.stages[:-1]))])
-        _choose(self.present, bench.effects)
+        choose(self.trial, [(name, f"{name} (never fitted)") for name in trials] + [(name, name) for name in others])
+        choose(self.joint, list(recording.joints), "" if self.joint.value else recording.joints[-1])
+        choose(self.other, [NONE, *(f"{k}: {one.label}" for k, one in enumerate(bench.stages[:-1]))])
+        choose(self.present, bench.effects)
         self.remove.disabled = not bench.effects
-        self.stairs.text = _error_by_stage(bench)
+        show(self.stairs, _error_by_stage(bench))
 
     def _show_candidates(self, bench: Workbench) -> None:
         joint = self.joint.value
@@ -282,7 +263,7 @@ class Page:
         leaders = [effect_path(group[0].candidate.effect) for group in groups or [] for _ in group]
         self.ranked.active = None
         self.ranked.labels = [
-            f"{100 * bench.share(score):.0f} %  {name}" + (f" (looks like {leader})" if name != leader else "")
+            plain(f"{100 * bench.share(score):.0f} %  {name}" + (f" (looks like {leader})" if name != leader else ""))
             for name, leader, score in zip(names, leaders, self.scores, strict=True)
         ]
         if groups is None:
@@ -290,34 +271,32 @@ class Page:
         unseen = bench.unseen(joint)
         hidden = {one.effect for one in unseen}
         every = sorted(effect_path(effect) for effect in bench.search.effects)
-        _choose(self.another, [NONE, *(name for name in every if name not in hidden and name not in names)], NONE)
-        lines = "".join(f"<div>{escape(one.effect)}: {escape(one.why)}</div>" for one in unseen)
+        choose(self.another, [NONE, *(name for name in every if name not in hidden and name not in names)], NONE)
+        lines = listed(f"{one.effect}: {one.why}" for one in unseen)
         reach = self.desk.explainable.get(joint)
         bound = (
             ""
             if reach is None
             else f" A black box of the logged signals explains {100 * reach:.0f} % of what is missing."
         )
-        self.unseen.text = (
-            f"First look: the part of the squared error on the fitted trials that each would take away.{bound}"
-            f'<details style="color:{FLOOR}"><summary>{len(unseen)} cannot be seen in these trials</summary>'
-            f"{lines}</details>"
+        folded = Html('<details style="color:{}"><summary>{} cannot be seen in these trials</summary>{}</details>')
+        show(
+            self.unseen,
+            f"First look: the part of the squared error on the fitted trials that each would take away.{bound}",
+            folded.format(FLOOR, len(unseen), lines),
         )
 
     def _show_experiment(self, bench: Workbench) -> None:
         proposed = self.desk.experiment
         self.experiment.figure.visible = proposed is not None
-        self.download.disabled = proposed is None or not proposed.decides
-        self.csv.text = self.desk.commands if proposed is not None and proposed.decides else ""
         if proposed is None:
-            self.proposal.text = ""
+            show(self.proposal)
             return
         safety = "keeps to the limits" if proposed.safety.safe else "would LEAVE the limits, do not play it"
         worth = f"evidence expected: {proposed.told:.3g} times what decides" if proposed.decides else "decides nothing"
         pair = " and ".join(proposed.predictions) or "the models"
-        self.proposal.text = listed(
-            [f"{proposed.name}, {proposed.time[-1]:.1f} s, to tell {pair} apart: {worth}; {safety} (dashed)"]
-        )
+        line = f"{proposed.name}, {proposed.time[-1]:.1f} s, to tell {pair} apart: {worth}; {safety} (dashed)"
+        show(self.proposal, listed([line]), DOWNLOAD if proposed.decides else "")
         if self.experiment.figure.tags != [self.desk.version, id(proposed)]:
             self.experiment.figure.tags = [self.desk.version, id(proposed)]
             self.experiment.show(proposed, list(bench.recording.units.values()))
@@ -341,7 +320,7 @@ class Page:
 
     def _show_missing(self, bench: Workbench, joint: str) -> None:
         missing, law = bench.missing(joint), self.desk.signature
-        _choose(self.signal, signals(missing))
+        choose(self.signal, signals(missing))
         law = law if law is not None and law.joint == joint else None
         self.missing.show(missing, self.signal.value, law, bench.recording.units[joint])
 
@@ -357,9 +336,9 @@ class Page:
         failing = [one for one in compared.failing_intervals if one.joint == joint]
         failing.sort(key=lambda one: -one.error)
         self.where.value = NONE
-        self.where.options = [NONE, *(_interval(one, unit) for one in failing[:20])]
+        choose(self.where, [NONE, *(_interval(one, unit) for one in failing[:20])])
         error = f"{joint} in this trial: {milli(compared.raw[0].joints[joint], unit)} RMS of the free run"
-        self.sentences.text = listed([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))])
+        show(self.sentences, listed([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))]))
 
     def _show_sliders(self, bench: Workbench, joint: str) -> None:
         values = bench.values(joint)
@@ -374,7 +353,7 @@ class Page:
         low, high = one.unknown.low, one.unknown.high
         slider = Slider(
             start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
-            title=f"{name} [{one.unit}]: {one.value:.4g}{found}; now", format=PrintfTickFormatter(format="%.4g"),
+            title=f"{plain(name)} [{one.unit}]: {one.value:.4g}{found}; now", format=PrintfTickFormatter(format="%.4g"),
         )  # fmt: skip
         slider.on_change("value", lambda attr, old, new: self._move(one, new))
         slider.on_change("value_throttled", lambda attr, old, new: self._set(one, new))
@@ -382,31 +361,29 @@ class Page:
 
 
 def _interval(one: FailingInterval, unit: str) -> tuple[str, str]:
-    return f"{one.joint}|{one.start}|{one.end}", f"{one.start:.2f} to {one.end:.2f} s: {milli(one.error, unit)}"
+    return f"{one.start}|{one.end}", f"{one.start:.2f} to {one.end:.2f} s: {milli(one.error, unit)}"
 
 
-def _error_by_stage(bench: Workbench) -> str:
+def _error_by_stage(bench: Workbench) -> Html:
     """The table of stages: raw error and error over the noise on the trials that were never fitted."""
     joints, units = bench.recording.joints, bench.recording.units
     most = max(max(stage.raw.joints.values()) for stage in bench.stages) or 1.0
 
-    def row(label: str, errors: dict[str, float], over: str) -> str:
-        cells = "".join(
-            f'<td style="text-align:right;background:linear-gradient(90deg,#cfe3f2 {100 * errors[j] / most:.0f}%,'
-            f'transparent 0)">{milli(errors[j], units[j])}</td>'
-            for j in joints
-        )
-        return f"<tr><td>{escape(label)}</td>{cells}<td style='text-align:right'>{over}</td></tr>"
+    cell = Html('<td style="text-align:right;background:linear-gradient(90deg,#cfe3f2 {:.0f}%,transparent 0)">{}</td>')
+    line = Html("<tr><td>{}</td>{}<td style='text-align:right'>{}</td></tr>")
 
-    def stage_row(stage: ModelStage) -> str:
+    def row(label: str, errors: dict[str, float], over: str) -> Html:
+        cells = html(*(cell.format(100 * errors[j] / most, milli(errors[j], units[j])) for j in joints))
+        return line.format(label, cells, over)
+
+    def stage_row(stage: ModelStage) -> Html:
         return row(stage.label, stage.raw.joints, f"{stage.judgement.error:.2f}")
 
-    head = "".join(f"<th>{escape(joint)}</th>" for joint in joints)
+    head = html(*(Html("<th>{}</th>").format(joint) for joint in joints))
     floor = "noise floor" + ("" if bench.floor.source == "repeats" else " (guess: no repeats)")
-    return (
-        f'<table cellpadding="4" style="width:100%"><tr><th></th>{head}<th>over noise</th></tr>'
-        + "".join(map(stage_row, bench.stages))
-        + row(floor, bench.floor.joints, "1")
-        + f"</table>RMS error of free runs on {len(bench.never_fitted)} trials that are never fitted; "
-        "over noise: error in short segments over the sensor's noise."
+    table = Html('<table cellpadding="4" style="width:100%"><tr><th></th>{}<th>over noise</th></tr>{}{}</table>')
+    return html(
+        table.format(head, html(*map(stage_row, bench.stages)), row(floor, bench.floor.joints, "1")),
+        f"RMS error of free runs on {len(bench.never_fitted)} trials that are never fitted; "
+        "over noise: error in short segments over the sensor's noise.",
     )

@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
-import secrets
+import os
+import sys
 import webbrowser
+from collections.abc import Iterator
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tactile_cube.api.job import Job
 from tactile_cube.errors import InputError
+from tactile_cube.whole_file import write_whole
 
 if TYPE_CHECKING:
     from bokeh.document import Document
-    from bokeh.server.server import Server
+    from bokeh.server.server import BaseServer
 
     from tactile_cube.workbench.desk import Desk
 
 HOST = "127.0.0.1"
 MESSAGE = 280_000_000
 """Bytes of a message from the page: two files of `importing.LARGEST` as base64; more closes the connection."""
+BODY = 100_000
+"""Bytes of a request; the page sends its files as messages."""
+REDIRECT = '<!DOCTYPE html><meta http-equiv="refresh" content="0;url={}">'
 
 
-def start(desk: Desk, port: int = 0) -> tuple[Server, str]:
+def start(desk: Desk, port: int = 0) -> tuple[BaseServer, str]:
     """Serve a desk on 127.0.0.1 and return the server, not yet running, and its address with the token.
 
     Raises:
@@ -30,51 +38,65 @@ def start(desk: Desk, port: int = 0) -> tuple[Server, str]:
     """
     try:
         from bokeh.application import Application
-        from bokeh.application.handlers.document_lifecycle import DocumentLifecycleHandler
         from bokeh.application.handlers.function import FunctionHandler
-        from bokeh.server.server import Server
+        from bokeh.server.server import BaseServer
+        from bokeh.server.util import bind_sockets
     except ModuleNotFoundError:
         raise InputError("the workbench needs Bokeh: pip install 'tactile-cube[workbench]'") from None
     from jinja2 import Template
+    from tornado.httpserver import HTTPServer
+    from tornado.ioloop import IOLoop
 
+    from tactile_cube.workbench.door import ENTER, NONCE, Door
     from tactile_cube.workbench.page import Page
 
-    token = secrets.token_urlsafe(24)
     template = Template(resources.files(__package__).joinpath("page.html.jinja").read_text(encoding="utf-8"))
-    refusal = Template("<!DOCTYPE html><title>workbench</title>Open the address that the workbench printed.")
 
     def window(document: Document) -> None:
-        asked = document.session_context.request.arguments.get("token", [b""])[0]
-        right = secrets.compare_digest(asked, token.encode())
-        document.title, document.template = "workbench", template if right else refusal
-        if right:
-            Page(document, desk)
+        document.title, document.template, document.template_variables["nonce"] = "workbench", template, NONCE
+        Page(document, desk)
 
     try:
-        application = Application(FunctionHandler(window), DocumentLifecycleHandler())
-        server = Server(application, address=HOST, port=port, websocket_max_message_size=MESSAGE)
+        sockets, port = bind_sockets(HOST, port)
     except OSError as error:
         raise InputError(
             f"port={port}: {error.strerror or error}; choose another one, or 0 for any that is free"
         ) from None
+    door = Door(Application(FunctionHandler(window)), desk, port, MESSAGE)
+    http = HTTPServer(door, max_body_size=BODY)
+    http.add_sockets(sockets)
+    server = BaseServer(IOLoop.current(), door, http)
     server.start()
-    return server, f"http://{HOST}:{server.port}/?token={token}"
+    return server, f"http://{HOST}:{port}{ENTER}?token={door.token}"
 
 
 def serve(job: Job) -> None:
-    """Serve until Ctrl-C."""
+    """Serve until Ctrl-C; what it writes is its user's alone, and the token stands in no log and no command line."""
     from tactile_cube.workbench.desk import Desk
 
     logging.getLogger("bokeh").setLevel(logging.ERROR)
+    os.umask(0o077)
+    for file in job.folder.glob("*.log"):
+        file.chmod(0o600)
     config = job.config
     desk = Desk(job.folder, config.own_effects or (), config.seed, config.model)
     server, address = start(desk, config.port)
     if config.recording is not None:
         desk.open(str(config.recording))
-    print(f"workbench: {address}\nCtrl-C ends it", flush=True)
-    if config.open:
-        webbrowser.open(address)
+    print(f"workbench: {address}\nCtrl-C ends it", file=sys.__stdout__, flush=True)  # past the log
+    with _opened(job.folder / "open.html", address) if config.open else contextlib.nullcontext():
+        try:
+            server.io_loop.start()
+        except KeyboardInterrupt:
+            desk.stop()
+
+
+@contextlib.contextmanager
+def _opened(file: Path, address: str) -> Iterator[None]:
+    """Open a browser by a file, as other users of the machine see its command line."""
+    write_whole(file, REDIRECT.format(address).encode())
     try:
-        server.io_loop.start()
-    except KeyboardInterrupt:
-        desk.stop()
+        webbrowser.open(file.resolve().as_uri())
+        yield
+    finally:
+        file.unlink(missing_ok=True)

@@ -37,6 +37,7 @@ from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.model import Model, effect_path
 from tactile_cube.measurement.replay.simulator import Simulated, free_run
 from tactile_cube.measurement.units import of_joint
+from tactile_cube.whole_file import written_together
 from tactile_cube.workbench.background import Diagnosing
 
 Array = NDArray[np.float64]
@@ -329,15 +330,14 @@ class Workbench:
         from tactile_cube.visualization.diagnosis_report import identification_report
         from tactile_cube.visualization.report import write_report
 
-        folder = Path(folder)
-        model = self.model_file()
-        folder.mkdir(parents=True, exist_ok=True)
-        write_model(model, folder / "model.yaml")
+        model, path = self.model_file(), str(Path(folder) / "model.yaml")
         after = compare_recording(without_touches(self.opened), model, "fast", USUAL_STEP, floor=self.floor)
         stages = {one.label: one.errors.overall for one in self.stages} | {"noise_floor": self.floor.overall}
         joints = {one.label: one.errors.joints for one in self.stages}
-        page = identification_report(after, stages, joints, model.provenance.command, str(folder / "model.yaml"))
-        write_report(page, folder / "report.html")
+        page = identification_report(after, stages, joints, model.provenance.command, path)
+        with written_together(Path(folder), "model.yaml") as aside:
+            write_report(page, aside / "report.html")
+            write_model(model, aside / "model.yaml")
         return model
 
     def model_file(self) -> ModelFile:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from html import escape
+from collections.abc import Callable
 from typing import Any
 
 from bokeh.models import Button, Column, Div, LayoutDOM, Row, Select, TextInput
@@ -11,6 +10,7 @@ from bokeh.models import Button, Column, Div, LayoutDOM, Row, Select, TextInput
 from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.sources.units import ANGLE_UNITS, TIME_UNITS, TORQUE_UNITS
 from tactile_cube.workbench.desk import Desk
+from tactile_cube.workbench.text import Html, choose, html, listed, show
 
 GAINS = {"kp": "K_P [N m/rad]", "kd": "K_D [N m s/rad]", "torque_limit": "torque limit [N m]"}
 NOMINAL = {
@@ -34,14 +34,12 @@ def column_of(*parts: LayoutDOM, **more: Any) -> Column:
     return Column(*parts, sizing_mode="stretch_width", **more)
 
 
-def text_of(**more: Any) -> Div:
-    """A text as wide as the window allows; what is shown in it is escaped by whoever writes it."""
-    return Div(sizing_mode="stretch_width", disable_math=True, **more)
-
-
-def listed(lines: Iterable[str], style: str = "") -> str:
-    """Lines as HTML, escaped."""
-    return "".join(f'<div style="{style}">{escape(line)}</div>' for line in lines)
+def text_of(*parts: str, styles: dict[str, str] | None = None, **more: Any) -> Div:
+    """A text as wide as the window allows."""
+    wrapped = {"overflow-wrap": "anywhere"} | (styles or {})
+    pane = Div(sizing_mode="stretch_width", disable_math=True, styles=wrapped, **more)
+    show(pane, *parts)
+    return pane
 
 
 def button(label: str, work: Callable[[], object], kind: str = "default") -> Button:
@@ -84,18 +82,20 @@ class ImportForm:
         text = f"To be imported: {', '.join(names)} with {desk.urdf.name if desk.urdf else '?'}"
         if desk.same_rig is not None:
             text += "; together with the trials of this recording, its gains hold where you state none"
-        self.waiting.text = listed([text]) + listed([f"still needed: {' and '.join(lacks)}"] if lacks else [], YELLOW)
+        show(self.waiting, listed([text]), listed([f"still needed: {' and '.join(lacks)}"] if lacks else [], YELLOW))
         there = None if seen is None else (seen.columns, seen.joints)
         if there == self.seen:
             return
         self.seen = there
-        self.table.text, self.columns.children = "", []
+        show(self.table)
+        self.columns.children = []
         if seen is None:
             return
-        cells = ["".join(f"<td>{value:.6g}</td>" for value in row) for row in seen.rows]
-        head = "".join(f"<th>{escape(name)}</th>" for name in seen.columns)
+        rows = [html(*(Html("<td>{:.6g}</td>").format(value) for value in row)) for row in seen.rows]
+        head = html(*(Html("<th>{}</th>").format(name) for name in seen.columns))
         doubt = listed([seen.doubt] if seen.doubt else [], YELLOW)
-        self.table.text = f'{doubt}<table cellpadding="4"><tr>{head}</tr><tr>{"</tr><tr>".join(cells)}</tr></table>'
+        lines = html(*(Html("<tr>{}</tr>").format(row) for row in (head, *rows)))
+        show(self.table, doubt, Html('<table cellpadding="4">{}</table>').format(lines))
         guessed = {joint: seen.guess.joints.get(joint, {}) if seen.guess else {} for joint in seen.joints}
         self.columns.children = [
             _columns_row("", "time", {"time": (seen.guess.time if seen.guess else None) or NONE}, seen.columns),
@@ -125,5 +125,10 @@ class ImportForm:
 
 def _columns_row(label: str, name: str, chosen: dict[str, str], columns: list[str]) -> Row:
     """A select of columns for each signal, with the column that is chosen."""
-    selects = [Select(title=k, options=[NONE, *columns], value=value, width=140) for k, value in chosen.items()]
-    return row_of(Div(text=escape(label), width=80), *selects, name=name)
+    selects = []
+    for signal, value in chosen.items():
+        selects.append(Select(title=signal, width=140))
+        choose(selects[-1], [NONE, *columns], value)
+    name_of = Div(width=80, disable_math=True, styles={"overflow-wrap": "anywhere"})
+    show(name_of, label)
+    return row_of(name_of, *selects, name=name)

@@ -1,5 +1,6 @@
 """Write a recording: recording.yaml, rig.urdf and one table a trial."""
 
+import io
 import shutil
 import sys
 import tempfile
@@ -20,6 +21,7 @@ from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_record
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.timing import rows_of
 from tactile_cube.untrusted_file import below
+from tactile_cube.whole_file import write_npz, write_whole, written_together
 
 Array = NDArray[np.float64]
 
@@ -49,15 +51,14 @@ class RecordingTables:
 
 
 def write_recording(folder: Path, recording: RecordingTables) -> None:
-    """Write a recording into a folder.
+    """Write a recording into a folder; its recording.yaml appears last.
 
     Raises:
         InputError: a trial's file, which a log may have named, lies outside of it.
     """
     description, tables = recording.description, recording.tables
-    files = [below(folder, table.entry.file, "trials.file") for table in tables]
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / description.rig).write_text(recording.urdf, encoding="utf-8")
+    for table in tables:
+        below(folder, table.entry.file, "trials.file")
     data = description.model_dump(exclude_defaults=True, exclude_none=True, exclude={"trials"})
     entries = [  # file, initialisation and kind always, the rest where it was said
         table.entry.model_dump(include={"file", "initialisation", "kind"})
@@ -66,9 +67,11 @@ def write_recording(folder: Path, recording: RecordingTables) -> None:
     ]
     ordered = {"format": 1, "rig": description.rig} | data | {"trials": entries}
     text = yaml.safe_dump(ordered, sort_keys=False, allow_unicode=True)
-    (folder / "recording.yaml").write_text(text, encoding="utf-8")
-    for file, table in zip(files, tables, strict=True):
-        _write_table(file, table, description.joints)
+    with written_together(folder, DESCRIPTION) as aside:
+        for table in tables:
+            _write_table(aside / table.entry.file, table, description.joints)
+        write_whole(aside / description.rig, recording.urdf.encode())
+        write_whole(aside / DESCRIPTION, text.encode())
 
 
 def _write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
@@ -81,11 +84,13 @@ def _write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
                 columns[f"{joint}.{signal}"] = values[:, index].astype(np.float32)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".npz":
-        np.savez_compressed(path, allow_pickle=False, **columns)
+        write_npz(path, columns)
     elif path.suffix == ".csv":
-        polars.DataFrame(columns).write_csv(path)
+        write_whole(path, polars.DataFrame(columns).write_csv().encode())
     else:
-        polars.DataFrame(columns).write_parquet(path)
+        content = io.BytesIO()
+        polars.DataFrame(columns).write_parquet(content)
+        write_whole(path, content.getbuffer())
 
 
 def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
