@@ -237,7 +237,7 @@ def test_a_wrong_value_is_named_with_its_key(tmp_path: Path, key: str, value: ob
         ("source: " + "1:" * 100_000 + "1", "is larger than any number"),  # base 60, minutes of arithmetic
         ("object: {<<: [{mass: 1}, {mass: 1}]}", "'<<' is not read"),  # 10 levels of 10 fill any memory
         (f"source: [{'1,' * 220_000}]", "more than 200000 keys and values"),
-        (f"source: {'[' * 100_000}", "50 within each other"),
+        (f"source: {'[' * 60}", "50 within each other"),  # PyYAML refuses 100 000 itself from 6.0.4 on
         (f"source: {'x' * 2_000_000}", "MB; up to 2 MB are read here"),
     ],
 )
