@@ -27,11 +27,13 @@ class Command:
         folder: run folder.
         settings: further words.
         limit: longest time [s] it may take before it counts as hung.
+        rows: that the undisturbed run writes into metrics.csv, without the header.
     """
 
     folder: Path
     settings: tuple[str, ...] = ()
     limit: float = 600.0
+    rows: int = 0
     process: BaseProcess = field(init=False)
 
     def start(self) -> None:

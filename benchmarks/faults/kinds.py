@@ -1,4 +1,4 @@
-"""The faults that a run must survive.
+"""The faults that a run must survive, at any moment or in a phase that chance seldom meets.
 
 A full disk is a limit on the size of files, which gives the process the same kind of error. A file that cannot be
 written is a folder in its place, which stops root too. A jump of the clock is not among them: training goes by the
@@ -25,11 +25,13 @@ class Kind:
         name: in the table.
         strike: does it to a running command; False when it had ended.
         undo: takes away what would keep the same command from going on.
+        phase: when its time begins; None: at the start of the command.
     """
 
     name: str
     strike: Callable[[Command], bool]
     undo: Callable[[Command], None] = lambda command: None
+    phase: Callable[[Command], bool] | None = None
 
 
 def _main(*signals: int) -> Callable[[Command], bool]:
@@ -96,6 +98,22 @@ def _unblocked(command: Command) -> None:
         blocked.rmdir()
 
 
+def _worker_there(command: Command) -> bool:
+    return bool(command.workers())
+
+
+def _all_logged(command: Command) -> bool:
+    metrics = command.folder / "metrics.csv"
+    return metrics.is_file() and metrics.read_text().count("\n") > command.rows
+
+
+PHASES = {"while it starts": _worker_there, "after the last iteration": _all_logged}
+AT_ITS_ENDS = tuple(
+    Kind(f"worker: {name} {words}", _worker(do), phase=phase)
+    for name, do in (("SIGKILL", psutil.Process.kill), ("SIGSTOP", psutil.Process.suspend))
+    for words, phase in PHASES.items()
+)
+"""What strikes within the second in which workers start, or after the last row of metrics.csv."""
 KINDS = (
     Kind("main process: SIGKILL", _main(signal.SIGKILL)),
     Kind("worker: SIGKILL", _worker(psutil.Process.kill)),
