@@ -81,7 +81,7 @@ def strike(kind: Kind, folder: Path, moment: float, settings: Sequence[str], ref
     """One fault and what comes of it."""
     command = Command(folder, tuple(settings), rows=len(reference["rows"]))
     command.start()
-    while kind.phase is not None and not command.ended and not kind.phase(command):
+    while kind.phase is not None and not command.ended and not kind.phase.begun(command):
         time.sleep(0.002)
     began = time.monotonic()
     while time.monotonic() - began < moment and not command.ended:
@@ -159,10 +159,6 @@ def table(outcomes: Sequence[Outcome], seconds: float) -> str:
     return f"{len(outcomes)} faults; the undisturbed run took {seconds:.0f} s; commit {current_commit()}\n\n{rows}\n"
 
 
-PHASE_SECONDS = 1.0
-"""Time within which a fault strikes once its phase has begun [s]; workers take about as long to start."""
-
-
 def campaign(
     faults: int, seed: int, out: Path | None, settings: Sequence[str] = SHORT, kinds: Sequence[Kind] = KINDS
 ) -> list[Outcome]:
@@ -176,7 +172,7 @@ def campaign(
             raise RuntimeError("two undisturbed runs differ")
         for number in range(faults):
             kind = kinds[number % len(kinds)]
-            folder, longest = Path(place) / f"fault{number}", PHASE_SECONDS if kind.phase else seconds
+            folder, longest = Path(place) / f"fault{number}", kind.phase.seconds if kind.phase else seconds
             outcomes.append(strike(kind, folder, moments.uniform(0.0, longest), settings, reference))
             print(outcomes[-1], flush=True)
             shutil.rmtree(folder)
@@ -193,9 +189,7 @@ def main() -> None:
     words.add_argument("--faults", type=int, default=100)
     words.add_argument("--seed", type=int, default=0)
     words.add_argument("--out", type=Path)
-    words.add_argument(
-        "--ends", action="store_true", help="strike only workers that start, and after the last iteration"
-    )
+    words.add_argument("--ends", action="store_true", help="only workers that start, and after the last iteration")
     words.add_argument("settings", nargs="*", help="further settings of the run, e.g. training.steps=1800")
     given = words.parse_args()
     kinds = AT_ITS_ENDS if given.ends else KINDS + AT_ITS_ENDS
