@@ -16,7 +16,7 @@ from tactile_cube.api.job import as_input_errors
 from tactile_cube.env import BORNE_TERMS, OUTCOMES, REWARD_TERMS, RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.rollout import Recorder
-from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode
+from tactile_cube.evaluation.verdict import judge_episode
 from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
@@ -32,7 +32,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
     """One world with stacked, noisy observations (120,) and actions (12,) in [-1, 1].
 
     `info` has "theta" [rad], "outcome", "faulty", "reward_terms" by name, and "privileged" (25,) for critics that may
-    see the object; in the last step of an episode also "is_success": whether the verdict of `evaluate` is regrasping.
+    see the object; in the last step of an episode also "is_success", as `evaluate` counts it.
     `render` shows what films of `evaluate` show. Random numbers come from a generator of its own: neither does it
     disturb torch's global one nor is it disturbed.
 
@@ -100,8 +100,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         if self._recorder is not None:
             self._recorder.add(data)
             if any(ends):
-                judged = judge_episode(self._recorder.record(0))
-                info["is_success"] = judged.verdict is EpisodeVerdict.REGRASPING
+                info["is_success"] = judge_episode(self._recorder.record(0)).success
         return data["observation"][0].numpy().copy(), float(data["reward"]), *ends, info
 
     def render(self) -> Picture | None:
