@@ -32,6 +32,8 @@ Progress = tuple[Any, ...]
 are steered also the odds of their parts."""
 
 
+GLANCE = 0.5
+"""How long a dead worker may go unnoticed [s]; siblings that inherited its pipe would hide its death for ever."""
 LAST_START = 3.0
 """How long a start that is given up may go on making processes [s]."""
 
@@ -166,6 +168,7 @@ class MultiSyncCollection:
         self._block: Future[TensorDictBase] | None = None
         self._final_cpu: float | None = None
         self._processes: list[Any] = []
+        self._seen = set[Any]()
         self._others = set(multiprocessing.active_children())
         build = partial(self._build, make_env, worlds // processes, worlds * steps, start_method)
         try:
@@ -250,7 +253,7 @@ class MultiSyncCollection:
     def _wait(self, future: "Future[Any]", doing: str) -> Any:
         name, seconds = ("timeout", self._timeout) if self._started else ("start_timeout", self._start_timeout)
         try:
-            return future.result(timeout=seconds)
+            return self._answer(future, seconds)
         except TimeoutError:
             self._kill()
             raise CollectionError(
@@ -262,6 +265,23 @@ class MultiSyncCollection:
         except BaseException:  # Ctrl-C: workers ignore it, and would be waited for
             self._kill()
             raise
+
+    def _answer(self, future: "Future[Any]", seconds: float) -> Any:
+        until = time.monotonic() + seconds
+        while True:
+            try:
+                return future.result(timeout=max(min(GLANCE, until - time.monotonic()), 0.0))
+            except TimeoutError:
+                if future.done() or time.monotonic() >= until:
+                    raise
+                if self._lost_a_worker():
+                    self._kill()  # what waits for it, says so then
+                    until = time.monotonic() + LAST_START
+
+    def _lost_a_worker(self) -> bool:
+        alive = set(multiprocessing.active_children()) - self._others
+        lost, self._seen = self._seen - alive, self._seen | alive
+        return bool(lost)
 
     def _kill(self) -> None:
         idle = self._thread.submit(lambda: None)  # before, it may start one more
