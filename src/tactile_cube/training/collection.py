@@ -163,12 +163,11 @@ class MultiSyncCollection:
     ):
         self._workers, self._timeout, self._start_timeout = processes, timeout, start_timeout
         self._started = False
-        self._behaviour = Behaviour(copy.deepcopy(actor))
+        self._behaviour, self._weights = Behaviour(copy.deepcopy(actor)), WeightSync()
         self._thread = Background()
         self._block: Future[TensorDictBase] | None = None
         self._final_cpu: float | None = None
         self._processes: list[Any] = []
-        self._seen = set[Any]()
         self._others = set(multiprocessing.active_children())
         build = partial(self._build, make_env, worlds // processes, worlds * steps, start_method)
         try:
@@ -192,7 +191,7 @@ class MultiSyncCollection:
             num_sub_threads=1,
             trust_policy=True,
             auto_register_policy_transforms=False,
-            weight_sync_schemes={"policy": WeightSync()},
+            weight_sync_schemes={"policy": self._weights},
             init_fn=partial(prepare_worker, None if start_method == "forkserver" else os.getpid()),
         )
         torch.set_num_threads(threads)
@@ -274,14 +273,9 @@ class MultiSyncCollection:
             except TimeoutError:
                 if future.done() or time.monotonic() >= until:
                     raise
-                if self._lost_a_worker():
+                if not all(process.is_alive() for process in self._weights.processes):
                     self._kill()  # what waits for it, says so then
                     until = time.monotonic() + LAST_START
-
-    def _lost_a_worker(self) -> bool:
-        alive = set(multiprocessing.active_children()) - self._others
-        lost, self._seen = self._seen - alive, self._seen | alive
-        return bool(lost)
 
     def _kill(self) -> None:
         idle = self._thread.submit(lambda: None)  # before, it may start one more

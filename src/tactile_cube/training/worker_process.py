@@ -30,6 +30,11 @@ class WeightSync(SharedMemWeightSyncScheme):  # type: ignore[misc]
             for one in queues.values():
                 one.cancel_join_thread()
 
+    @property
+    def processes(self) -> list[Any]:
+        """The workers so far, while they are still being started too."""
+        return list(getattr(self.context, "procs", ()))
+
     def shutdown(self) -> None:
         """End the thread that receives weights, in a worker."""
         WeightSyncScheme.shutdown(self)
