@@ -50,7 +50,7 @@ def test_loggers_write_into_the_run_folder(tmp_path: Path) -> None:
     for option in ("default", "csv"):
         (tmp_path / option).mkdir()
         for entry in composed(f"logger={option}").logger.values():
-            logger = instantiate(entry, _partial_=True)(folder=tmp_path / option, resumed_at=0)
+            logger = instantiate(entry, _partial_=True)(folder=tmp_path / option, resumed_at=0, config={})
             logger.log(1, {"a": 1.0})
             logger.close()
         assert "1" in (tmp_path / option / "metrics.csv").read_text()
