@@ -42,7 +42,7 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
 def test_the_readable_agent_runs_the_recipe() -> None:
     recipe, readable = composed("+experiment=taught"), composed("+experiment=taught", "agent=sac")
     differing = {key for key in recipe.agent if recipe.agent[key] != readable.agent[key]}
-    assert differing == {"_target_", "precision"}
+    assert differing == {"_target_"}
     assert instantiate(readable.agent, _partial_=True)(Sizes(120, 25, 12)).loss.demonstration_weight == 2
 
 
