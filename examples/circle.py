@@ -115,7 +115,7 @@ class Circle:
         words += [f"protocol.episodes={self.sizes.episodes}", f"film={str(film).lower()}", *self.sizes.evaluation]
         path = self.run("evaluate", f"{name}/results.json", title, *words)
         summary: dict[str, Any] = json.loads(path.read_text())["variants"][0]["summary"]
-        self.say(f"    {summary['mean_angle']:.2f} rad, {summary['successes']} of {summary['episodes']} regrasp")
+        self.say(f"    {summary['mean_angle']:.2f} rad, {summary['successes']} of {summary['episodes']} successful")
         return summary
 
     def find(self) -> tuple[dict[str, Any], Path]:
@@ -157,7 +157,7 @@ def policy_file(name: str) -> Path:
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """Markdown of the evaluations, one row each."""
-    lines = ["| policy | hand | mean angle [rad] | regrasping | cube kept |", "|---|---|---|---|---|"]
+    lines = ["| policy | hand | mean angle [rad] | successful | cube kept |", "|---|---|---|---|---|"]
     for name, one in rows.items():
         policy, hand = name.split(" on ")
         angle = f"{one['mean_angle']:.2f} +- {one['std_angle']:.2f}"

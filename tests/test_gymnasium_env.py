@@ -20,7 +20,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.policies import ScriptedPolicy
 from tactile_cube.evaluation.rollout import run_episode
-from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode
+from tactile_cube.evaluation.verdict import judge_episode
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.randomization import Randomization
 from tactile_cube.transforms import EnvConfig, make_env
@@ -93,14 +93,14 @@ def test_another_render_mode_is_refused() -> None:
         GymnasiumRotation(EnvConfig(Task("full")), render_mode="human")
 
 
-def test_success_is_the_verdict_of_evaluate_told_in_the_last_step(
+def test_success_is_that_of_evaluate_told_in_the_last_step(
     env: GymnasiumRotation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged = []
 
     def judge_episode(record: EpisodeRecord) -> SimpleNamespace:
         judged.append(record)
-        return SimpleNamespace(verdict=EpisodeVerdict.REGRASPING)
+        return SimpleNamespace(success=True)
 
     monkeypatch.setattr(gymnasium_env, "judge_episode", judge_episode)
     env.reset(seed=0)
@@ -127,7 +127,7 @@ def test_the_scripted_gait_earns_the_success_that_evaluate_gives_it() -> None:
     expected = judge_episode(run_episode(made, ScriptedPolicy(), 0), 0, 0)
     made.close()
     assert info["theta"] == pytest.approx(expected.final_angle)
-    assert info["is_success"] == (expected.verdict is EpisodeVerdict.REGRASPING)
+    assert info["is_success"] == expected.success
 
 
 def test_registered_name_takes_options_of_the_configuration() -> None:

@@ -1,6 +1,6 @@
 """Faults of all kinds at random moments of `+experiment=smoke`: is anything lost, does anything hang or stay behind?
 
-    python -m benchmarks.faults.campaign --faults 100 --seed 0 --out outputs/reliability
+    python -m benchmarks.faults.campaign --faults 105 --seed 0 --out outputs/reliability
 
 The run is as short as it can be with three barriers, two workers and learning from a replay; words at the end
 change it.
@@ -23,7 +23,7 @@ from typing import Any
 import torch
 
 from benchmarks.faults.command import Command, be_ready
-from benchmarks.faults.kinds import KINDS, Kind
+from benchmarks.faults.kinds import AT_ITS_ENDS, KINDS, Kind
 from tactile_cube.agent.policy_file import current_commit, load_actor
 from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import BEFORE, FILE, Checkpoints, load_checkpoint
@@ -45,7 +45,7 @@ class Outcome:
 
     Attributes:
         kind: of fault.
-        moment: when it struck, from the start [s].
+        moment: when it struck, from the beginning of its phase [s].
         struck: False when the run had ended before.
         seconds: from the fault to the end of the command.
         status: its exit status; None: it hung.
@@ -79,11 +79,13 @@ def undisturbed(folder: Path, settings: Sequence[str]) -> tuple[dict[str, Any], 
 
 def strike(kind: Kind, folder: Path, moment: float, settings: Sequence[str], reference: dict[str, Any]) -> Outcome:
     """One fault and what comes of it."""
-    command = Command(folder, tuple(settings))
+    command = Command(folder, tuple(settings), rows=len(reference["rows"]))
     command.start()
+    while kind.phase is not None and not command.ended and not kind.phase.begun(command):
+        time.sleep(0.002)
     began = time.monotonic()
     while time.monotonic() - began < moment and not command.ended:
-        time.sleep(0.02)
+        time.sleep(0.002)
     struck = kind.strike(command)
     at = time.monotonic()
     status = command.wait()
@@ -157,8 +159,10 @@ def table(outcomes: Sequence[Outcome], seconds: float) -> str:
     return f"{len(outcomes)} faults; the undisturbed run took {seconds:.0f} s; commit {current_commit()}\n\n{rows}\n"
 
 
-def campaign(faults: int, seed: int, out: Path | None, settings: Sequence[str] = SHORT) -> list[Outcome]:
-    """Strike with all kinds in turn, at moments spread over the run; write the table after each."""
+def campaign(
+    faults: int, seed: int, out: Path | None, settings: Sequence[str] = SHORT, kinds: Sequence[Kind] = KINDS
+) -> list[Outcome]:
+    """Strike with all kinds in turn, at moments spread over the run or its phase; write the table after each."""
     moments = random.Random(seed)
     outcomes: list[Outcome] = []
     with tempfile.TemporaryDirectory() as place:
@@ -167,9 +171,9 @@ def campaign(faults: int, seed: int, out: Path | None, settings: Sequence[str] =
         if not same(first, reference):
             raise RuntimeError("two undisturbed runs differ")
         for number in range(faults):
-            kind = KINDS[number % len(KINDS)]
-            folder = Path(place) / f"fault{number}"
-            outcomes.append(strike(kind, folder, moments.uniform(0.0, seconds), settings, reference))
+            kind = kinds[number % len(kinds)]
+            folder, longest = Path(place) / f"fault{number}", kind.phase.seconds if kind.phase else seconds
+            outcomes.append(strike(kind, folder, moments.uniform(0.0, longest), settings, reference))
             print(outcomes[-1], flush=True)
             shutil.rmtree(folder)
             if out is not None:
@@ -185,9 +189,11 @@ def main() -> None:
     words.add_argument("--faults", type=int, default=100)
     words.add_argument("--seed", type=int, default=0)
     words.add_argument("--out", type=Path)
+    words.add_argument("--ends", action="store_true", help="only workers that start, and after the last iteration")
     words.add_argument("settings", nargs="*", help="further settings of the run, e.g. training.steps=1800")
     given = words.parse_args()
-    outcomes = campaign(given.faults, given.seed, given.out, [*SHORT, *given.settings])
+    kinds = AT_ITS_ENDS if given.ends else KINDS + AT_ITS_ENDS
+    outcomes = campaign(given.faults, given.seed, given.out, [*SHORT, *given.settings], kinds)
     lost = [one for one in outcomes if one.status is None or one.orphans or one.damaged or not one.equal]
     print(f"{len(outcomes)} faults, {len(lost)} with a loss")
     raise SystemExit(1 if lost else 0)

@@ -1,9 +1,11 @@
 """A training command in a process of its own, and what is left of it."""
 
+import ctypes
 import multiprocessing
 import os
 import sys
 import time
+import traceback
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -27,11 +29,13 @@ class Command:
         folder: run folder.
         settings: further words.
         limit: longest time [s] it may take before it counts as hung.
+        rows: that the undisturbed run writes into metrics.csv, without the header.
     """
 
     folder: Path
     settings: tuple[str, ...] = ()
     limit: float = 600.0
+    rows: int = 0
     process: BaseProcess = field(init=False)
 
     def start(self) -> None:
@@ -107,4 +111,13 @@ def _train(words: list[str], console: Path, wish: Path) -> None:
         os.dup2(file.fileno(), 2)
     os.environ[WISH] = str(wish)
     sys.argv = ["train", *words]
-    main()
+    status = 0
+    try:
+        main()
+    except SystemExit as ended:
+        status = ended.code if isinstance(ended.code, int) else int(bool(ended.code))
+    except BaseException:
+        traceback.print_exc()
+        status = 1
+    # a child of multiprocessing leaves out what a program does at its end, where a training once hung
+    ctypes.pythonapi.Py_Exit(ctypes.c_int(status))

@@ -1,4 +1,4 @@
-"""The faults that a run must survive.
+"""The faults that a run must survive, at any moment or in a phase that chance seldom meets.
 
 A full disk is a limit on the size of files, which gives the process the same kind of error. A file that cannot be
 written is a folder in its place, which stops root too. A jump of the clock is not among them: training goes by the
@@ -18,6 +18,14 @@ from benchmarks.faults.command import Command
 
 
 @dataclass(frozen=True)
+class Phase:
+    """A part of a run: how it is told that it has begun, and how long it lasts [s]."""
+
+    begun: Callable[[Command], bool]
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Kind:
     """A kind of fault.
 
@@ -25,11 +33,13 @@ class Kind:
         name: in the table.
         strike: does it to a running command; False when it had ended.
         undo: takes away what would keep the same command from going on.
+        phase: in which it strikes; None: in the whole run.
     """
 
     name: str
     strike: Callable[[Command], bool]
     undo: Callable[[Command], None] = lambda command: None
+    phase: Phase | None = None
 
 
 def _main(*signals: int) -> Callable[[Command], bool]:
@@ -96,6 +106,22 @@ def _unblocked(command: Command) -> None:
         blocked.rmdir()
 
 
+def _worker_there(command: Command) -> bool:
+    return bool(command.workers())
+
+
+def _all_logged(command: Command) -> bool:
+    metrics = command.folder / "metrics.csv"
+    return metrics.is_file() and metrics.read_text().count("\n") > command.rows
+
+
+PHASES = {"while it starts": Phase(_worker_there, 1.0), "after the last iteration": Phase(_all_logged, 0.2)}
+AT_ITS_ENDS = tuple(
+    Kind(f"worker: {name} {words}", _worker(do), phase=phase)
+    for name, do in (("SIGKILL", psutil.Process.kill), ("SIGSTOP", psutil.Process.suspend))
+    for words, phase in PHASES.items()
+)
+"""What strikes workers that start, and those that are no longer needed once all rows of metrics.csv are there."""
 KINDS = (
     Kind("main process: SIGKILL", _main(signal.SIGKILL)),
     Kind("worker: SIGKILL", _worker(psutil.Process.kill)),

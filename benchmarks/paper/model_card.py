@@ -9,6 +9,7 @@ from typing import Any
 
 from benchmarks.paper.ancestry import NONE, Ancestor, ancestry_table, total
 from tactile_cube.agent.policy_file import PolicyInfo
+from tactile_cube.evaluation.verdict import SUCCESS, SUCCESS_RATE
 
 Results = dict[str, Any]
 
@@ -60,12 +61,20 @@ def read_card(path: Path) -> dict[str, str]:
 
 def _measured(results: Sequence[Results]) -> list[str]:
     """One line an evaluation."""
-    lines = []
+    lines = [f"Successful: {SUCCESS}.", ""] if results else []
     for result in results:
         summary = result["variants"][0]["summary"]
         lines.append(
             f"- `{result['command']}`: {summary['mean_angle']:.2f} +- {summary['std_angle']:.2f} rad (best "
-            f"{summary['best_angle']:.2f}), {summary['successes']}/{summary['episodes']} successful, "
+            f"{summary['best_angle']:.2f}), {_successes(result)}/{summary['episodes']} successful, "
             f"{summary['kept']} kept the cube, exploits found: {summary['exploits'] or 'none'}"
         )
     return lines
+
+
+def _successes(result: Results) -> int:
+    """Counted again, since files from before 0.3 have another rule."""
+    episodes = result["variants"][0]["episodes"]
+    return sum(
+        one["ending"] == "time_limit" and one["final_angle"] >= SUCCESS_RATE * one["duration"] for one in episodes
+    )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -12,11 +11,11 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 
-from tactile_cube.api.job import as_input_errors
+from tactile_cube.api.environment import env_config
 from tactile_cube.env import BORNE_TERMS, OUTCOMES, REWARD_TERMS, RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.rollout import Recorder
-from tactile_cube.evaluation.verdict import EpisodeVerdict, judge_episode
+from tactile_cube.evaluation.verdict import judge_episode
 from tactile_cube.transforms import EnvConfig, make_env
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
@@ -32,9 +31,8 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
     """One world with stacked, noisy observations (120,) and actions (12,) in [-1, 1].
 
     `info` has "theta" [rad], "outcome", "faulty", "reward_terms" by name, and "privileged" (25,) for critics that may
-    see the object; in the last step of an episode also "is_success": whether the verdict of `evaluate` is regrasping.
-    `render` shows what films of `evaluate` show. Random numbers come from a generator of its own: neither does it
-    disturb torch's global one nor is it disturbed.
+    see the object; in the last step of an episode also "is_success", as `evaluate` counts it.
+    `render` shows what films of `evaluate` show. Torch's global generator is left alone.
 
     Example:
         >>> env = gymnasium.make("tactile_cube/Rotation-v0", task="table", start="wide_yaw")
@@ -61,9 +59,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         self._judged, self._seeded = judged, False
         self._recorder: Recorder | None = None
         self._scene: Scene | None = None
-        with torch.random.fork_rng(devices=[]):
-            self._env = make_env(config, worlds=1, seed=0, evaluation=True)
-            self._generator = torch.get_rng_state()
+        self._env = make_env(config, worlds=1, seed=0, evaluation=True)
         shape = tuple(self._env.observation_spec["observation"].shape[1:])
         self.observation_space = gymnasium.spaces.Box(-FULL_TURN, FULL_TURN, shape, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (config.hand.joints,), np.float32)
@@ -76,10 +72,9 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
         self._seeded = True
-        with self._own_generator():
-            if seed is not None:
-                self._env.set_seed(seed)
-            data = self._env.reset()
+        if seed is not None:
+            self._env.set_seed(seed)
+        data = self._env.reset()
         self._recorder = Recorder(self._env) if self._judged else None
         self._close_scene()  # the next object may be of another size
         return data["observation"][0].numpy().copy(), _info(data)
@@ -94,14 +89,12 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         if action.shape != self.action_space.shape or not np.isfinite(action).all():
             raise InputError(f"action {action}: give {self.action_space.shape} finite numbers from -1 to 1")
         command = torch.as_tensor(np.clip(action, -1.0, 1.0), dtype=torch.float32)[None]
-        with self._own_generator():
-            data = self._env.step(TensorDict({"action": command}, batch_size=[1]))["next"]
+        data = self._env.step(TensorDict({"action": command}, batch_size=[1]))["next"]
         info, ends = _info(data), (bool(data["terminated"]), bool(data["truncated"]))
         if self._recorder is not None:
             self._recorder.add(data)
             if any(ends):
-                judged = judge_episode(self._recorder.record(0))
-                info["is_success"] = judged.verdict is EpisodeVerdict.REGRASPING
+                info["is_success"] = judge_episode(self._recorder.record(0)).success
         return data["observation"][0].numpy().copy(), float(data["reward"]), *ends, info
 
     def render(self) -> Picture | None:
@@ -120,13 +113,6 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
             self._scene.close()
             self._scene = None
 
-    @contextmanager
-    def _own_generator(self) -> Iterator[None]:
-        with torch.random.fork_rng(devices=[]):
-            torch.set_rng_state(self._generator)
-            yield
-            self._generator = torch.get_rng_state()
-
     def close(self) -> None:
         """Closes the world and its pictures."""
         self._close_scene()
@@ -143,40 +129,16 @@ def _info(data: TensorDictBase) -> dict[str, Any]:
     }
 
 
-@as_input_errors
-def make_rotation(
-    task: str = "table",
-    reward: str = "early",
-    randomization: str = "paper",
-    start: str = "wide_yaw",
-    engine: str = "bullet",
-    hand: str = "dlr_hand2",
-    object: str = "box",
-    overrides: tuple[str, ...] = (),
-    render_mode: str | None = None,
-) -> GymnasiumRotation:
-    """Return the environment of the named options of `conf/`.
+def make_rotation(overrides: Sequence[str] = (), render_mode: str | None = None, **choices: str) -> GymnasiumRotation:
+    """Return the environment that `tactile_cube.make_env` has of the same settings, for one world.
 
     Args:
-        task: option of the group of that name.
-        reward: option of the group of that name.
-        randomization: option of the group of that name.
-        start: option of the group of that name.
-        engine: "bullet" or "mujoco".
-        hand: option of the group of that name.
-        object: option of the group of that name.
-        overrides: further settings as on the command line, e.g. "task.filter_time=0.25".
+        overrides: settings as on the command line of `train`, e.g. "+experiment=table", "task.filter_time=0.25".
         render_mode: "rgb_array", or None for no pictures.
+        choices: options of groups of `conf/train.yaml` and values, e.g. task="table", engine="mujoco".
 
     Raises:
         InputError: an option that there is not.
     """
-    from hydra.utils import instantiate
-
-    from tactile_cube.composition import composed
-
-    groups = {"hand": hand, "object": object, "task": task, "reward": reward, "randomization": randomization}
-    groups |= {"start": start, "exploration": "none", "curriculum": "none", "env": "rotation"}
-    groups |= {"model": "null", "engine": engine}
-    config = composed(None, [*(f"+{group}={option}" for group, option in groups.items()), *overrides])
-    return GymnasiumRotation(instantiate(config.env), render_mode)
+    words = [f"{group}={option}" for group, option in choices.items()]
+    return GymnasiumRotation(env_config(*words, *overrides), render_mode)

@@ -1,5 +1,6 @@
 """Training, trying and exporting a policy without a command line."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -49,3 +50,29 @@ def test_wrong_values_are_input_errors_as_on_the_command_line(tmp_path: Path) ->
         tactile_cube.make_env("task.filter_time=-1")
     with pytest.raises(InputError, match=r"agent\.gama"):
         tactile_cube.train("agent.gama=1", folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("call", "due"),
+    [
+        (lambda: tactile_cube.record("out=x", "source=finger"), "out"),
+        (lambda: tactile_cube.record("source=finger"), "out"),
+        (lambda: tactile_cube.evaluate("randomization=wide"), "policy"),
+        (lambda: tactile_cube.evaluate("hold", "protocol=smoke", model="model=x"), "model"),
+        (lambda: tactile_cube.compare("recording=x"), "recording"),
+        (lambda: tactile_cube.view("run=x"), "run"),
+    ],
+)
+def test_a_setting_in_the_place_of_a_value_is_refused_and_makes_no_file_of_that_name(
+    call: Callable[[], object], due: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=rf"is a setting where the value of {due} is due"):
+        call()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_whose_name_looks_like_a_setting_is_named_by_a_path(tmp_path: Path) -> None:
+    job = called_job("record", ["source=finger"], out=tmp_path / "out=x")
+    assert job.config.out == str(tmp_path / "out=x")
+    assert called_job("record", [], out=Path("out=x")).config.out == "out=x"

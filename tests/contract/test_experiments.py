@@ -53,5 +53,11 @@ def test_every_experiment_is_pinned_and_nothing_else() -> None:
     assert sorted(yaml.safe_load(PINNED.read_text())) == EXPERIMENTS
 
 
+@pytest.mark.parametrize("experiment", ["alone", "hold", "wide", "steered", "taught", "contact", "finetune", "table"])
+def test_a_recipe_with_published_results_fixes_what_its_bits_depend_on(experiment: str) -> None:
+    chosen = settings(f"+experiment={experiment}")
+    assert (chosen["collector.processes"], chosen["agent.precision"]) == (1, "bf16")
+
+
 if __name__ == "__main__":
     pin()

@@ -42,7 +42,7 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
 def test_the_readable_agent_runs_the_recipe() -> None:
     recipe, readable = composed("+experiment=taught"), composed("+experiment=taught", "agent=sac")
     differing = {key for key in recipe.agent if recipe.agent[key] != readable.agent[key]}
-    assert differing == {"_target_", "precision"}
+    assert differing == {"_target_"}
     assert instantiate(readable.agent, _partial_=True)(Sizes(120, 25, 12)).loss.demonstration_weight == 2
 
 
@@ -50,7 +50,7 @@ def test_loggers_write_into_the_run_folder(tmp_path: Path) -> None:
     for option in ("default", "csv"):
         (tmp_path / option).mkdir()
         for entry in composed(f"logger={option}").logger.values():
-            logger = instantiate(entry, _partial_=True)(folder=tmp_path / option, resumed_at=0)
+            logger = instantiate(entry, _partial_=True)(folder=tmp_path / option, resumed_at=0, config={})
             logger.log(1, {"a": 1.0})
             logger.close()
         assert "1" in (tmp_path / option / "metrics.csv").read_text()

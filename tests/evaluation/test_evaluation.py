@@ -15,8 +15,8 @@ from tests.evaluation.synthetic import episode
 
 def test_results_come_back_with_every_episode(tmp_path: Path) -> None:
     results = [judge_episode(episode(angle=angle), number) for number, angle in enumerate((5.0, 2.0))]
-    variant = VariantResult(Variant(), results, summarise(results, 0.8), 0.8)
-    protocol, source = Protocol("paper", success_share=0.8), PolicySource(HoldPolicy(), "hold")
+    variant = VariantResult(Variant(), results, summarise(results))
+    protocol, source = Protocol("paper"), PolicySource(HoldPolicy(), "hold")
     run = EvaluationRun(protocol, source, Task("full"), "mujoco", 4, "python -m x", 0.1, {"randomization": "wide"})
     write_results(tmp_path / "results.json", run, [variant])
     data = read_results(tmp_path / "results.json")

@@ -9,7 +9,7 @@ from tactile_cube.evaluation.protocol import Protocol
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"episodes": 0}, {"seconds": -1.0}, {"success_share": 1.5}, {"variants": ()}, {"film": -1}, {"worlds": "x"}],
+    [{"episodes": 0}, {"seconds": -1.0}, {"variants": ()}, {"film": -1}, {"worlds": "x"}],
 )
 def test_impossible_protocols_are_refused_by_key(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=f"protocol.{next(iter(wrong))}"):

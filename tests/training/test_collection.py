@@ -55,6 +55,16 @@ def test_killed_worker_is_reported_without_waiting_for_the_timeout() -> None:
     collection.close()
 
 
+def test_a_worker_killed_at_its_start_is_reported_though_its_sibling_keeps_its_pipe_open() -> None:
+    def killed(worlds: int, seed: int) -> TinyEnv:
+        if seed == 1:  # begun after the sibling whose copy of the pipe stays open
+            os.kill(os.getpid(), signal.SIGKILL)
+        return TinyEnv(worlds, seed)
+
+    with pytest.raises(CollectionError, match=r"^simulation worker failed to start"):  # not: no answer within 30 s
+        start(make=killed, processes=2)
+
+
 def test_stuck_worker_is_reported_after_the_timeout() -> None:
     collection = start(make=StuckEnv, timeout=2.0)
     with pytest.raises(CollectionError, match=r"collector\.timeout=2 s"):

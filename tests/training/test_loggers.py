@@ -49,4 +49,26 @@ def test_tensorboard_gets_every_curve(tmp_path: Path) -> None:
 def test_missing_weights_and_biases_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "wandb", None)
     with pytest.raises(InputError, match="pip install"):
-        WandbLogger(tmp_path, resumed_at=0)
+        WandbLogger(tmp_path, resumed_at=0, config={})
+
+
+def test_weights_and_biases_gets_a_run_for_each_seed_and_stage_with_its_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("wandb")
+    monkeypatch.setenv("WANDB_MODE", "offline")
+
+    def sent(folder: str, resumed_at: int = 0) -> tuple[str, str, str]:
+        (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+        logger = WandbLogger(tmp_path / folder, resumed_at, config={"agent": {"gamma": 0.9}})
+        logger.log(10, {"angle": 0.5})
+        assert logger._run.config["agent"] == {"gamma": 0.9}
+        logger.close()
+        assert list((tmp_path / folder).glob("wandb/offline-run-*/*.wandb"))
+        return logger._run.id, logger._run.name, logger._run.group
+
+    first = sent("curriculum-seed0/gaiting")
+    assert first[1:] == ("curriculum-seed0/gaiting", "curriculum-seed0")
+    assert sent("curriculum-seed0/gaiting", resumed_at=10)[0] == first[0]
+    others = ["curriculum-seed1/gaiting", "curriculum-seed0/holding", "again/curriculum-seed0/gaiting"]
+    assert len({first[0], *(sent(other)[0] for other in others)}) == 4

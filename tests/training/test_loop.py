@@ -147,6 +147,18 @@ def test_a_run_says_how_much_ctrl_c_costs_and_whose_networks_it_begins_with(
     assert second == f"networks of {policy}; critics begin anew, the actor waits for {FROZEN} updates"
 
 
+def test_a_run_does_the_steps_it_was_asked_for_and_says_how_many_that_were(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tiny_run(tmp_path, steps=90)  # 20 an iteration, 80 from barrier to barrier
+    run.announce()
+    assert run.train() == "all 100 steps done"
+    run.close()
+    assert run.learner.steps == run.saved_at == 100
+    assert "starts, 100 steps in all" in capsys.readouterr().out
+    assert tiny_run(tmp_path, steps=90).train() == "all 100 steps done"
+
+
 def test_warm_start_from_other_shape_is_refused(tmp_path: Path) -> None:
     finish(tiny_run(tmp_path / "first", steps=80))
     for file in ("checkpoint.pt", "policy.safetensors"):

@@ -1,8 +1,11 @@
 """Workers that fail are replaced, and the run ends with the bits of an undisturbed one."""
 
+import gc
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,9 +13,10 @@ from typing import Any
 import pytest
 import torch
 
-from tactile_cube.training.collection import Background, CollectionError, MultiSyncCollection
+from tactile_cube.training.collection import CollectionError, MultiSyncCollection
 from tactile_cube.training.recovery import train_on
 from tactile_cube.training.run import Run
+from tactile_cube.training.worker_process import Background
 from tests.training.tiny_env import TinyEnv, tiny_environment
 from tests.training.tiny_run import finish, tiny_run, weights
 
@@ -166,3 +170,33 @@ def test_a_worker_stopped_while_it_starts_is_given_up_and_leaves_nothing_behind(
     with pytest.raises(CollectionError, match=r"no simulation worker answered within collector\.start_timeout=5 s"):
         tiny_run(tmp_path / "run", collector=collector, environment=environment)
     assert not multiprocessing.active_children()
+
+
+def trained_through(phase: str, folder: Path) -> None:
+    """Train to the end, in a program of its own, although the last worker is killed in a phase of the run."""
+    gc.disable()  # what is left over then waits for the end of the program, as it may in any
+    once, main = folder / "once", os.getpid()
+
+    def killed_at_its_start(worlds: int, seed: int) -> TinyEnv:
+        if phase == "start" and seed == 0 and os.getpid() != main and not once.exists():
+            once.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return TinyEnv(worlds, seed)
+
+    def build() -> Run:
+        run = tiny_run(folder / "run", collector=COLLECTOR | {"start_timeout": 5.0}, environment=environment)
+        collect = run.learner.collection
+        if phase == "exit":
+            collect.close = lambda close=collect.close: (send(signal.SIGKILL, run), close())  # type: ignore[method-assign, misc]
+        return run
+
+    tiny = tiny_environment()
+    environment = type(tiny)(killed_at_its_start, tiny.sizes, tiny.reward_terms, tiny.reward_weights)
+    assert train_on(build)[1] == "all 160 steps done"
+    assert once.exists() == (phase == "start")
+
+
+@pytest.mark.parametrize("phase", ["start", "exit"])
+def test_a_program_ends_though_a_worker_was_killed_as_it_began_or_ended(tmp_path: Path, phase: str) -> None:
+    program = f"import sys, pathlib, {__name__} as here; here.trained_through(sys.argv[1], pathlib.Path(sys.argv[2]))"
+    subprocess.run([sys.executable, "-c", program, phase, str(tmp_path)], check=True, timeout=120.0)

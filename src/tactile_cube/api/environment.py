@@ -34,18 +34,20 @@ def env_config(*settings: str) -> EnvConfig:
 def make_env(*settings: str, worlds: int = 1, seed: int = 0) -> TransformedEnv:
     """A TorchRL environment of the hand: worlds, joint offsets, noise, sticky actions, the observation stack.
 
-    Gymnasium's own way is `gymnasium.make("tactile_cube/Rotation-v0", task="table")` after `import tactile_cube`.
+    It is the task itself, as Gymnasium's `tactile_cube/Rotation-v0` and `evaluate` have it: full weight and T_s of the
+    task. A curriculum and extra exploration belong to `train`; an easier stage is set, as in
+    `make_env("task.gravity_scale=0.05", "task.filter_time=0.12")`. Torch's global generator is left alone.
 
     Args:
         settings: as in `env_config`.
         worlds: how many, simulated one after the other in this process.
-        seed: of everything random.
+        seed: of everything random in them.
 
     Example:
         >>> env = tactile_cube.make_env("task=table", worlds=4)
         >>> data = env.rollout(10)
     """
-    return transforms.make_env(env_config(*settings), worlds, seed)
+    return transforms.make_env(env_config(*settings), worlds, seed, evaluation=True)
 
 
 @as_input_errors

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 import shlex
 import sys
 import time
@@ -12,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed, refuse_unknown_keys, with_recipe
 from tactile_cube.errors import InputError
 from tactile_cube.usage_error import usage_error
@@ -78,7 +80,7 @@ def called_job(command: str, settings: Sequence[str], folder: PathLike | None = 
             by its folder, a model that is no file by its rig.
 
     Raises:
-        InputError: as `typed_job`, or a setting that the command does not have.
+        InputError: as `typed_job`, a setting that the command does not have, or one in the place of a value.
     """
     from omegaconf import OmegaConf
 
@@ -87,6 +89,7 @@ def called_job(command: str, settings: Sequence[str], folder: PathLike | None = 
     refuse_unknown_keys(command, config)
     for key, value in given.items():
         if value is not None:
+            _refuse_setting(command, key, value, config)
             named = value if isinstance(value, list) else _name(value)
             OmegaConf.update(config, key, named)
             words.append(f"{key}={named}")
@@ -95,6 +98,16 @@ def called_job(command: str, settings: Sequence[str], folder: PathLike | None = 
     del config["hydra"]
     OmegaConf.set_struct(config, True)
     return _job(config, hydra, command, words, place)
+
+
+def _refuse_setting(command: str, key: str, value: Any, config: DictConfig) -> None:
+    """Refuse a setting where a value is due: it would be taken for a file of that name."""
+    found = re.match(r"[+~]*(\w+)[\w./@]*=", value) if isinstance(value, str) else None
+    if found and (found[1] in set(config) or (CONFIG / found[1]).is_dir()):
+        raise InputError(
+            f"{command}: {key}={value!r} is a setting where the value of {key} is due: give {key} first, without "
+            f"'{key}=', and settings after it; a file of that name is pathlib.Path({value!r})"
+        )
 
 
 def _name(thing: Any) -> str:

@@ -75,9 +75,9 @@ class WorldsEnv(EnvBase):  # type: ignore[misc]
         return conditions
 
     def _set_seed(self, seed: int | None) -> None:
-        """Seeds every world, and torch's global generator, which the transforms draw from."""
+        """Seeds every world, and the generator that the transforms draw from."""
         if seed is not None:
-            torch.manual_seed(seed)
+            torch.default_generator.manual_seed(seed)
             self._seed_tasks(seed)
 
     def _seed_tasks(self, seed: int) -> None:

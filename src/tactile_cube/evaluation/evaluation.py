@@ -22,7 +22,7 @@ from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.policies import Policy, PolicySource, ReplayPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.rollout import run_episode
-from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, succeeded, summarise
+from tactile_cube.evaluation.summary import Summary, drawn, lost_where, sentence, summarise
 from tactile_cube.evaluation.variant import NumbPolicy, Variant
 from tactile_cube.evaluation.verdict import EpisodeResult, judge_episode
 from tactile_cube.simulation import Start
@@ -41,17 +41,13 @@ class VariantResult:
     variant: Variant
     results: list[EpisodeResult]
     summary: Summary
-    success_share: float | None
     unresolved: str = ""
     """Which of its worlds the solver does not resolve; "" where it resolves all."""
 
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
-        flags, varied = succeeded(self.results, self.success_share), drawn(self.results)
-        episodes = [
-            result.as_dict() | {"world": {name: result.world[name] for name in varied}, "success": flag}
-            for result, flag in zip(self.results, flags, strict=True)
-        ]
+        varied = drawn(self.results)
+        episodes = [one.as_dict() | {"world": {name: one.world[name] for name in varied}} for one in self.results]
         return {
             "variant": asdict(self.variant),
             "summary": asdict(self.summary),
@@ -63,8 +59,7 @@ class VariantResult:
     @property
     def text(self) -> str:
         """The summary in words, which episodes did not succeed, where the object is lost, what is not resolved."""
-        flags = succeeded(self.results, self.success_share)
-        failed = [str(result.episode) for result, success in zip(self.results, flags, strict=True) if not success]
+        failed = [str(result.episode) for result in self.results if not result.success]
         lines = [sentence(self.variant.name, self.summary)]
         lines += [f"  not successful: {', '.join(failed)}"] if failed else []
         lines += [f"  {where.text}" for where in lost_where(self.results)]
@@ -148,9 +143,9 @@ class Evaluation:
             results.append(judge_episode(record, number, seed))
             report(variant.name, results[-1])
         env.close()
-        share, options = self.protocol.success_share, variant.apply(self._config).simulation
+        options = variant.apply(self._config).simulation
         frictions = [float(result.world["tip_spinning_friction"]) for result in results]
-        return VariantResult(variant, results, summarise(results, share), share, unresolved_among(frictions, options))
+        return VariantResult(variant, results, summarise(results), unresolved_among(frictions, options))
 
 
 def episode_seed(seed: int, episode: int) -> int:
@@ -212,7 +207,6 @@ def write_results(path: Path, run: EvaluationRun, variants: list[VariantResult])
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "protocol": run.protocol.name,
         "seconds": run.protocol.seconds,
-        "success_share": run.protocol.success_share,
         "policy": {"label": run.source.label, **run.source.provenance},
         "task": asdict(run.task),
         "engine": run.engine,

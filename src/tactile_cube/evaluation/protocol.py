@@ -1,4 +1,4 @@
-"""How a policy is tried: how many episodes, how long, under which conditions, and what counts as success."""
+"""How a policy is tried: how many episodes, how long, and under which conditions."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ class Protocol:
         episodes: number of episodes per variant.
         seconds: time limit of an episode [s]; None: the task's own.
         worlds: whose randomisation and starts: of the policy's "training", or of the "paper".
-        success_share: an episode succeeds when it keeps the cube and reaches this share of the best episode's angle.
-            Source: paper, section IV: 80 %. None: when its verdict is regrasping.
         variants: conditions, each tried with the same seeds.
         nominal_values: where the nominal condition lies on the axes of the variants.
         catalogue: add a variant for each effect of the drivetrain's catalogue at its typical size.
@@ -33,7 +31,6 @@ class Protocol:
     episodes: int = 20
     seconds: float | None = None
     worlds: str = "training"
-    success_share: float | None = None
     variants: Sequence[Variant] = field(default_factory=lambda: (Variant(),))
     nominal_values: Mapping[str, float] = field(default_factory=dict)
     catalogue: bool = False
@@ -49,10 +46,8 @@ class Protocol:
             raise InputError(f"protocol.seconds is {self.seconds}; give a time above 0 s or null")
         if self.worlds not in ("training", "paper"):
             raise InputError(f"protocol.worlds is {self.worlds!r}; choose training or paper")
-        if self.success_share is not None and not 0 < self.success_share <= 1:
-            raise InputError(f"protocol.success_share is {self.success_share}; give a number in (0, 1] or null")
         if not self.variants:
-            raise InputError("protocol.variants is empty; give at least one, {name: nominal}")
+            raise InputError("protocol.variants is empty; give at least one, {name: worlds as drawn}")
         if self.film < 0:
             raise InputError(f"protocol.film is {self.film}; give 0 or more")
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from tactile_cube.evaluation.verdict import REGRASP_ANGLE, EpisodeResult, EpisodeVerdict
+from tactile_cube.evaluation.variant import UNCHANGED
+from tactile_cube.evaluation.verdict import SUCCESS, EpisodeResult, EpisodeVerdict
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,8 @@ class Summary:
     """What a set of episodes comes to; means over the episodes, of what `EpisodeResult` has by the same name.
 
     Attributes:
-        mean_angle: of the final angles, as `std_angle` and `best_angle` are [rad].
+        mean_angle: of the final angles, as `std_angle`, `median_angle` and `best_angle` are [rad].
+        low_angle: below which their lowest tenth lies [rad].
         success_means: what success is, in words.
         success_low: lower end of the 95 % interval of the success rate; `success_high`: upper end.
         kept: episodes that ended with the cube in the hand.
@@ -30,6 +32,8 @@ class Summary:
     episodes: int
     mean_angle: float
     std_angle: float
+    median_angle: float
+    low_angle: float
     best_angle: float
     successes: int
     success_means: str
@@ -47,22 +51,25 @@ class Summary:
     exploits: dict[str, int]
 
 
+LOWEST = 0.1
 AVERAGED = ("tip_support", "link_contact", "link_force_share", "rise")
 
 
-def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> Summary:
-    """Reduce episodes to a summary; `success_share` as in `Protocol`."""
+def summarise(results: Sequence[EpisodeResult]) -> Summary:
+    """Reduce episodes to a summary."""
     angles = np.array([result.final_angle for result in results])
-    successes = sum(succeeded(results, success_share))
+    successes = sum(result.success for result in results)
     low, high = wilson_interval(successes, len(results))
     alike = {name: float(np.mean([getattr(one, name) for one in results])) for name in AVERAGED}
     return Summary(
         episodes=len(results),
         mean_angle=float(angles.mean()),
         std_angle=float(angles.std()),
+        median_angle=float(np.median(angles)),
+        low_angle=float(np.quantile(angles, LOWEST)),
         best_angle=float(angles.max()),
         successes=successes,
-        success_means=success_means(success_share),
+        success_means=SUCCESS,
         success_low=low,
         success_high=high,
         kept=sum(result.kept for result in results),
@@ -75,21 +82,6 @@ def summarise(results: Sequence[EpisodeResult], success_share: float | None) -> 
         verdicts={verdict.value: sum(result.verdict == verdict for result in results) for verdict in EpisodeVerdict},
         exploits=dict(Counter(name for result in results for name in result.exploits)),
     )
-
-
-def succeeded(results: Sequence[EpisodeResult], success_share: float | None) -> list[bool]:
-    """Return which episodes succeeded, as `success_means` says."""
-    if success_share is None:
-        return [result.verdict == EpisodeVerdict.REGRASPING for result in results]
-    best = max(result.final_angle for result in results)
-    return [result.kept and best > 0 and result.final_angle >= success_share * best for result in results]
-
-
-def success_means(success_share: float | None) -> str:
-    """Return the definition of success in words: the paper's share of the best angle, or the verdict regrasping."""
-    if success_share is None:
-        return f"verdict regrasping: kept to the end, beyond {REGRASP_ANGLE:g} rad and still turning"
-    return f"kept to the end and turned at least {100 * success_share:g} % as far as the best episode"
 
 
 def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
@@ -111,25 +103,26 @@ HEADER = (
 )
 
 
-def row(result: EpisodeResult, name: str = "nominal") -> str:
-    """Return an episode as a line of text; the variant's name is added when it is not the nominal one."""
+def row(result: EpisodeResult, name: str = UNCHANGED) -> str:
+    """Return an episode as a line of text; the variant's name is added where it changes something."""
     faces = "/".join(str(count) for count in result.faces_visited)
     measured = f"{result.final_angle:8.2f} {result.late_angle:6.2f} {result.duration:7.1f}"
     ending = "kept" if result.kept else result.ending
     counted = f"{sum(result.finger_lifts):6d}{faces:>9}{math.degrees(result.max_tilt):7.1f}{1e3 * result.rise:6.1f}"
     touched = f"{100 * result.tip_support:6.0f}{100 * result.link_contact:7.0f}{100 * result.link_force_share:7.0f}"
-    remarks = f"{', '.join(result.exploits) or '-'}{'' if name == 'nominal' else f'   [{name}]'}"
+    remarks = f"{', '.join(result.exploits) or '-'}{'' if name == UNCHANGED else f'   [{name}]'}"
     return f"{result.episode:4d} {measured}  {result.verdict.value:<17}{ending:<12}{counted}{touched}  {remarks}"
 
 
 def sentence(name: str, summary: Summary) -> str:
-    """Return a summary: kept, successful and angle with what success means, then contacts, verdicts and reward."""
+    """Return a summary: kept, successful and what that means, angles; then contacts, verdicts and reward."""
     verdicts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in summary.verdicts.items() if count)
     terms = ", ".join(f"{name} {value:.1f}" for name, value in summary.reward_terms.items() if value)
     return (
         f"{name}: {summary.kept}/{summary.episodes} kept, {summary.successes}/{summary.episodes} successful (95 %: "
         f"{100 * summary.success_low:.0f} to {100 * summary.success_high:.0f} %; {summary.success_means}), "
-        f"{summary.mean_angle:.2f} +- {summary.std_angle:.2f} rad (best {summary.best_angle:.2f})\n"
+        f"median {summary.median_angle:.2f} rad, lowest tenth below {summary.low_angle:.2f}, mean "
+        f"{summary.mean_angle:.2f} +- {summary.std_angle:.2f}, best {summary.best_angle:.2f}\n"
         f"  three or more tips on the cube {100 * summary.tip_support:.0f} % of the time, another link "
         f"{100 * summary.link_contact:.0f} %, with {100 * summary.link_force_share:.0f} % of the normal force; the "
         f"cube {1e3 * summary.rise:.0f} mm above its start late on; {summary.finger_lifts:.1f} finger lifts\n"

@@ -19,6 +19,9 @@ from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions
 from tactile_cube.transforms import EnvConfig
 
+UNCHANGED = "worlds as drawn"
+"""Name of the condition that changes nothing of what randomisation and starts draw."""
+
 
 class NumbPolicy:
     """Another policy whose senses are partly frozen at the first observation of the episode."""
@@ -107,7 +110,7 @@ class Variant:
         numb: senses of the policy that are frozen at the start: q_m, e_q, or a finger's name for all of that finger.
     """
 
-    name: str = "nominal"
+    name: str = UNCHANGED
     axis: str = ""
     value: float = 0.0
     constants: Mapping[str, Any] = field(default_factory=dict)

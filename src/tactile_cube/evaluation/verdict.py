@@ -27,6 +27,15 @@ LATE_ANGLE = 0.25
 """Angle that must be gained in this part [rad]; less means that the hand has come to rest."""
 
 
+SUCCESS_RATE = 15.0 / 40.0
+"""An episode succeeds that keeps the object to the end and turns it at least so fast on average [rad/s].
+
+15 rad in 40 s is the paper's best run (section IV). It depends on no other episode, whatever their length.
+"""
+SUCCESS = "kept to the end and turned by at least 15 rad in 40 s, in proportion for other lengths"
+"""The rule in words."""
+
+
 class EpisodeVerdict(StrEnum):
     """What an episode was.
 
@@ -93,9 +102,14 @@ class EpisodeResult:
         """Whether the cube was still in the hand at the end."""
         return self.ending == "time_limit"
 
+    @property
+    def success(self) -> bool:
+        """Whether it kept the cube and turned it as `SUCCESS_RATE` asks, in the rewarded direction."""
+        return self.kept and self.final_angle >= SUCCESS_RATE * self.duration
+
     def as_dict(self) -> dict[str, object]:
         """Return plain data for JSON."""
-        return {**asdict(self), "kept": self.kept}
+        return {**asdict(self), "kept": self.kept, "success": self.success}
 
 
 def judge_episode(record: EpisodeRecord, episode: int = 0, seed: int = 0) -> EpisodeResult:

@@ -53,7 +53,7 @@ def build_run(
         make_agent: builds the agent for the environment's sizes.
         collector: how worlds are spread over processes.
         training: schedule.
-        loggers: makers of loggers by name, called with `folder` and `resumed_at`.
+        loggers: makers of loggers by name, called with `folder`, `resumed_at` and `config`.
         config: the resolved configuration, as plain data.
 
     Raises:
@@ -79,7 +79,7 @@ def build_run(
             learner=learner,
             folder=folder,
             config=config,
-            loggers=[make(folder=folder, resumed_at=learner.steps) for make in loggers.values()],
+            loggers=[make(folder=folder, resumed_at=learner.steps, config=config) for make in loggers.values()],
             ledger=Ledger(
                 folder / LEDGER,
                 processes=1 if collector.kind == "single" else collector.workers + 1,

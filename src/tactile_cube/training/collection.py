@@ -6,18 +6,13 @@ generator and the worlds' own, and `restart` sets both.
 
 import contextlib
 import copy
-import ctypes
 import multiprocessing
 import os
-import queue
-import signal
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, TimeoutError
 from functools import partial
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -27,14 +22,20 @@ from torchrl.envs import EnvBase
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
+from tactile_cube.training.worker_process import Background, WeightSync, cpu_seconds, prepare_worker
 
-T = TypeVar("T")
 MakeEnv = Callable[..., EnvBase]
 """make_env(worlds=n, seed=s) -> batched environment of n worlds with a method set_progress(steps, performance)."""
 
 Progress = tuple[Any, ...]
 """What a curriculum goes by: environment steps so far, and mean final angle [rad] of the last episodes; where constants
 are steered also the odds of their parts."""
+
+
+GLANCE = 0.5
+"""How long a dead worker may go unnoticed [s]; siblings that inherited its pipe would hide its death for ever."""
+LAST_START = 3.0
+"""How long a start that is given up may go on making processes [s]."""
 
 
 class CollectionError(RuntimeError):
@@ -132,36 +133,6 @@ class SingleCollection:
             self._cpu += time.thread_time() - started
 
 
-class Background:
-    """A daemon thread that runs submitted calls one after another, so that none is waited for without a time limit.
-
-    Daemonic, because a call may be stuck in a pipe to a dead process, and that must not keep the program from ending.
-    One for all calls, because a worker ends with the thread that started it (`_prepare_worker`).
-    """
-
-    def __init__(self) -> None:
-        self._calls: queue.SimpleQueue[tuple[Future[object], Callable[[], object]] | None] = queue.SimpleQueue()
-        threading.Thread(target=self._run, daemon=True, name="collection").start()
-
-    def submit(self, call: Callable[[], T]) -> "Future[T]":
-        """Queue a call; its result or exception arrives in the future."""
-        future: Future[T] = Future()
-        self._calls.put((future, call))  # type: ignore[arg-type]
-        return future
-
-    def close(self) -> None:
-        """End the thread after the calls already queued."""
-        self._calls.put(None)
-
-    def _run(self) -> None:
-        while (entry := self._calls.get()) is not None:
-            future, call = entry
-            try:
-                future.set_result(call())
-            except BaseException as error:  # noqa: BLE001, RUF100 - handed to whoever asks for the result
-                future.set_exception(error)
-
-
 class MultiSyncCollection:
     """Worker processes that host several worlds each and step them while the learner updates.
 
@@ -192,14 +163,18 @@ class MultiSyncCollection:
     ):
         self._workers, self._timeout, self._start_timeout = processes, timeout, start_timeout
         self._started = False
-        self._behaviour = Behaviour(copy.deepcopy(actor))
+        self._behaviour, self._weights = Behaviour(copy.deepcopy(actor)), WeightSync()
         self._thread = Background()
         self._block: Future[TensorDictBase] | None = None
         self._final_cpu: float | None = None
         self._processes: list[Any] = []
         self._others = set(multiprocessing.active_children())
         build = partial(self._build, make_env, worlds // processes, worlds * steps, start_method)
-        self._collector, self._blocks = self._call(build, "start")
+        try:
+            self._collector, self._blocks = self._call(build, "start")
+        except BaseException:
+            self._thread.close()
+            raise
         self._processes = self._collector.procs
 
     def _build(self, make_env: MakeEnv, worlds: int, frames: int, start_method: str) -> tuple[MultiSyncCollector, Any]:
@@ -216,7 +191,8 @@ class MultiSyncCollection:
             num_sub_threads=1,
             trust_policy=True,
             auto_register_policy_transforms=False,
-            init_fn=partial(_prepare_worker, None if start_method == "forkserver" else os.getpid()),
+            weight_sync_schemes={"policy": self._weights},
+            init_fn=partial(prepare_worker, None if start_method == "forkserver" else os.getpid()),
         )
         torch.set_num_threads(threads)
         return collector, iter(collector)
@@ -246,7 +222,7 @@ class MultiSyncCollection:
         """CPU time of all workers since they started [s]; 0 where the system does not tell."""
         if self._final_cpu is not None:
             return self._final_cpu
-        return sum(map(_process_cpu_seconds, self._processes))
+        return sum(map(cpu_seconds, self._processes))
 
     def close(self) -> None:
         """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
@@ -276,7 +252,7 @@ class MultiSyncCollection:
     def _wait(self, future: "Future[Any]", doing: str) -> Any:
         name, seconds = ("timeout", self._timeout) if self._started else ("start_timeout", self._start_timeout)
         try:
-            return future.result(timeout=seconds)
+            return self._answer(future, seconds)
         except TimeoutError:
             self._kill()
             raise CollectionError(
@@ -289,10 +265,25 @@ class MultiSyncCollection:
             self._kill()
             raise
 
+    def _answer(self, future: "Future[Any]", seconds: float) -> Any:
+        until = time.monotonic() + seconds
+        while True:
+            try:
+                return future.result(timeout=max(min(GLANCE, until - time.monotonic()), 0.0))
+            except TimeoutError:
+                if future.done() or time.monotonic() >= until:
+                    raise
+                if not all(process.is_alive() for process in self._weights.processes):
+                    self._kill()  # what waits for it, says so then
+                    until = time.monotonic() + LAST_START
+
     def _kill(self) -> None:
-        self._kill_children()
-        with contextlib.suppress(Exception):  # the thread may have been about to start one more
-            self._thread.submit(lambda: None).result(timeout=1.0)
+        idle = self._thread.submit(lambda: None)  # before, it may start one more
+        until = time.monotonic() + LAST_START
+        while not idle.done() and time.monotonic() < until:
+            self._kill_children()
+            with contextlib.suppress(TimeoutError):
+                idle.result(timeout=0.05)
         self._kill_children()
 
     def _kill_children(self) -> None:
@@ -300,27 +291,6 @@ class MultiSyncCollection:
         for process in set(multiprocessing.active_children()) - self._others:
             process.kill()
             process.join(1.0)
-
-
-def _prepare_worker(parent: int | None) -> None:
-    """Leave Ctrl-C to the main process `parent`, and end with it even if it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    torch.set_num_threads(1)
-    if os.uname().sysname == "Linux":
-        pr_set_pdeathsig = 1
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)  # SIGTERM would not reach a stopped process
-        if parent is not None and os.getppid() != parent:  # it ended before
-            os._exit(1)
-
-
-def _process_cpu_seconds(process: Any) -> float:
-    """User and system time of a running process [s], from /proc; 0 for one that is closed already."""
-    try:
-        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
-    except (OSError, ValueError):
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 Collection = SingleCollection | MultiSyncCollection

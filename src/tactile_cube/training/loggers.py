@@ -1,7 +1,9 @@
 """Where metrics go: CSV, TensorBoard, Weights & Biases."""
 
 import csv
+import hashlib
 import io
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -11,7 +13,10 @@ from tactile_cube.whole_file import write_whole
 
 
 class MetricLogger(Protocol):
-    """Takes rows of numbers. Built as `Logger(folder=run folder, resumed_at=steps, **its own settings)`."""
+    """Takes rows of numbers.
+
+    Built as `Logger(folder=run folder, resumed_at=steps, config=all settings of the run, **its own settings)`.
+    """
 
     def log(self, steps: int, metrics: Mapping[str, float]) -> None:
         """Write one row at `steps` environment steps."""
@@ -23,7 +28,7 @@ class MetricLogger(Protocol):
 class CsvLogger:
     """metrics.csv in the run folder; rows after the checkpoint that a run goes on from are dropped first."""
 
-    def __init__(self, folder: Path, resumed_at: int):
+    def __init__(self, folder: Path, resumed_at: int, **_: object):
         self.path = folder / "metrics.csv"
         kept = _rows_until(resumed_at, self.path) if resumed_at and self.path.is_file() else []
         text = io.StringIO(newline="")
@@ -49,7 +54,7 @@ class CsvLogger:
 class TensorBoardLogger:
     """Event files in the run folder: `tensorboard --logdir outputs/train`."""
 
-    def __init__(self, folder: Path, resumed_at: int):
+    def __init__(self, folder: Path, resumed_at: int, **_: object):
         from torch.utils.tensorboard import SummaryWriter  # imports slowly
 
         self._writer: Any = SummaryWriter(str(folder / "tensorboard"), purge_step=resumed_at + 1)
@@ -65,15 +70,27 @@ class TensorBoardLogger:
 
 
 class WandbLogger:
-    """Weights & Biases (`pip install .[wandb]`)."""
+    """Weights & Biases (`pip install .[wandb]`): a run for each folder, grouped by the training or sweep it is part of.
 
-    def __init__(self, folder: Path, resumed_at: int, project: str = "tactile_cube"):
+    A run that goes on writes into its own again; one that starts over begins it anew.
+    """
+
+    def __init__(self, folder: Path, resumed_at: int, config: Mapping[str, Any], project: str = "tactile_cube"):
         try:
             import wandb  # type: ignore[import-not-found, unused-ignore]
         except ImportError:
             raise InputError("logger=wandb needs Weights & Biases: pip install 'tactile-cube[wandb]'") from None
-        name = folder.name
-        self._run: Any = wandb.init(project=project, name=name, id=name, dir=str(folder), resume="allow")
+        place = folder.resolve()
+        name, digest = f"{place.parent.name}/{place.name}", hashlib.sha256(str(place).encode()).hexdigest()
+        self._run: Any = wandb.init(
+            project=project,
+            group=place.parent.name,
+            name=name,
+            id=f"{re.sub(r'[^a-zA-Z0-9_.=-]', '_', name)[-100:]}-{digest[:8]}",  # W&B allows neither / nor : in it
+            config=dict(config),
+            dir=str(folder),
+            resume="allow" if resumed_at else None,
+        )
 
     def log(self, steps: int, metrics: Mapping[str, float]) -> None:
         """Send one row."""

@@ -52,11 +52,13 @@ class Learner:
         self.assembler = TransitionAssembler(self.agent.settings.n_step, self.agent.settings.gamma)
 
     def run_to_barrier(self, after_iteration: Callable[[], None]) -> None:
-        """Reset all worlds, then collect and learn up to the next barrier."""
+        """Reset all worlds, then collect and learn up to the next barrier, which the end of the run is too."""
         self.collection.restart(barrier_seed(self.seed, self.iteration), self._progress())
         for _ in range(self.settings.barrier_iterations):
             self.iterate()
             after_iteration()
+            if self.steps >= self.settings.steps:
+                break
         self.replay.extend(self.assembler.flush())
 
     def iterate(self) -> None:

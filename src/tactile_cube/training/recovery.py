@@ -44,7 +44,7 @@ def _session(build: Callable[[], Run]) -> tuple[Run | None, str | CollectionErro
         run.announce()
         return run, run.train()
     except CollectionError as error:
-        return run, error.with_traceback(None)
+        return run, CollectionError(str(error))  # its cause would keep what failed from being deleted
     finally:
         if run is not None:
             run.close()

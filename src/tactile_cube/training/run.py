@@ -34,6 +34,7 @@ class Run:
         approximations: which shortcuts are on, in words.
         best_angle: largest mean final angle at a barrier so far [rad].
         saved_at: environment steps at the last checkpoint.
+        total: environment steps in all: those asked for, in whole iterations.
     """
 
     learner: Learner
@@ -49,7 +50,10 @@ class Run:
 
     def __post_init__(self) -> None:
         """A session begins."""
-        self.line = ProgressLine(self.learner.settings.steps, self.learner.steps, self.learner.updates)
+        settings = self.learner.settings
+        iteration = self.barrier_steps // settings.barrier_iterations
+        self.total = -(-settings.steps // iteration) * iteration
+        self.line = ProgressLine(self.total, self.learner.steps, self.learner.updates)
         self.commit = current_commit()
         self.saved_at = self.learner.steps
 
@@ -76,7 +80,7 @@ class Run:
         """Say what runs where, where it begins, and which shortcuts are on."""
         learner, settings = self.learner, self.learner.settings
         start = f"goes on at {learner.steps} steps" if learner.steps else "starts"
-        self.line.say(f"{self.folder}: {start}, {settings.steps} steps in all")
+        self.line.say(f"{self.folder}: {start}, {self.total} steps in all")
         self.line.say(
             f"saved every {self.barrier_steps} steps; after Ctrl-C the same command goes on from the last time, "
             "and does the steps since then again"
@@ -133,7 +137,7 @@ class Run:
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
         if steps >= settings.steps:
-            return f"all {settings.steps} steps done"
+            return f"all {self.total} steps done"
         if settings.mastered(self.learner.episodes.mean_angle, self.learner.episodes.kept):
             return f"{MASTERED} above {settings.goal}"
         deadline = settings.stop_if_no_regrasp_by

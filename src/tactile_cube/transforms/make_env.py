@@ -23,6 +23,7 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.health import unresolved
 from tactile_cube.transforms.disturbances import JointOffset, SensorNoise, StickyAction
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
+from tactile_cube.transforms.own_generator import OwnGeneratorEnv
 
 ALMOST_ALL = 1.0 - 1e-9
 """The fraction of draws below what counts as a distribution's largest value."""
@@ -113,8 +114,9 @@ def make_env(config: EnvConfig, worlds: int, seed: int, evaluation: bool = False
     Args:
         config: what the environment is.
         worlds: number of worlds that this process hosts; with `simulation.engine` mixed, engines alternate among them.
-        seed: seed of the worlds and, through torch's global generator, of the transforms.
-        evaluation: leaves out the extra exploration and the curriculum; everything else stays as configured.
+        seed: seed of the worlds and of the transforms. Those draw from torch's global generator in training, where the
+            actor's noise comes from it too, else from one of the environment's own.
+        evaluation: the task itself, without extra exploration and curriculum; everything else stays as configured.
 
     Raises:
         InputError: fewer than one world.
@@ -126,7 +128,8 @@ def make_env(config: EnvConfig, worlds: int, seed: int, evaluation: bool = False
     of_worlds = [replace(config, simulation=config.simulation.of_world(seed + index)) for index in range(worlds)]
     tasks = [rotation_env(one, poses) for one in of_worlds]
     base = WorldsEnv(tasks, None if evaluation else config.curriculum)
-    env = TransformedEnv(base, Compose(*transforms(config, explore=not evaluation)))
+    kind = OwnGeneratorEnv if evaluation else TransformedEnv
+    env = kind(base, Compose(*transforms(config, explore=not evaluation)))
     env.set_seed(seed)
     return env
 

@@ -49,7 +49,7 @@ def run(folder: Path, **config: Any) -> Path:
 
 
 def test_the_card_says_how_it_was_made_and_what_it_does() -> None:
-    result = results("paper")
+    result = results("paper", angle=15.5)
     result["variants"][0]["summary"]["exploits"] = {}
     card = model_card("default", INFO, RUNS, [result], "")
     for fact in (
@@ -57,7 +57,8 @@ def test_the_card_says_how_it_was_made_and_what_it_does() -> None:
         "1 000 000 (curriculum), then 500 000 (finetune)",
         "abc123",
         "5.75 (4.50 h on the clock)",
-        "9/10 successful",
+        "8/10 successful",
+        "Successful: kept to the end and turned by at least 15 rad in 40 s",
         "simulation only",
     ):
         assert fact in card

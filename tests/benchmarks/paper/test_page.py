@@ -19,15 +19,14 @@ def results(protocol: str, label: str = "cube", angle: float = 12.0, table: bool
         "mean_angle": angle - 1,
         "std_angle": 0.5,
         "best_angle": angle,
-        "successes": 9,
         "episodes": 10,
-        "success_low": 0.596,
-        "success_high": 0.982,
         "kept": 8,
         "verdicts": {"regrasping": 8, "dropped": 2, "holding": 0},
     }
-    episode = {"final_angle": angle, "duration": 40.0, "ending": "time_limit"}
-    variant = {"variant": {"name": "nominal"}, "summary": summary, "episodes": [episode]}
+    kept = {"duration": 40.0, "ending": "time_limit"}
+    angles = [*[angle] * 8, 0.79 * angle]
+    episodes = [*(kept | {"final_angle": one} for one in angles), kept | {"final_angle": angle, "ending": "dropped"}]
+    variant = {"variant": {"name": "nominal"}, "summary": summary, "episodes": episodes}
     return {
         "format": FORMAT,
         "created": "2026-11-21T10:00:00+00:00",
@@ -63,7 +62,11 @@ def test_other_worlds_fill_a_row_of_their_own() -> None:
     words = "python -m tactile_cube.evaluate protocol=paper protocol.worlds=training seed=1"
     page = paper_page([results("paper", angle=12.0), results("paper", angle=9.0) | {"command": words}])
     assert "12.0 rad" in line(page, "best of these runs")
-    assert "successful (95 %: 60 to 98 %), 8.0 +- 0.5 rad" in line(page, "10 runs in the worlds of its training")
+    assert "8/10 kept, 8/10 as far (95 %: 49 to 94 %), 8.0 +- 0.5 rad" in line(page, "10 runs in the worlds of its")
+
+
+def test_the_papers_own_rule_counts_no_hand_that_never_moves() -> None:
+    assert "0/10 as far" in line(paper_page([results("paper", angle=0.0)]), "10 runs of 40 s")
 
 
 def test_what_is_written_by_hand_stays_where_it_stands() -> None:

@@ -32,6 +32,15 @@ def test_repeats_give_the_sensor_noise_and_not_the_joint_offset(tmp_path: Path, 
     assert floor.overall == pytest.approx(2e-4, rel=0.1)
 
 
+def test_two_slow_repeats_scatter_by_the_standard_deviation_of_one(tmp_path: Path) -> None:
+    recording, clean = read_recording(write(tmp_path)), table(noise=0.0)
+    position = np.stack([clean["a.position"], clean["b.position"]], axis=1)
+    wave = 2e-3 * np.sin(np.linspace(0.0, 20.0 * np.pi, len(position)))[:, None]  # too slow for a sensor's white noise
+    pair = [replace(recording.trials[0], name=f"{sign:+d}", position=position + sign * wave) for sign in (1, -1)]
+    # they differ by 2 x 2e-3 sin, whose mean square 2 (2e-3)^2 is the sum of the variances of both
+    assert noise_floor(recording.with_trials(pair)).overall == pytest.approx(2e-3, rel=0.03)
+
+
 def test_repeats_of_a_simulation_are_no_better_than_their_sensor(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path))
     floor = noise_floor(recording.with_trials([recording.trials[0], replace(recording.trials[0], name="again")]))
