@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.paper.budget import POLICIES, WORLDS, read_budget
 from benchmarks.paper.model_card import read_card
 from benchmarks.paper.page import DIFFERENCES, paper_page
 from benchmarks.paper.rows import HEAD, ROWS, read_comparison
@@ -70,11 +71,12 @@ def test_the_papers_own_rule_counts_no_hand_that_never_moves() -> None:
 
 
 def test_what_is_written_by_hand_stays_where_it_stands() -> None:
-    before = f"# Title\n\nContact.\n\n{HEAD}\nold\n\n{DIFFERENCES}\n\n- One.\n\n## Old\n\nold"
+    before = f"# Title\n\nContact.\n\n{HEAD}\noutdated\n\n{DIFFERENCES}\n\n- One.\n\n## Old\n\noutdated"
     written = paper_page([], written=before)
     assert written.startswith(f"# Title\n\nContact.\n\n{HEAD}")
-    assert f"\n\n{DIFFERENCES}\n\n- One.\n\n## Robustness" in written
-    assert "old" not in written
+    assert f"\n\n{DIFFERENCES}\n\n- One.\n\n## What a gait earns and pays\n" in written
+    assert written.index("What a gait earns") < written.index("## Robustness")
+    assert "outdated" not in written
     assert paper_page([], written=written) == written
 
 
@@ -118,3 +120,11 @@ def test_a_comparison_without_a_band_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.what)
 def test_every_protocol_of_the_table_exists(row: Any) -> None:
     assert (Path(__file__).parents[3] / "conf" / "protocol" / f"{row.protocol}.yaml").is_file()
+
+
+def test_the_budgets_terms_add_up_to_the_return() -> None:
+    rows, total = read_budget(), ("spin", "height", "plane", "tilt", "proximal")
+    assert len(rows) == len(POLICIES) * len(WORLDS)
+    lost = 10.0  # published nowhere, conf/reward/paper.yaml
+    for row in rows:
+        assert row["return"] == pytest.approx(sum(row[key] for key in total) - lost * (1.0 - row["held"]), abs=0.05)
