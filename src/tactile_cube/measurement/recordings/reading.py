@@ -59,7 +59,8 @@ def read_recording(folder: str | Path) -> Recording:
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
     check_inertia(recording)
-    warnings = [*recording.warnings, *swap_warning(recording)]
+    warnings = [f"{rig.path}: {line}" for line in recording.rigid_body().corrected]
+    warnings += [*recording.warnings, *swap_warning(recording)]
     if not_drawn:
         warnings.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
     return replace(recording, warnings=tuple(warnings))

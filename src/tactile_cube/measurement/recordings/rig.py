@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.urdf_elements import MOVABLE
 from tactile_cube.hand.urdf_tree import read_joints
 from tactile_cube.untrusted_file import read_text
 
@@ -71,7 +70,7 @@ def parse_rig(text: str, path: Path) -> Rig:
         InputError: no URDF, or no robot with a movable joint.
     """
     try:
-        joints = [joint for joint in read_joints(text)[0] if joint.kind in MOVABLE]
+        joints = [joint for joint in read_joints(text)[0] if joint.movable]
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     if not joints:
