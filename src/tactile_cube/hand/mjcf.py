@@ -104,7 +104,7 @@ class _Reader:
             parts.append(self._joint(joint, before, link, place + turn @ at, turn, mimics))
             place, turn, before = -at, np.eye(3), link
         inertia = _matrix(m.body_iquat[body]) @ np.diag(m.body_inertia[body]) @ _matrix(m.body_iquat[body]).T
-        mass = inertial_element(m.body_mass[body], m.body_ipos[body] - self._shift(body), inertia, digits=17)
+        mass = inertial_element(m.body_mass[body], m.body_ipos[body] - self._shift(body), inertia, digits=15)
         return [*parts, *map(_link, links[:-1]), _link(name, mass)]
 
     def _shift(self, body: int) -> Array:
@@ -126,7 +126,7 @@ class _Reader:
         else:
             turn = turn @ Rotation.from_rotvec(-zero * axis).as_matrix()
         limited, (lower, upper) = bool(m.jnt_limited[joint]), m.jnt_range[joint]
-        ends = f'<limit lower="{lower:.17g}" upper="{upper:.17g}" effort="0" velocity="0"/>' if limited else ""
+        ends = f'<limit lower="{lower:.15g}" upper="{upper:.15g}" effort="0" velocity="0"/>' if limited else ""
         more = f'<axis xyz="{number_list(axis)}"/>{ends}{mimics.get(joint, "")}'
         turning = "revolute" if limited else "continuous"
         named = "prismatic" if kind == "SLIDE" else turning
@@ -154,7 +154,7 @@ class _Reader:
             zero = m.qpos0[m.jnt_qposadr[[follower, leader]]]
             offset = zero[0] + a0 - a1 * zero[1]
             leading = escape(self.joints[leader])
-            yield follower, f'<mimic joint="{leading}" multiplier="{a1:.17g}" offset="{offset:.17g}"/>'
+            yield follower, f'<mimic joint="{leading}" multiplier="{a1:.15g}" offset="{offset:.15g}"/>'
 
     def _joint_constants(self, joint: int) -> None:
         m, name = self.model, self.joints[joint]
