@@ -29,6 +29,7 @@ class JointDrive:
         excess: dry friction at rest beyond `friction` [N m], which falls by exp(-|v / velocity|^exponent).
         velocity: [rad/s].
         exponent: [1].
+        stiffness: of the gear between motor and link [N m/rad].
         gain: of the torque, which kp, kd and torque_limit have in them [1].
         beyond: what none of these hold: name -> its numbers.
     """
@@ -47,8 +48,14 @@ class JointDrive:
     excess: float = 0.0
     velocity: float = 0.0
     exponent: float = 2.0
+    stiffness: float = inf
     gain: float = 1.0
     beyond: Mapping[str, str] = field(default_factory=dict)
+
+    def at_link(self) -> JointDrive:
+        """Return the drive with the gains that a link feels through the gear, which a rigid drive would have."""
+        softer = 1.0 + self.kp / self.stiffness
+        return replace(self, kp=self.kp / softer, kd=self.kd / softer)
 
     def not_in(self, held: Collection[str]) -> list[str]:
         """Return what a format does not hold that holds these attributes and effects, a line each."""
@@ -71,7 +78,8 @@ SILENT = {
     "delay": (0.0, "s"),
     "stall": (inf, "N m"),
     "no_load": (inf, "rad/s"),
-    "excess": (0.0, "N m of stribeck_friction"),
+    "excess": (0.0, "N m more friction at rest (stribeck_friction)"),
+    "stiffness": (inf, "N m/rad"),
 }
 """Attributes that may be left out, the values that say nothing, and units."""
 CONSTANTS = {
@@ -80,9 +88,10 @@ CONSTANTS = {
     "torque_limit": "torque_limit",
     "reflected_inertia": "armature",
     "static_friction": "friction",
+    "stiffness": "stiffness",
 }
 """Constants of a model, and the attributes that hold them."""
-OTHERS = {"stiffness": inf, "friction_creep": 0.0, "reading_delay": 0.0}
+OTHERS = {"friction_creep": 0.0, "reading_delay": 0.0}
 """Other constants of a model, and the values that say nothing."""
 
 Values = Mapping[str, float]

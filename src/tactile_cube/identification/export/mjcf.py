@@ -32,7 +32,7 @@ LIGHTEST = 1e-9
 def as_mjcf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
     """Return the text, and what it does not hold, a line each."""
     known, simulator = nominal_model(recording, model), Simulator(recording)
-    memory, drives = simulator.memory(known), drives_of(model)
+    memory, drives = simulator.memory(known), [drive.at_link() for drive in drives_of(model)]
     numbers = {key: simulator.plant.view(memory, key)[0] for key in OF_MECHANISM}
     mechanical = [term.effect.name for term in known.terms if term.effect.stage is Stage.MECHANISM]
     tree, torque_mode = simulator.tree, recording.torque_controlled
@@ -65,6 +65,8 @@ def _held(drive: JointDrive, torque_mode: bool) -> tuple[str, ...]:
 def _said(left: list[str]) -> list[str]:
     about = "by tactile_cube.export; commands are joint angles [rad], or torques [N m] where actuators are motors"
     lines = [about, *(f"not held: {one}" for one in left)]
+    if any(": stiffness " in line for line in left):
+        lines.append("gains are those that links feel; a motor is ahead of its link by torque / stiffness")
     return [line.replace("--", "- -") for line in lines]
 
 
