@@ -104,6 +104,18 @@ def _import_bag(folder: Path) -> None:
     write_recordings(folder / "out", bag.recordings(0))
 
 
+MJCF = """<mujoco><compiler angle="radian"/><default><default class="c"><joint armature="0.02"/></default></default>
+<worldbody><body name="a" euler="0 0.1 0"><joint name="j" class="c" axis="0 1 0" ref="0.1" range="-1 1"/>
+<geom type="capsule" size="0.02 0.1"/><body pos="0 0 0.3"><joint name="k" type="slide" frictionloss="0.2"/>
+<inertial pos="0 0 1" mass="2" diaginertia="1 1 1"/></body></body></worldbody>
+<equality><joint joint1="k" joint2="j" polycoef="0 1 0 0 0"/></equality>
+<actuator><position joint="j" kp="5" kv="0.3" gear="2"/></actuator></mujoco>"""
+
+
+def _read_mjcf(folder: Path) -> None:
+    RigidBodyTree.from_urdf(read_rig(folder / "rig.xml").text)
+
+
 def _read_urdf(folder: Path) -> None:
     RigidBodyTree.from_urdf(read_rig(folder / "rig.urdf").text)
 
@@ -236,6 +248,7 @@ READERS = (
     Reader(
         "URDF of a finger", 8, lambda folder: (folder / "rig.urdf").write_text(DLR_HAND2.finger_urdf(0)), _read_urdf
     ),
+    Reader("MJCF", 8, lambda folder: (folder / "rig.xml").write_text(MJCF), _read_mjcf),
     Reader("model file", 12, lambda folder: write_model(model(), folder / "model.yaml"), _read_model),
     Reader("policy", 8, _policy, _read_policy, _damage_policy),
     Reader("checkpoint", 10, _checkpoint, _read_checkpoint, _damage_checkpoint),

@@ -1,8 +1,9 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
 Nearly each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`,
-`record`, `export`, `deploy`, `view`, `monitor` and `effects`; `search_grasps`, `make_env`, `load_policy`,
-`read_recording` and `recording_from_arrays` give what they work on. Nothing slow is imported before it is used.
+`record`, `export`, `export_model`, `deploy`, `view`, `monitor` and `effects`; `search_grasps`, `make_env`,
+`load_policy`, `read_recording` and `recording_from_arrays` give what they work on. Nothing slow is imported before it
+is used.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.environment import env_config, make_env, search_grasps
     from tactile_cube.api.evaluation import evaluate
     from tactile_cube.api.identification import identify
+    from tactile_cube.api.model_export import export_model
     from tactile_cube.api.monitoring import monitor
     from tactile_cube.api.recording import record
     from tactile_cube.api.training import train
@@ -35,6 +37,7 @@ _PLACES = {
     "api.batch": ["diagnose_each"],
     "api.comparison": ["compare"],
     "api.deployment": ["deploy", "export", "load_policy"],
+    "api.model_export": ["export_model"],
     "api.diagnosis": ["diagnose"],
     "api.effects": ["effects"],
     "api.environment": ["env_config", "make_env", "search_grasps"],
@@ -60,6 +63,7 @@ __all__ = [
     "env_config",
     "evaluate",
     "export",
+    "export_model",
     "identify",
     "load_policy",
     "make_env",

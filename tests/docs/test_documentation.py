@@ -70,7 +70,7 @@ def test_every_command_that_a_page_shows_is_one_that_composes(page: Path) -> Non
 
 def test_the_commands_of_the_quickstarts_are_found_at_all() -> None:
     found = typed_commands((ROOT / "docs" / "match.md").read_text(encoding="utf-8"))
-    names = "record compare diagnose effects identify compare evaluate train average evaluate monitor"
+    names = "record compare diagnose effects identify compare export evaluate train average evaluate monitor"
     assert [name for name, _ in found] == names.split()
     assert ["recording=outputs/bench", "effects=[stribeck_friction@q3]", "hydra.run.dir=outputs/fit"] in [
         w for _, w in found

@@ -172,7 +172,7 @@ def test_changing_gravity_afterwards_equals_computing_with_it() -> None:
     [
         ("<robot", {}, "not well-formed"),
         ("<sdf/>", {}, "<sdf>"),
-        (robot(joint("a", "floating", "base", "l1")), {}, "type 'floating'"),
+        (robot(joint("a", "ball", "base", "l1")), {}, "type 'ball'"),
         (robot(joint("a", "revolute", "base", "l9")), {}, "'l9'"),
         (robot(joint("a", "revolute", "base", "l1", "0 0 0")), {}, "axis of joint 'a' is zero"),
         (robot(joint("a", "revolute", "base", "l1", "0 x 0")), {}, "three numbers"),

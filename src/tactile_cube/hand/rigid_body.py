@@ -39,6 +39,7 @@ class RigidBodyTree:
         inertia: (N, 3, 3) about the centre of mass, in the link's axes [kg m^2].
         lower: (N,) joint limits [rad or m], infinite where the URDF has none.
         upper: (N,).
+        corrected: what was changed to make a mechanism of the description, a line each.
     """
 
     joint_names: tuple[str, ...]
@@ -58,6 +59,7 @@ class RigidBodyTree:
     inertia: Array
     lower: Array
     upper: Array
+    corrected: tuple[str, ...] = ()
 
     @classmethod
     def from_urdf(
@@ -74,7 +76,7 @@ class RigidBodyTree:
         Raises:
             InputError: no tree, an unknown joint, a coupling to a joint that is not actuated, impossible masses.
         """
-        dofs, homes, actuated = read_movable_joints(text, joints, coupled)
+        dofs, homes, actuated, corrected = read_movable_joints(text, joints, coupled)
         leaders = [actuated.index(d.coupling.joint if d.coupling else d.name) for d in dofs]
         index = {d.link: k for k, d in enumerate(dofs)}
         return cls(
@@ -95,6 +97,7 @@ class RigidBodyTree:
             inertia=np.stack([d.body.inertia for d in dofs]),
             lower=np.array([d.lower for d in dofs]),
             upper=np.array([d.upper for d in dofs]),
+            corrected=corrected,
         )
 
     @property

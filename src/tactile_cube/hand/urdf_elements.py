@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,8 +14,12 @@ from tactile_cube.errors import InputError
 
 Array = npt.NDArray[np.float64]
 MOVABLE = ("revolute", "continuous", "prismatic")
+FREE = ("floating", "planar")
+"""Types of joints without a drive; their links are held where the URDF puts them."""
 ROUNDING = 0.02
 """Share of the largest principal moment that rounded numbers may lack to those of a body."""
+NO_INERTIA = 1e-15
+"""[kg m^2] A moment that is rounding of zero: a milligram of 1 mm has 1e-13."""
 
 
 @dataclass(frozen=True)
@@ -87,12 +91,22 @@ class Joint:
         """Whether it slides."""
         return self.kind == "prismatic"
 
+    @property
+    def movable(self) -> bool:
+        """Whether a drive can move it."""
+        return self.kind in MOVABLE
+
+    @property
+    def free(self) -> bool:
+        """Whether it moves without a drive."""
+        return self.kind in FREE
+
 
 def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
     """A <joint> with the body of the link that it carries, of `bodies` by link."""
     name = attribute(element, "name", "a joint")
     kind = attribute(element, "type", f"joint '{name}'")
-    if kind not in (*MOVABLE, "fixed"):
+    if kind not in (*MOVABLE, *FREE, "fixed"):
         raise InputError(f"URDF: joint '{name}' has type '{kind}'; use one of {', '.join(MOVABLE)} or fixed")
     parent, child = (_linked(element, end, name, bodies) for end in ("parent", "child"))
     limit = element.find("limit")
@@ -103,19 +117,25 @@ def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
         parent=parent,
         link=child,
         placement=placement_of(element, f"joint '{name}'"),
-        axis=_axis(element, name),
-        lower=number(limit, "lower", f"joint '{name}'", 0.0) if bounded else -np.inf,
-        upper=number(limit, "upper", f"joint '{name}'", 0.0) if bounded else np.inf,
+        axis=_axis(element, name) if kind in MOVABLE else np.array([1.0, 0.0, 0.0]),
+        lower=_end(limit, "lower", name) if bounded else -np.inf,
+        upper=_end(limit, "upper", name) if bounded else np.inf,
         velocity=_strength(limit, "velocity", name),
         effort=_strength(limit, "effort", name),
-        coupling=_mimic(element, name),
+        coupling=_mimic(element, name) if kind in MOVABLE else None,
         body=bodies[child],
     )
 
 
+def _end(limit: ElementTree.Element | None, key: str, joint: str) -> float:
+    """A limit; exporters write 1e16 or inf where they know none."""
+    value = number(limit, key, f"the limit of joint '{joint}'", 0.0, most=np.inf)
+    return value if abs(value) <= limits.NUMBER else float(np.copysign(np.inf, value))
+
+
 def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
-    """A limit of speed or torque; exporters write 0 where they know none."""
-    value = number(limit, key, f"the limit of joint '{joint}'", 0.0)
+    """A limit of speed or torque; exporters also write 0 or -1 where they know none."""
+    value = _end(limit, key, joint)
     return value if value > 0.0 else float("inf")
 
 
@@ -132,7 +152,7 @@ def body_of(link: ElementTree.Element) -> Body:
     """The <inertial> of a <link>; without one it has no mass.
 
     Raises:
-        InputError: no body has this mass or this inertia.
+        InputError: no body has this mass.
     """
     inertial, where = link.find("inertial"), f"link '{link.get('name')}'"
     if inertial is None:
@@ -145,13 +165,31 @@ def body_of(link: ElementTree.Element) -> Body:
     body = Body(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     if not 0.0 <= mass <= limits.MASS:
         raise InputError(f"URDF: {where} has mass {mass:g} kg; give it 0 to {limits.MASS:g} kg")
-    least, middle, most = np.linalg.eigvalsh(body.inertia)
-    if min(least, least + middle - most) < -ROUNDING * abs(most):
-        raise InputError(
-            f"URDF: {where} has principal moments of inertia {least:.4g}, {middle:.4g}, {most:.4g} kg m^2; give it "
-            "those of a body: none negative, none larger than the other two together"
-        )
     return body.seen_from(placement_of(inertial, where))
+
+
+def balanced(body: Body, link: str) -> Body:
+    """The body itself, or with the mean of its moments where no body has them, as MuJoCo's balanceinertia does.
+
+    Raises:
+        InputError: the mean is no moment of inertia either.
+    """
+    moments = principal_moments(body)
+    least, middle, most = moments
+    if min(least, least + middle - most) >= -max(ROUNDING * abs(most), NO_INERTIA):
+        return body
+    if moments.mean() <= 0.0:
+        numbers = ", ".join(f"{one:.4g}" for one in moments)
+        raise InputError(
+            f"URDF: link '{link}' has principal moments of inertia {numbers} kg m^2; give it those of a body: none "
+            "negative, none larger than the other two together"
+        )
+    return replace(body, inertia=moments.mean() * np.eye(3))
+
+
+def principal_moments(body: Body) -> Array:
+    """Moments (3,) about its centre of mass, the smallest first [kg m^2]."""
+    return np.asarray(np.linalg.eigvalsh(body.inertia))
 
 
 def placement_of(element: ElementTree.Element, where: str) -> Placement:
@@ -196,14 +234,16 @@ def triple(element: ElementTree.Element, key: str, where: str) -> Array:
     return values
 
 
-def number(element: ElementTree.Element | None, key: str, where: str, default: float) -> float:
-    """One number of an attribute."""
+def number(
+    element: ElementTree.Element | None, key: str, where: str, default: float, most: float = limits.NUMBER
+) -> float:
+    """One number of an attribute, of size `most` or less."""
     text = element.get(key) if element is not None else None
     try:
         value = default if text is None else float(text)
     except ValueError:
         value = float("nan")
-    if not abs(value) <= limits.NUMBER:
+    if not abs(value) <= most:
         raise InputError(f'URDF: {where} has {key}="{text}"; it takes a number up to {limits.NUMBER:g}')
     return value
 

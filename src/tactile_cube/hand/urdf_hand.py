@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -79,6 +80,8 @@ def hand_from_urdf(
             f"hand.fingers have different joints ({counts}); fingers of equally many joints can be simulated"
         )
     moving = RigidBodyTree.from_urdf(text, [str(joint) for one in fingers.values() for joint in one["joints"]])
+    for line in moving.corrected:
+        warnings.warn(f"{file}: {line}", stacklevel=2)
     hand = Hand(
         name=name,
         fingers=chains,

@@ -14,28 +14,41 @@ from pathlib import Path
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.hand.urdf_elements import Body, Joint, Mimic, Placement, attribute, body_of, joint_of
+from tactile_cube.hand.urdf_elements import (
+    Body,
+    Joint,
+    Mimic,
+    Placement,
+    attribute,
+    balanced,
+    body_of,
+    joint_of,
+    principal_moments,
+)
 from tactile_cube.untrusted_file import below, regular
 
+XACRO = "URDF: it is a xacro file, which other programs turn into a URDF; run xacro first: xacro FILE > robot.urdf"
+UNEXPANDED = re.compile(r"\$[{(]")
+"""What xacro would replace in an attribute."""
 Homes = dict[str, tuple[str, Placement]]
 """The link that each link moves with, itself or the root's included, and where its frame is in that link's."""
 
 
 def read_movable_joints(
     text: str, joints: Sequence[str] | None = None, coupled: Mapping[str, Mimic] | None = None
-) -> tuple[list[Joint], Homes, tuple[str, ...]]:
-    """The joints that move, parents before children; where all links are; the actuated joints' names in order.
+) -> tuple[list[Joint], Homes, tuple[str, ...], tuple[str, ...]]:
+    """The joints that move, parents first; where all links are; the actuated joints in order; what was corrected.
 
     See `RigidBodyTree.from_urdf` for the arguments.
     """
     every, bodies = read_joints(text)
-    movable = [j.name for j in every if j.kind != "fixed"]
+    movable = [j.name for j in every if j.movable]
     for name in (*(coupled or ()), *(joints or ())):
         if name not in movable:
             raise InputError(f"URDF: it has no movable joint '{name}'; movable: {', '.join(movable) or 'none'}")
     if coupled:
         every = [replace(j, coupling=coupled[j.name]) if j.name in coupled else j for j in every]
-    leaders = [j.name for j in every if j.kind != "fixed" and j.coupling is None]
+    leaders = [j.name for j in every if j.movable and j.coupling is None]
     actuated = tuple(leaders if joints is None else joints)
     if not actuated:
         raise InputError("URDF: no joint of it can move; a mechanism needs at least one")
@@ -50,9 +63,10 @@ def read_movable_joints(
             raise InputError(
                 f"joint '{joint.name}' follows '{leader}', which does not move on its own; name one of {known}"
             )
-        if leader not in actuated:  # locked; a follower of a locked joint too
+        if joint.movable and leader not in actuated:  # locked; a follower of a locked joint too
             every[k] = replace(joint, kind="fixed")
-    return *_merge_fixed(*_parents_first(every, bodies)), actuated
+    moving, homes, impossible = _merge_fixed(*_parents_first(every, bodies))
+    return moving, homes, actuated, _corrections(every, impossible)
 
 
 def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
@@ -81,11 +95,18 @@ def robot_of(text: str) -> ElementTree.Element:
         InputError: it is no URDF.
     """
     try:
-        robot = ElementTree.fromstring(text)
+        robot = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # an encoding that is none
+        if "<xacro:" in text:
+            raise InputError(XACRO) from None
         raise InputError(f"URDF: not well-formed XML: {error}") from None
     if robot.tag != "robot":
         raise InputError(f"URDF: the root element is <{robot.tag}>; it must be <robot>")
+    if any(
+        "/xacro}" in part.tag or any(UNEXPANDED.search(value) for value in part.attrib.values())
+        for part in robot.iter()
+    ):
+        raise InputError(XACRO)
     return robot
 
 
@@ -111,22 +132,38 @@ def _parents_first(every: list[Joint], bodies: Mapping[str, Body]) -> tuple[str,
     return reached[0], ordered
 
 
-def _merge_fixed(root: str, ordered: list[Joint]) -> tuple[list[Joint], Homes]:
-    """Moves what hangs on a fixed joint into the link before it, and its children with it."""
+def _merge_fixed(root: str, ordered: list[Joint]) -> tuple[list[Joint], Homes, list[Joint]]:
+    """Moves what hangs on a fixed joint into the link before it; also the moving links that no body could be."""
     homes: Homes = {root: (root, Placement())}
     moving: dict[str, Joint] = {}
+    impossible = []
     for joint in ordered:
         carrier, place = homes[joint.parent]
         placed = place.then(joint.placement)
-        if joint.kind != "fixed":
-            homes[joint.link] = joint.link, Placement()
-            moving[joint.link] = replace(joint, parent=carrier, placement=placed)
+        homes[joint.link] = (joint.link, Placement()) if joint.movable else (carrier, placed)
+        if not (joint.movable or carrier in moving):
             continue
-        homes[joint.link] = carrier, placed
-        if carrier in moving:
-            merged = moving[carrier].body.joined(joint.body.seen_from(placed))
+        body = balanced(joint.body, joint.link)
+        impossible += [] if body is joint.body else [joint]
+        if joint.movable:
+            moving[joint.link] = replace(joint, parent=carrier, placement=placed, body=body)
+        else:
+            merged = moving[carrier].body.joined(body.seen_from(placed))
             moving[carrier] = replace(moving[carrier], body=merged)
-    return list(moving.values()), homes
+    return list(moving.values()), homes, impossible
+
+
+def _corrections(every: list[Joint], impossible: list[Joint]) -> tuple[str, ...]:
+    said = [f"joint '{joint.name}' is {joint.kind}; its link '{joint.link}' is held" for joint in every if joint.free]
+    if impossible:
+        first = principal_moments(impossible[0].body)
+        names = ", ".join(f"'{joint.link}'" for joint in impossible)
+        said.append(
+            f"no body has the moments of inertia of {names}; each link gets the mean of its three, as by MuJoCo's "
+            f"balanceinertia: '{impossible[0].link}' {first.mean():.4g} kg m^2 in place of "
+            + ", ".join(f"{moment:.4g}" for moment in first)
+        )
+    return tuple(said)
 
 
 SHAPES = ("visual", "collision")

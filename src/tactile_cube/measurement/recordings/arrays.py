@@ -19,8 +19,8 @@ from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.recordings.description import Description, PerJoint, TrialEntry
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
-from tactile_cube.untrusted_file import read_text
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def recording_from_arrays(
     Args:
         trials: what was measured.
         joints: names in the URDF, in the order of the columns.
-        urdf: path of the rig's URDF, or its text.
+        urdf: path of the rig's URDF or MJCF, or the text of a URDF.
         rate: samples per second [Hz].
         kp: stiffness of the impedance controller [N m/rad], one number or one for each joint; not used in torque mode.
         kd: its damping [N m s/rad].
@@ -160,4 +160,4 @@ def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[n
 def _urdf_text(urdf: str | Path) -> str:
     if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
         return urdf
-    return read_text(Path(urdf))
+    return read_rig(Path(urdf)).text

@@ -26,6 +26,8 @@ DEFAULTS = {
     "reading_delay": 0.0,
 }
 """What may be stated of a drive, and its value where nothing is."""
+EFFECTS = {"viscous_friction": "damping"}
+"""Effects that may be stated too, by the value of one parameter."""
 SLOWER = 0.75  # share of the log's rate that rounding explains
 
 
@@ -98,10 +100,8 @@ def gains_of(description: Description, entry: TrialEntry | None, key: str) -> Ga
 def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
     """Refuse nominal values of what no drive has, or that are no physical constants."""
     for key, values in nominal.items():
-        if key not in DEFAULTS:
-            raise ValueError(
-                f"key 'nominal.{key}': unknown; known are {', '.join(DEFAULTS)}{suggestion(key, DEFAULTS)}"
-            )
+        if key not in (every := (*DEFAULTS, *EFFECTS)):
+            raise ValueError(f"key 'nominal.{key}': unknown; known are {', '.join(every)}{suggestion(key, every)}")
         if (values < 0).any() or (np.isinf(values).any() and key not in MAY_BE_INFINITE):
             raise ValueError(
                 f"key 'nominal.{key}': received {values.tolist()}; expected numbers >= 0 for {list(joints)}"

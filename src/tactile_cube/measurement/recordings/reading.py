@@ -28,11 +28,11 @@ from tactile_cube.measurement.recordings.plausibility import (
     without_wraps,
 )
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.rig import Rig, read_rig
+from tactile_cube.measurement.recordings.rig import Rig, parse_rig
 from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.timing import check_time, on_grid, rows_of
 from tactile_cube.measurement.recordings.trial import Trial, load_of
-from tactile_cube.untrusted_file import below
+from tactile_cube.untrusted_file import below, read_text
 
 DESCRIPTION = "recording.yaml"
 
@@ -48,7 +48,8 @@ def read_recording(folder: str | Path) -> Recording:
         raise InputError(f"recording={folder}: no such folder; a recording is a folder with {DESCRIPTION} in it")
     file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)
-    rig = read_rig(below(folder, description.rig, f"{file}: key 'rig'"))
+    path = below(folder, description.rig, f"{file}: key 'rig'")
+    rig = parse_rig(read_text(path, "; recording.yaml names it under 'rig'"), path)
     urdf, not_drawn = with_own_files(rig.text, rig.path, folder)
     rig = replace(rig, text=urdf)
     check_joints(description, rig, file)
@@ -59,7 +60,8 @@ def read_recording(folder: str | Path) -> Recording:
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
     check_inertia(recording)
-    warnings = [*recording.warnings, *swap_warning(recording)]
+    warnings = [f"{rig.path}: {line}" for line in recording.rigid_body().corrected]
+    warnings += [*recording.warnings, *swap_warning(recording)]
     if not_drawn:
         warnings.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
     return replace(recording, warnings=tuple(warnings))

@@ -1,18 +1,20 @@
 """What a recording's URDF says of its joints: names, limits, couplings."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.urdf_elements import MOVABLE
+from tactile_cube.hand.mjcf import is_mjcf, read_mjcf
 from tactile_cube.hand.urdf_tree import read_joints
 from tactile_cube.untrusted_file import read_text
 
 LONGEST_WAY = 10.0  # [m] of a sliding joint
+CONTROLLER = ("kp", "kd", "torque_limit")
 WRONG_ZERO = 0.35  # [rad] a servo that was mounted some teeth off
 
 
@@ -53,15 +55,39 @@ class Rig:
     text: str  # the URDF
     path: Path  # the file it was read from
     joints: dict[str, RigJoint]  # movable joints by name
+    stated: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # constant of the drives -> joint -> value
+    left_out: tuple[str, ...] = ()  # what the file says beside the mechanism and is not used
+
+    @property
+    def gains(self) -> dict[str, Mapping[str, float]]:
+        """What is stated of controllers."""
+        return {key: row for key, row in self.stated.items() if key in CONTROLLER}
+
+    @property
+    def nominal(self) -> dict[str, Mapping[str, float]]:
+        """What is stated of the rest of the drives."""
+        return {key: row for key, row in self.stated.items() if key not in CONTROLLER}
+
+    def understood(self, joints: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+        """What the file states of drives, for people: what, how, and what told it."""
+        for key, row in self.stated.items():
+            values = [f"{row[joint]:.4g}" for joint in joints if joint in row]
+            yield f"{key}", ", ".join(values), f"{self.path.name}, where you state none"
+        for line in self.left_out:
+            yield "not used", line, self.path.name
 
 
 def read_rig(path: Path) -> Rig:
-    """The URDF at `path`.
+    """The mechanism in a URDF, or in an MJCF, which MuJoCo reads.
 
     Raises:
-        InputError: the file is missing or too large, no URDF, or has no movable joint.
+        InputError: the file is missing or too large, neither, or has no movable joint.
     """
-    return parse_rig(read_text(path, "; recording.yaml names it under 'rig'"), path)
+    text = read_text(path)
+    if not is_mjcf(text):
+        return parse_rig(text, path)
+    found = read_mjcf(path)
+    return replace(parse_rig(found.urdf, path), stated=found.stated, left_out=found.left_out)
 
 
 def parse_rig(text: str, path: Path) -> Rig:
@@ -71,7 +97,7 @@ def parse_rig(text: str, path: Path) -> Rig:
         InputError: no URDF, or no robot with a movable joint.
     """
     try:
-        joints = [joint for joint in read_joints(text)[0] if joint.kind in MOVABLE]
+        joints = [joint for joint in read_joints(text)[0] if joint.movable]
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     if not joints:

@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.consistency import DEFAULTS
+from tactile_cube.measurement.recordings.consistency import DEFAULTS, EFFECTS
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, terms_of
 
 Array = NDArray[np.float64]
+STATED = 0.5
+"""Part by which a stated effect may be wrong: damping is copied from one model to the next."""
 CONTROLLER = ("kp", "kd", "torque_limit")
 TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
 
@@ -24,7 +26,7 @@ def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model
     two recordings. Else what was found on one would soak up what is new in another.
     """
     constants = {key: np.array([one.value for one in row]) for key, row in _estimates(recording, known).items()}
-    terms = tuple(term for one in (known.drive_effects if known else ()) for term in _terms(one, recording))
+    terms = tuple(term for one in _effects(recording, known) for term in _terms(one, recording))
     return Model(constants, terms, no_offsets(recording))
 
 
@@ -51,10 +53,25 @@ def draw_model(
     }
     effects = [
         (one.effect, {key: _drawn(value, 0.0, rng) for key, value in one.parameters.items()})
-        for one in (known.drive_effects if known is not None else [])
+        for one in _effects(recording, known)
     ]
     offset = _offset(recording, known, spread.get("offset", 0.0), rng)
     return Model(constants, terms_of(effects, recording.joints), dict.fromkeys(no_offsets(recording), offset))
+
+
+def _effects(recording: Recording, known: ModelFile | None) -> list[EffectEstimate]:
+    """What is known of effects, or stated of them and may be wrong by `STATED`."""
+    if known is not None:
+        return known.drive_effects
+    return [
+        EffectEstimate(
+            effect=f"{effect}@{joint}",
+            parameters={parameter: Estimate(value=v, low=(1.0 - STATED) * v, high=(1.0 + STATED) * v)},
+        )
+        for effect, parameter in EFFECTS.items()
+        for joint, v in zip(recording.joints, recording.nominal.get(effect, np.zeros(0)), strict=False)
+        if v > 0.0
+    ]
 
 
 def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:

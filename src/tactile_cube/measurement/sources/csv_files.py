@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from glob import glob
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from tactile_cube.measurement.recordings.rig import Rig, RigJoint, read_rig
 from tactile_cube.measurement.recordings.tables import Table, read_table, refuse_words
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
-from tactile_cube.measurement.sources.source import described, known, rate_of
+from tactile_cube.measurement.sources.source import described, rate_of, with_stated
 from tactile_cube.measurement.sources.units import Unit, geared, position_unit, same_unit, time_unit, torque_unit
 
 Array = NDArray[np.float64]
@@ -54,8 +54,7 @@ class CsvFiles:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
-        controller = self._controller()
-        torque_mode = controller.get("mode") == "torque"
+        torque_mode = self.controller.get("mode") == "torque"
         paths, rig = self._paths(), read_rig(Path(self.urdf))
         tables = {path: read_table(path, only_numbers=False) for path in paths}
         columns = self._columns(tables[paths[0]], paths[0], rig, torque_mode)
@@ -77,9 +76,11 @@ class CsvFiles:
         rate = self.rate if self.rate is not None else rate_of(trials[0].time, 3, str(paths[0]))
         guessed = kinds_of([path.stem for path in paths], [trial.command for trial in trials], 1 / rate)
         kinds = _one_each(self.kind, paths, "kind", guessed)
+        joints = list(columns.joints)
         description = described(
-            gravity=list(self.gravity), rate_hz=rate, joints=list(columns.joints), controller=controller,
-            nominal=known(self.nominal), sensors={"read": self.read, "position_resolution": self.resolution},
+            gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=self._controller(rig, joints),
+            nominal=with_stated(self.nominal, rig.nominal, joints),
+            sensors={"read": self.read, "position_resolution": self.resolution},
         )  # fmt: skip
         pieces = []
         for trial, kind in zip(trials, kinds, strict=True):
@@ -88,7 +89,7 @@ class CsvFiles:
         by = "source.kind" if self.kind is not None else "file names and commands"
         count = Counter(kinds)
         repeats = ", ".join(f"{kind} x {n}" if n > 1 else kind for kind, n in count.items())
-        understood = [*_rows(columns, units, stamps, rate), ("kinds", repeats, by)]
+        understood = [*_rows(columns, units, stamps, rate), ("kinds", repeats, by), *rig.understood(joints)]
         return {"": RecordingTables(description, rig.text, pieces, [row for row in understood if row[1]])}
 
     def _units(
@@ -136,8 +137,8 @@ class CsvFiles:
         entry = TrialEntry(file=file, initialisation=start, note=f"from {path.name}")
         return TrialTable(entry, time, origin=path, **values)
 
-    def _controller(self) -> dict[str, float | str]:
-        said: dict[str, float | str] = known(self.controller)
+    def _controller(self, rig: Rig, joints: list[str]) -> dict[str, Any]:
+        said = with_stated(self.controller, rig.gains, joints)
         missing = [f"source.controller.{key}" for key in ("kp", "kd") if key not in said]
         if missing and said.get("mode", "position") == "position":
             raise InputError(

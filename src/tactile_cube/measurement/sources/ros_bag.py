@@ -13,7 +13,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.source import described, known, rate_of
+from tactile_cube.measurement.sources.source import described, rate_of, with_stated
 from tactile_cube.untrusted_file import regular
 
 Array = NDArray[np.float64]
@@ -44,10 +44,11 @@ class RosBag:
         tables = [self._trial(Path(name), joints) for name in self.files]
         rate = self.rate if self.rate is not None else rate_of(tables[0].time, 2, str(tables[0].entry.note))
         description = described(
-            gravity=list(self.gravity), rate_hz=rate, joints=joints, controller=known(self.controller),
-            nominal=known(self.nominal), sensors={"read": self.read},
+            gravity=list(self.gravity), rate_hz=rate, joints=joints, sensors={"read": self.read},
+            controller=with_stated(self.controller, rig.gains, joints),
+            nominal=with_stated(self.nominal, rig.nominal, joints),
         )  # fmt: skip
-        return {"": RecordingTables(description, rig.text, tables)}
+        return {"": RecordingTables(description, rig.text, tables, list(rig.understood(joints)))}
 
     def _trial(self, path: Path, joints: list[str]) -> TrialTable:
         messages = _messages(path, (self.states, self.commands))

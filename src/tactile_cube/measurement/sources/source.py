@@ -1,8 +1,8 @@
 """What every source of recordings gives."""
 
 import re
-from collections.abc import Mapping
-from typing import Protocol, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,14 @@ def described(**values: object) -> Description:
 def known(values: Mapping[str, Value | None]) -> dict[str, Value]:
     """The entries that are not None."""
     return {key: value for key, value in values.items() if value is not None}
+
+
+def with_stated(
+    said: Mapping[str, Value | None], stated: Mapping[str, Mapping[str, float]], joints: Sequence[str]
+) -> dict[str, Any]:
+    """What the user says, and what the rig's file states of all joints; a limit that is infinite says nothing."""
+    of_file = {key: {joint: row[joint] for joint in joints} for key, row in stated.items() if row.keys() >= set(joints)}
+    return of_file | {key: value for key, value in known(said).items() if value != float("inf") or key not in of_file}
 
 
 REGULAR = 0.1  # part of a step by which those of a log at one rate differ

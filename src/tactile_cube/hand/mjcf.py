@@ -1,0 +1,213 @@
+"""An MJCF file, read by MuJoCo, as a URDF and the constants of the drives that it states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tactile_cube import limits
+from tactile_cube.errors import InputError
+from tactile_cube.hand.mjcf_text import own_mjcf
+from tactile_cube.hand.urdf import Array, inertial_element, number_list, origin_element, robot_element
+
+OF_JOINTS = {"armature": "reflected_inertia", "frictionloss": "static_friction", "damping": "viscous_friction"}
+"""MuJoCo's constants of a joint, and what recording.yaml calls them."""
+GAINS = ("kp", "kd")
+USUAL_GRAVITY = (0.0, 0.0, -9.81)
+"""That importers take where none is said [m/s^2]."""
+
+
+@dataclass(frozen=True)
+class Mjcf:
+    """What a mechanism is, and what its file states of drives.
+
+    Attributes:
+        urdf: the mechanism as a URDF.
+        stated: constant -> joint -> value: reflected_inertia [kg m^2], static_friction [N m], viscous_friction
+            [N m s/rad]; of joints with one actuator kp [N m/rad], kd [N m s/rad] and torque_limit [N m].
+        left_out: what the file says and a recording's model has no place for, a line each.
+    """
+
+    urdf: str
+    stated: dict[str, dict[str, float]] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+
+def is_mjcf(text: str) -> bool:
+    """Whether a text may be MJCF: its first element is <mujoco>."""
+    start = text.find("<mujoco")
+    return start >= 0 and "<robot" not in text[:start]
+
+
+def read_mjcf(file: Path) -> Mjcf:
+    """Read a mechanism and its drives; joints at zero are where MuJoCo's qpos is zero.
+
+    Raises:
+        InputError: MuJoCo cannot read it, or it names files elsewhere.
+    """
+    import mujoco  # takes 0.1 s
+
+    text = own_mjcf(file)
+    try:
+        model = mujoco.MjSpec.from_string(text).compile()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = "; ".join(line for line in str(error).split("\n") if line)
+        raise InputError(f"{file}: MuJoCo does not read it: {reason}") from None
+    if model.njnt > limits.JOINTS:
+        raise InputError(f"{file}: it has {model.njnt} joints; at most {limits.JOINTS} are read")
+    return _Reader(model, mujoco).read(file.stem)
+
+
+class _Reader:
+    def __init__(self, model: Any, mujoco: Any) -> None:
+        self.model, self.mujoco = model, mujoco
+        self.bodies = [model.body(k).name or f"body_{k}" for k in range(model.nbody)]
+        self.joints = [model.joint(k).name or f"joint_{k}" for k in range(model.njnt)]
+        self.stated: dict[str, dict[str, float]] = {}
+        self.left_out: list[str] = []
+
+    def read(self, name: str) -> Mjcf:
+        mimics = dict(self._mimics())
+        parts = [_link(self.bodies[0])]
+        for body in range(1, self.model.nbody):
+            parts += self._body(body, mimics)
+        gravity = self.model.opt.gravity
+        if not np.allclose(gravity, USUAL_GRAVITY, atol=0.01):
+            self.left_out.append(f"gravity of {number_list(gravity)} m/s^2; state it in source.gravity")
+        for joint in range(self.model.njnt):
+            self._joint_constants(joint)
+        for actuator in range(self.model.nu):
+            self._actuator(actuator)
+        limits_of = self.stated.get("torque_limit", {})
+        self.stated["torque_limit"] = {joint: limits_of.get(joint, np.inf) for joint in self.joints}
+        stated = {key: row for key, row in self.stated.items() if key in GAINS or set(row.values()) - {0.0, np.inf}}
+        return Mjcf(robot_element(escape(name), parts), stated, tuple(self.left_out))
+
+    def _body(self, body: int, mimics: dict[int, str]) -> list[str]:
+        """Links and joints of a body: one link for each joint, of which the last one is the body's."""
+        m, name = self.model, self.bodies[body]
+        parent, first = m.body_parentid[body], m.body_jntadr[body]
+        place, turn = m.body_pos[body] - self._shift(parent), _matrix(m.body_quat[body])
+        joints = list(range(first, first + m.body_jntnum[body]))
+        links = [*(f"{name}_{self.joints[j]}" for j in joints[:-1]), name]
+        before, parts = self.bodies[parent], []
+        if not joints:
+            parts.append(_joint_element(f"{name}_fixed", "fixed", before, name, origin_element(place, turn)))
+        for joint, link in zip(joints, links, strict=False):
+            at = self._place(joint)
+            parts.append(self._joint(joint, before, link, place + turn @ at, turn, mimics))
+            place, turn, before = -at, np.eye(3), link
+        inertia = _matrix(m.body_iquat[body]) @ np.diag(m.body_inertia[body]) @ _matrix(m.body_iquat[body]).T
+        mass = inertial_element(m.body_mass[body], m.body_ipos[body] - self._shift(body), inertia, digits=15)
+        return [*parts, *map(_link, links[:-1]), _link(name, mass)]
+
+    def _shift(self, body: int) -> Array:
+        """Where the link of a body has its origin: at its last joint, in the body's frame."""
+        count = self.model.body_jntnum[body]
+        return self._place(self.model.body_jntadr[body] + count - 1) if count else np.zeros(3)
+
+    def _place(self, joint: int) -> Array:
+        """Of a joint in its body's frame (3,) [m]; a free joint has none."""
+        return np.zeros(3) if self._kind(joint) == "FREE" else np.asarray(self.model.jnt_pos[joint])
+
+    def _joint(self, joint: int, parent: str, child: str, place: Array, turn: Array, mimics: dict[int, str]) -> str:
+        m, name, kind = self.model, self.joints[joint], self._kind(joint)
+        if kind not in ("HINGE", "SLIDE"):
+            return _joint_element(name, "floating", parent, child, origin_element(place, turn))
+        axis, zero = m.jnt_axis[joint], m.qpos0[m.jnt_qposadr[joint]]
+        if kind == "SLIDE":
+            place = place - turn @ axis * zero
+        else:
+            turn = turn @ Rotation.from_rotvec(-zero * axis).as_matrix()
+        limited, (lower, upper) = bool(m.jnt_limited[joint]), m.jnt_range[joint]
+        ends = f'<limit lower="{lower:.15g}" upper="{upper:.15g}" effort="0" velocity="0"/>' if limited else ""
+        more = f'<axis xyz="{number_list(axis)}"/>{ends}{mimics.get(joint, "")}'
+        turning = "revolute" if limited else "continuous"
+        named = "prismatic" if kind == "SLIDE" else turning
+        return _joint_element(name, named, parent, child, origin_element(place, turn) + more)
+
+    def _kind(self, joint: int) -> str:
+        return self._named("mjtJoint", self.model.jnt_type[joint])
+
+    def _named(self, kind: str, number: int) -> str:
+        """MuJoCo's word for a number of an enumeration, without prefix."""
+        return str(getattr(self.mujoco, kind)(int(number)).name).partition("_")[2]
+
+    def _mimics(self) -> Iterator[tuple[int, str]]:
+        """Joints that an equality ties to another one, and their <mimic>."""
+        m = self.model
+        for k in range(m.neq):
+            name, (a0, a1, *more) = m.eq(k).name or f"equality {k}", m.eq_data[k][:5]
+            pair = self._named("mjtEq", m.eq_type[k]) == "JOINT" and m.eq_obj2id[k] >= 0 and m.eq_active0[k]
+            if not pair or any(more):
+                self.left_out.append(
+                    f"equality '{name}': only a joint that follows another one in proportion is simulated"
+                )
+                continue
+            follower, leader = m.eq_obj1id[k], m.eq_obj2id[k]
+            zero = m.qpos0[m.jnt_qposadr[[follower, leader]]]
+            offset = zero[0] + a0 - a1 * zero[1]
+            leading = escape(self.joints[leader])
+            yield follower, f'<mimic joint="{leading}" multiplier="{a1:.15g}" offset="{offset:.15g}"/>'
+
+    def _joint_constants(self, joint: int) -> None:
+        m, name = self.model, self.joints[joint]
+        if self._kind(joint) not in ("HINGE", "SLIDE"):
+            return
+        for theirs, ours in OF_JOINTS.items():
+            self.stated.setdefault(ours, {})[name] = float(getattr(m, f"dof_{theirs}")[m.jnt_dofadr[joint]])
+        if m.jnt_stiffness[joint]:
+            self.left_out.append(f"joint '{name}': the spring of {m.jnt_stiffness[joint]:g} N m/rad")
+
+    def _actuator(self, k: int) -> None:
+        """Gains and limits of a motor or a position actuator; MuJoCo's forces act on a joint times the gear."""
+        m, name = self.model, self.model.actuator(k).name or f"number {k}"
+        joint, gear = self.joints[m.actuator_trnid[k, 0]], m.actuator_gear[k, 0]
+        if self._named("mjtTrn", m.actuator_trntype[k]) not in ("JOINT", "JOINTINPARENT"):
+            self.left_out.append(f"actuator '{name}': it drives no joint directly")
+            return
+        if joint in self.stated.get("torque_limit", {}):
+            self.left_out.append(f"actuator '{name}': joint '{joint}' has another one")
+            return
+        for theirs, ours in (("armature", "reflected_inertia"), ("damping", "viscous_friction")):
+            self.stated.setdefault(ours, {}).setdefault(joint, 0.0)
+            self.stated[ours][joint] += float(gear**2 * getattr(m, f"actuator_{theirs}")[k])
+        most = max(abs(m.actuator_forcerange[k])) * abs(gear) if m.actuator_forcelimited[k] else np.inf
+        self.stated.setdefault("torque_limit", {})[joint] = float(most)
+        gain, bias = m.actuator_gainprm[k], m.actuator_biasprm[k]
+        law = self._named("mjtGain", m.actuator_gaintype[k]), self._named("mjtBias", m.actuator_biastype[k])
+        if law == ("FIXED", "AFFINE") and bias[1] == -gain[0] and bias[0] == 0.0:
+            self.stated.setdefault("kp", {})[joint] = float(gear**2 * gain[0])
+            self.stated.setdefault("kd", {})[joint] = float(gear**2 * -bias[2])
+        elif law != ("FIXED", "NONE"):
+            self.left_out.append(f"actuator '{name}': it is neither a motor nor a position actuator")
+        self._details(k, name, gear)
+
+    def _details(self, k: int, name: str, gear: float) -> None:
+        m = self.model
+        if self._named("mjtDyn", m.actuator_dyntype[k]) != "NONE":
+            self.left_out.append(f"actuator '{name}': its activation dynamics")
+        if m.actuator_delay[k]:
+            self.left_out.append(f"actuator '{name}': its delay of {m.actuator_delay[k]:g} s")
+        if gear != 1.0:
+            self.left_out.append(f"actuator '{name}': its gear of {gear:g}; commands are taken as the joint's")
+
+
+def _link(name: str, inside: str = "") -> str:
+    return f'<link name="{escape(name)}">{inside}</link>'
+
+
+def _joint_element(name: str, kind: str, parent: str, child: str, inside: str) -> str:
+    ends = f'<parent link="{escape(parent)}"/><child link="{escape(child)}"/>'
+    return f'<joint name="{escape(name)}" type="{kind}">{ends}{inside}</joint>'
+
+
+def _matrix(quaternion: Array) -> Array:
+    """Of a quaternion in MuJoCo's order, w first."""
+    return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())

@@ -1,0 +1,1 @@
+"""A model in the words of other programs: MJCF, URDF, BAM."""
