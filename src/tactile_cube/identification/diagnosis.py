@@ -13,26 +13,28 @@ from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.disturbances import Disturbance, in_time
-from tactile_cube.identification.fitting.gauss_newton import Fit
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved, stated_error
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.evidence import judge
+from tactile_cube.identification.search.evidence import gain, judge
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
-from tactile_cube.identification.verdict import Unexplained, Verdict
+from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
+from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
-from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
+from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_with_links
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, effect_path
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
 from tactile_cube.measurement.replay.windows import steps_per_row
+from tactile_cube.measurement.units import common_unit
 
 UNPROVEN = 3
 FAR_OFF = 10.0  # a model as many times further off than its steps hides them, until it is known what it lacks
@@ -53,6 +55,7 @@ class Diagnosis:
         over_noise: refitted, with_effects: errors of segments there, in units of the sensor noise.
         floor: noise floor of the recording.
         unexplained: what is left, joint by joint; empty unless something is.
+        standard: the field's standard model, which came first.
         experiment: what would tell rivals, or what is unproven and chance, apart; None without either.
         held_out: names of the trials that the search chose by.
         tested: names of those that nothing was fitted to or chosen by; without any, those that chose test too.
@@ -72,6 +75,7 @@ class Diagnosis:
     floor: NoiseFloor
     unexplained: list[Unexplained]
     experiment: Experiment | None
+    standard: StandardModel
     held_out: list[str]
     tested: list[str]
     known: tuple[str, ...] = ()
@@ -116,10 +120,12 @@ def diagnose_recording(
         criteria: what decides.
     """
     recording = in_time(recording, effects, say, known)
-    inquiry, left_out, suspected = beside_disturbances(
-        in_long_steps_first(Inquiry(recording, effects, engine, step, seed, say, known, criteria))
-    )
+    whole = Inquiry(recording, effects, engine, step, seed, say, known, criteria)
+    standard = fit_standard_model(*whole.parts[:2], noise_with_links(recording), known, effects)
+    say(standard.sentence(common_unit(recording.units.values())))
+    inquiry, left_out, suspected = beside_disturbances(in_long_steps_first(whole))
     search, findings, simulations, verdict = inquiry.answer
+    verdict = no_worse(verdict, standard, search, simulations)
     _, held_out, tested = inquiry.parts
     fitted = simulations.final(verdict.chosen)
     test = held_out if tested is None else tested
@@ -138,6 +144,7 @@ def diagnose_recording(
         floor=simulations.floor,
         unexplained=simulations.unexplained(verdict.chosen, beside_base=verdict.kind == "unknown_effect"),
         experiment=None,
+        standard=standard,
         held_out=[trial.name for trial in held_out.trials],
         tested=[trial.name for trial in tested.trials] if tested else [],
         known=tuple(term.label for term in search.start.terms),
@@ -152,6 +159,19 @@ def diagnose_recording(
     extended = not diagnosis.rivals
     experiment = next_experiment(search.shooting, inquiry.recording, fits, search.noise, seed, criteria, extended)
     return replace(diagnosis, experiment=experiment)
+
+
+def no_worse(verdict: Verdict, standard: StandardModel, search: Search, simulations: Simulations) -> Verdict:
+    """The verdict, with the standard model in the place of one that is not the whole of it and follows worse."""
+    if verdict.kind not in NOT_ALL or standard.fit is None:
+        return verdict
+    if not search.free_runs.worse(simulations.final(verdict.chosen).model, standard.model):
+        return verdict
+    search.say("the standard model follows the held-out trials better than what was found")
+    fitted = fit(search.problem, standard.model, search.unknowns(standard.model), iterations=0)
+    judged = search.judged(standard.model)
+    better = gain(search.base.judgement, judged)
+    return Verdict("unknown_effect", Explanation(standard.effects, fitted, judged, 1.0, better))
 
 
 def in_long_steps_first(asked: Inquiry) -> Inquiry:

@@ -39,6 +39,11 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
         "error_joints": errors["joints"],
         "noise_floor_source": diagnosis.floor.source,
+        "standard_model": {
+            "otherwise": list(diagnosis.standard.otherwise),
+            "error": diagnosis.standard.error,
+            "stated_error": diagnosis.standard.stated_error,
+        },
         "error_part": "test" if diagnosis.tested else "held_out",
         "error_over_noise": diagnosis.over_noise,
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],

@@ -23,6 +23,7 @@ from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Engine, free_run
 from tactile_cube.measurement.split import held_out_split
@@ -94,17 +95,30 @@ def identify_effects(
     for effect, joint, parameters in wanted:
         added = with_effect(search, search.frozen(current), effect, joint, parameters).model
         search.problem.linearise_starts(added)
-        current = fit(search.problem, added, search.unknowns(added), iterations=4)
+        current = _no_worse(search, current, added)
         label = current.model.terms[-1].label
         judgement = search.judged(current.model)
         stages[f"+ {label}"] = judgement.model
         say(f"fitted {label}")
-    fitted = final_fit(Problem(search.shooting, search.all_windows), current.model, search.unknowns(current.model))
+    every, unknowns = Problem(search.shooting, search.all_windows), search.unknowns(current.model)
+    fitted = final_fit(every, current.model, unknowns)
+    if search.free_runs.worse(fitted.model, current.model):
+        fitted = final_fit(every, current.model, unknowns, iterations=0)
     last = list(stages)[-1]
     stages[last] = fitted.model.with_offsets(stages[last].offsets)
     say("simulating the held-out trials")
     summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
     return Identification(fitted, summaries, floor, judgement, [trial.name for trial in held_out.trials])
+
+
+def _no_worse(search: Search, before: Fit, added: Model) -> Fit:
+    """Everything refitted with an effect more; where held-out trials are followed worse, what went before as it was."""
+    unknowns = search.unknowns(added)
+    found = fit(search.problem, added, unknowns, iterations=4)
+    if not search.free_runs.worse(found.model, before.model):
+        return found
+    kept = fit(search.problem, added, unknowns, iterations=0)
+    return min((kept, found), key=lambda one: search.free_runs.error(one.model))
 
 
 def judge_known(recording: Recording, model: ModelFile, seed: int = 0) -> Judgement:

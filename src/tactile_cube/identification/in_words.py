@@ -60,6 +60,9 @@ def answer(result: dict[str, Any], experiment: Experiment | None, constants: Seq
         f"{milli(error['with_effects'], unit)} with the recommended model; "
         f"noise floor {milli(error['noise_floor'], unit)}."
     )
+    if standard := result.get("standard_model"):
+        named = ", ".join(standard["otherwise"]) or "nothing otherwise than stated"
+        lines.append(f"The field's standard model: {milli(standard['error'], unit)} on held-out trials ({named}).")
     if experiment is not None:
         lines += next_steps(experiment, units)
     return "\n".join(lines)

@@ -215,9 +215,13 @@ class Simulations:
         return bool(np.mean(difference[validation.weight > 0.0] ** 2) < self.search.criteria.alike**2)
 
     def final(self, one: Explanation) -> Fitted:
-        """An explanation refitted on all fitted trials, with intervals."""
+        """An explanation with intervals, refitted on all fitted trials unless held-out ones are followed worse then."""
         if one.label not in self._final:
-            self._final[one.label] = final_fit(self.problem, one.fit.model, self.search.unknowns(one.fit.model))
+            unknowns = self.search.unknowns(one.fit.model)
+            found = final_fit(self.problem, one.fit.model, unknowns)
+            if self.search.free_runs.worse(found.model, one.fit.model):
+                found = final_fit(self.problem, one.fit.model, unknowns, iterations=0)
+            self._final[one.label] = found
         return self._final[one.label]
 
     def free_errors(self, one: Explanation) -> dict[str, float]:

@@ -74,7 +74,8 @@ def fit(
             damping *= 10.0
         else:
             return best  # no step is too short to fail where a fit has converged
-        gain = (best.cost - tried.cost) / max(best.cost, 1e-9)
+        reached = best.cost + weight * best.prior_penalty
+        gain = (reached - tried.cost - weight * tried.prior_penalty) / max(reached, 1e-9)
         damping *= 0.3
         best = tried
         if gain < converged:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.base import base_unknowns
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, renewed
+from tactile_cube.identification.fitting.held_out import HeldOut
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown
@@ -34,6 +35,7 @@ class Division:
         start: the model to begin with, of the trials to fit; `start_held_out` of the others.
         all_windows: of the trials to fit; `problem` takes as many of them as a search needs.
         validation: the problem of the trials to judge by.
+        free_runs: of the same trials, whole.
         offsets: joint offsets of all initialisations that are known by now [rad].
     """
 
@@ -66,17 +68,21 @@ class Division:
         self.problem = Problem(shooting, some(self.all_windows, segments))
         self.validation = Problem(shooting, some(self.windows(held_out), segments))
         self.offsets = dict(self.start_held_out.offsets)
+        self.free_runs = HeldOut(shooting, held_out, noise, self.offsets)
 
     def windows(self, recording: Recording) -> Windows:
         """Other trials cut likewise."""
         return self.shooting.cut(recording, self.noise, segment=self.segment)
 
     def fit_base(self) -> Explanation:
-        """Refit what the model already has."""
+        """Refit what the model already has; as it is stated where that follows the held-out trials better."""
         self.problem.linearise_starts(self.start)
         first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
         self.problem.linearise_starts(first.model)
         second = fit(self.problem, first.model, first.unknowns, iterations=3)
+        if self.free_runs.worse(second.model, self.start):
+            self.problem.linearise_starts(self.start)
+            second = fit(self.problem, self.start, first.unknowns, iterations=0)
         judgement = self.judged(second.model)
         self.offsets = dict(judgement.model.offsets)
         return Explanation((), second, judgement, 1.0, 0.0)

@@ -146,9 +146,31 @@ SMALLEST = 1e-6  # part of the range of motion
 def sensor_noise(recording: Recording) -> Array:
     """White part (n,) of the position signals [rad], robust against jumps; at least what the owner states of it."""
     sensors = recording.description.sensors
-    stated = np.hypot(sensors.position_resolution / np.sqrt(12.0), sensors.position_noise)
-    joints = range(len(recording.joints))
-    return np.array([_noise([t.position[t.valid, j] for t in recording.trials], stated) for j in joints])
+    signals = [[t.position[t.valid, j] for t in recording.trials] for j in range(len(recording.joints))]
+    steps = [sensors.position_resolution or reading_step(np.concatenate(one)) for one in signals]
+    stated = [np.hypot(step / np.sqrt(12.0), sensors.position_noise) for step in steps]
+    return np.array([_noise(one, float(least)) for one, least in zip(signals, stated, strict=True)])
+
+
+WHOLE, MOSTLY = (
+    0.1,
+    0.98,
+)  # of a step by which a change may miss a multiple of it, and the share of changes that keep it
+FEWEST_VALUES = 20  # that a signal takes: with fewer gaps chance looks like a step
+FEW_STEPS = 20  # a larger change is a multiple of any small step, within what its digits tell
+
+
+def reading_step(signal: Array) -> float:
+    """Resolution of a sensor [rad] that its readings (n,) show: changes are multiples of it; 0 where they show none."""
+    values = np.unique(signal)
+    if len(values) < FEWEST_VALUES:
+        return 0.0
+    gaps = np.diff(values)
+    gaps = gaps[gaps > SMALLEST * float(np.ptp(values))]  # smaller ones are the last digit of one value
+    step = float(np.quantile(gaps, 0.1)) if len(gaps) else 0.0
+    near = gaps[gaps < FEW_STEPS * step] / step if step else gaps
+    whole = np.abs(near - np.round(near)) < WHOLE
+    return step if len(near) and whole.mean() > MOSTLY else 0.0
 
 
 def noise_with_links(recording: Recording) -> Array:

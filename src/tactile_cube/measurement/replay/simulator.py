@@ -18,13 +18,15 @@ from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.integrals import integrating_joints, wind_up
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
-from tactile_cube.measurement.replay.windows import SMOOTHING, Windows, asks_for_much, whole_trials
+from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
 if TYPE_CHECKING:
     from tactile_cube.simulation.rig import RigWorld
@@ -107,7 +109,8 @@ class Simulator:
     def free_runs(self, models: Sequence[Model], trials: Sequence[Trial] | None = None) -> list[list[Simulated]]:
         """Each model through trials of the recording, all by default, from their measured starts."""
         trials = self.recording.trials if trials is None else trials
-        windows = whole_trials(self.recording, trials, self.substeps, self.time)
+        noise, speed = sensors(self.recording.with_trials(list(trials)))
+        windows = whole_trials(self.recording, trials, self.substeps, self.time, noise, speed)
         signals = self.simulate(models, [windows] * len(models), torques=True)
         return [
             [Simulated(*one[k, :, : len(trial.time)]) for k, trial in enumerate(trials)]
@@ -304,6 +307,11 @@ class Simulator:
                 j = self.recording.joints.index(term.joint)
                 links[:, j] -= smooth_lead(torque[:, j], term.values["smooth"], term.values["softness"])
         return links
+
+
+def sensors(recording: Recording) -> tuple[Array, Array]:
+    """Noise (n,) of the position sensors [rad], and how well the speed at a trial's start is to be read [rad/s]."""
+    return sensor_noise(recording), START_SPEED * np.array([one.of("rad/s") for one in joint_scales(recording)])
 
 
 def _zero_links(shown: Array, windows: Windows, joints: int) -> None:

@@ -24,6 +24,8 @@ LEAD = 1  # segments at the beginning of a window that only wake such memories, 
 HISTORY = 8.0  # [s] of commands before a window at most, for effects that remember them, such as a rate limit
 WAKING = 0.15  # [s] of the first command before a free run, for effects with a memory
 LONGEST_STEP = 0.0021  # [s] of the simulation; of a finger, as all times here
+FEWEST_AROUND = 3  # samples on either side of a start that its speed is read from
+WELL = 0.1  # of the speed that has to be told, where fewer samples than usual are taken
 FEWEST = 4  # samples that a window after a trial's first one needs
 NO_LINKS = np.zeros(0, dtype=np.int64)
 ROWS = (
@@ -174,20 +176,26 @@ def cut(
     return _stacked(pieces, history, segment, substeps, links)
 
 
-def whole_trials(recording: Recording, trials: Sequence[Trial], substeps: int, time: float = 1.0) -> Windows:
+def whole_trials(
+    recording: Recording,
+    trials: Sequence[Trial],
+    substeps: int,
+    time: float = 1.0,
+    noise: Array | float = 1.0,
+    speed: Array | float = np.inf,
+) -> Windows:
     """Each trial as a window of one segment, simulated freely from its measured start.
 
-    Shorter ones stand still at their last command until the longest one has ended.
+    Shorter ones stand still at their last command until the longest one has ended. The speed at a start is read from
+    as few samples as the noise of the sensors (n,) [rad] lets tell it, as well as `speed` (n,) [rad/s].
     """
     longest = max(len(trial.time) for trial in trials)
     history = round(WAKING / recording.step)
-    unweighted = np.ones(len(recording.joints))
+    noise = np.broadcast_to(noise, len(recording.joints))
     pieces = [
         piece
         for k, trial in enumerate(trials)
-        for piece in _pieces(
-            recording, trial, k, longest, longest, longest, history, unweighted, time, np.inf, substeps
-        )
+        for piece in _pieces(recording, trial, k, longest, longest, longest, history, noise, time, speed, substeps)
     ]
     return _stacked(pieces, history, longest, substeps)
 
@@ -371,15 +379,21 @@ def _around(command: Array, reading: str) -> tuple[Array, Array]:
 def _half_width(step: float, noise: Array, speed: Array | float, time: float) -> int:
     """Rows on either side of a start that its speed is read from.
 
-    More than usual, and up to half a segment, where so few leave it too noisy: dry friction asks for its sign.
+    Fewer than usual where so few tell it well beyond need, for where a speed changes fast a polynomial misreads it.
+    More, and up to half a segment, where the usual ones leave it too noisy: dry friction asks for its sign.
     """
-    half = max(2, round(SMOOTHING * time / step))
-    while half < round(0.5 * SEGMENT * time / step):
-        basis = np.vander(step * np.arange(-half, half + 1), _terms(half), increasing=True)
-        if np.all(np.linalg.norm(np.linalg.pinv(basis)[1]) * noise <= speed):
-            break
-        half += 1
-    return half
+    usual, most = max(2, round(SMOOTHING * time / step)), round(0.5 * SEGMENT * time / step)
+    if not np.all(np.isfinite(speed)):
+        return usual
+    fewer = (half for half in range(min(FEWEST_AROUND, usual), usual) if _tells(step, half, noise, WELL * speed))
+    more = (half for half in range(usual, most) if _tells(step, half, noise, speed))
+    return next(fewer, next(more, max(usual, most)))
+
+
+def _tells(step: float, half: int, noise: Array, speed: Array | float) -> bool:
+    """Whether so many rows on either side tell a speed as well as `speed`."""
+    basis = np.vander(step * np.arange(-half, half + 1), _terms(half), increasing=True)
+    return bool(np.all(np.linalg.norm(np.linalg.pinv(basis)[1]) * noise <= speed))
 
 
 def _unsteady(starts: Rows, kinks: Rows, rows: int) -> NDArray[np.bool_]:

@@ -1,0 +1,273 @@
+"""The field's standard model of a drive, fitted in seconds: the first answer, which a search has to beat.
+
+Torque constant, mass, rotor inertia, viscous and Coulomb friction of every joint, beside the constants that its owner
+states; then offset of the torque and friction by direction. All are expected where they are stated.
+
+Source: Gautier, Dynamic identification of robots with power model, ICRA 1997 (the model). Ribeiro et al., On the
+smoothness of nonlinear system identification, Automatica 121, 2020 (windows that grow). Janot, Gautier, Brunot, EMPS
+benchmark, 2019 (friction by direction).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects import find_effect
+from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.scales import Scales
+from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.identification.fitting.base import base_unknowns, every_effect
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit
+from tactile_cube.identification.fitting.held_out import ALIKE, HeldOut
+from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.shooting import Shooting
+from tactile_cube.identification.search.candidates import Candidate, model_unknowns
+from tactile_cube.identification.search.division import some
+from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.replay.model import Model, Term
+from tactile_cube.measurement.replay.nominal import nominal_model
+from tactile_cube.measurement.replay.windows import Windows
+from tactile_cube.measurement.units import milli
+
+Array = NDArray[np.float64]
+WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short ones from far off, long ones for what is slow
+FEWEST_ROWS = 8
+LONGEST_FITTED = 24.0  # [s] of a finger: enough data for a first answer
+MISSED = (
+    0.25  # of the squared error: `criteria.large_gain`, from which an effect is needed though its interval reaches 0
+)
+ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
+OUTLYING = 2.0  # robust standard deviations from which on an error counts in proportion, not squared
+NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal number
+Laws = Mapping[str, tuple[str, ...]]
+"""Effect -> parameters that are fitted."""
+PLAIN: Laws = {
+    "torque_gain": ("error",),
+    "payload": ("mass",),
+    "reflected_inertia": ("excess",),
+    "viscous_friction": ("damping",),
+    "coulomb_friction": ("friction",),
+}
+BY_DIRECTION: Laws = {
+    "viscous_friction": ("damping", "difference"),
+    "asymmetric_friction": ("difference",),
+    "torque_bias": ("bias",),
+}
+
+
+def spreads(scales: Scales) -> dict[str, float]:
+    """How far each number may be from what is stated, as a standard deviation.
+
+    Masses are weighed, torque constants and rotors come from data sheets, friction is a part of the usual torque.
+    """
+    torque, damping = scales.torque, scales.torque / scales.speed
+    return {
+        "torque_gain.error": 0.3,
+        "payload.mass": 0.05 * scales.mass,
+        "reflected_inertia.excess": 0.3 * scales.inertia,
+        "viscous_friction.damping": 0.5 * damping,
+        "viscous_friction.difference": 0.1 * damping,
+        "coulomb_friction.friction": 0.3 * torque,
+        "asymmetric_friction.difference": 0.05 * torque,
+        "torque_bias.bias": 0.05 * torque,
+    }
+
+
+@dataclass(frozen=True)
+class StandardModel:
+    """A model with the standard effects, and how it does.
+
+    Attributes:
+        model: with those effects that are found otherwise than stated; what is stated where no fit was better.
+        fit: on the trials to fit, in the windows that did best; None where no fit was better.
+        effects: those of the model, each at one joint.
+        half_width: (P,) of the 95 % interval of each of the fit's unknowns.
+        stated_error: RMS of free runs of the held-out trials as stated [rad].
+        error: the same of this model [rad].
+    """
+
+    model: Model
+    fit: Fit | None = field(repr=False)
+    effects: tuple[Candidate, ...]
+    half_width: Array = field(repr=False)
+    stated_error: float
+    error: float
+
+    @property
+    def otherwise(self) -> tuple[str, ...]:
+        """Effects that are found otherwise than stated, NAME@JOINT: their intervals leave out what changes nothing."""
+        if self.fit is None:
+            return ()
+        first = len(self.model.terms) - len(self.effects)
+        sure = certainties(self.model, self.fit, self.half_width)
+        return tuple(t.label for k, t in enumerate(self.model.terms) if k >= first and sure.get(k, 0.0) > 1.0)
+
+    def sentence(self, unit: str) -> str:
+        """The first answer, for the terminal; `unit` of the positions: rad or m."""
+        stated = f"held-out error {milli(self.stated_error, unit)} as stated"
+        if self.fit is None:
+            return f"{stated}; the standard model does no better"
+        named = f"{', '.join(self.otherwise)} otherwise" if self.otherwise else "nothing otherwise than stated"
+        return f"{stated}, standard model {milli(self.error, unit)} ({named}); the search has to beat it"
+
+
+def fit_standard_model(
+    fitted: Recording,
+    held_out: Recording,
+    noise: Array,
+    known: ModelFile | None = None,
+    effects: Sequence[type[Effect]] = (),
+) -> StandardModel:
+    """Fit the standard model; nothing is taken that does worse on the held-out trials than what went before.
+
+    Args:
+        fitted: trials to fit.
+        held_out: trials to judge by.
+        noise: (n,) or (2 n,) of the position sensors [rad].
+        known: the model to begin with; None: what the recording's owner states.
+        effects: classes to compile in; their kernel is used again by a search for them.
+    """
+    return _Fitting(fitted, held_out, noise, known, effects).run()
+
+
+class _Fitting:
+    """The trials, and the models that are tried one after another."""
+
+    def __init__(
+        self,
+        fitted: Recording,
+        held_out: Recording,
+        noise: Array,
+        known: ModelFile | None,
+        effects: Sequence[type[Effect]],
+    ) -> None:
+        self.recording, self.noise = fitted, noise
+        self.start = nominal_model(fitted, known)
+        self.shooting = Shooting(fitted, every_effect(effects, self.start))
+        self.judge = HeldOut(self.shooting, held_out, noise, nominal_model(held_out, known).offsets)
+
+    def run(self) -> StandardModel:
+        """The plain model in growing windows, by direction too where that is better, then what of it is needed."""
+        stated = self.judge.error(self.start)
+        best = _Tried(self.start, stated)
+        for laws, gain in ((PLAIN, 0.0), (BY_DIRECTION, MISSED)):
+            best = self.grown(best, laws, gain)
+        if best.fit is None:
+            return StandardModel(self.start, None, (), np.zeros(0), stated, stated)
+        best = self.needed(best)
+        return StandardModel(best.model, best.fit, self.added(best.model), best.half_width, stated, best.error)
+
+    def grown(self, before: _Tried, laws: Laws, gain: float) -> _Tried:
+        """The best fit with these laws too, in windows that grow; what it was before where none gains as much."""
+        best, model = before, self.with_laws(before.model, laws)
+        longest = max(len(trial.time) for trial in self.recording.trials)
+        lengths = [round(seconds * self.shooting.time / self.recording.step) for seconds in WINDOWS]
+        for rows in dict.fromkeys(min(max(length, FEWEST_ROWS), longest) for length in lengths):
+            tried = self.robust(model, rows)
+            if tried.error**2 < (1.0 - gain) * before.error**2 and tried.error < best.error:
+                best = tried
+            model = tried.model
+        return best
+
+    def robust(self, model: Model, rows: int) -> _Tried:
+        """A fit in windows of so many rows with a soft-L1 loss, by weights that are taken anew."""
+        segments = max(1, round(LONGEST_FITTED * self.shooting.time / (rows * self.recording.step)))
+        windows = some(self.shooting.cut(self.recording, self.noise, segment=rows), segments)
+        sizes = self.shooting.sizes
+        unknowns = (*base_unknowns(self.recording, self.start.constants, sizes), *model_unknowns(model, sizes))
+        for _ in range(ROUNDS):
+            problem = self.weighted(windows, model)
+            found = fit(problem, model, unknowns, ITERATIONS)
+            model = found.model
+        half_width = NORMAL_95 * standard_errors(problem, found) * np.array([u.scale for u in unknowns])
+        return _Tried(model, self.judge.error(model), rows, found, half_width)
+
+    def weighted(self, windows: Windows, model: Model) -> Problem:
+        """The problem of windows in which a model's errors count as a soft-L1 loss weighs them."""
+        problem = Problem(self.shooting, windows)
+        error = np.abs(problem.limited(problem.measured - problem.predictions([model])[0]))
+        weight = windows.weight * np.sqrt(soft_l1(error, problem.weight)).reshape(windows.weight.shape)
+        problem = Problem(self.shooting, replace(windows, weight=weight))
+        problem.linearise_starts(model)
+        return problem
+
+    def needed(self, best: _Tried) -> _Tried:
+        """Without the effects that are as stated, the least certain one of each joint first."""
+        assert best.fit is not None, "what is stated has nothing to take out"
+        new, first = best.model.terms[len(self.start.terms) :], len(self.start.terms)
+        sure = certainties(best.model, best.fit, best.half_width)
+        doubt = {term.label: sure[first + k] for k, term in enumerate(new)}
+        by_joint = {joint: [t.label for t in new if t.joint == joint] for joint in self.recording.joints}
+        least = {min(labels, key=doubt.__getitem__) for labels in by_joint.values() if labels}
+        needless = {label for label in least if doubt[label] < 1.0}
+        if not needless:
+            return best
+        terms = tuple(t for t in best.model.terms if t not in new or t.label not in needless)
+        fewer = self.robust(replace(best.model, terms=terms), best.rows)
+        return self.needed(fewer) if fewer.error**2 <= (1.0 + MISSED) * best.error**2 else best
+
+    def added(self, model: Model) -> tuple[Candidate, ...]:
+        """The effects of a model beyond what is known."""
+        return tuple(
+            Candidate(t.effect, (t.joint,), {key: t.values[key] for key in t.fitted}, self.shooting.sizes)
+            for t in model.terms[len(self.start.terms) :]
+        )
+
+    def with_laws(self, model: Model, laws: Laws) -> Model:
+        """The model with these laws at every joint, those that it has with more of their numbers free."""
+        for name, parameters in laws.items():
+            for joint in self.recording.joints:
+                model = with_law(model, find_effect(name), joint, parameters, self.shooting.sizes[joint])
+        return model
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A model, its error on the held-out trials [rad], and the fit that it comes from, in windows of so many rows."""
+
+    model: Model
+    error: float
+    rows: int = 0
+    fit: Fit | None = None
+    half_width: Array = field(default_factory=lambda: np.zeros(0))
+
+
+def certainties(model: Model, found: Fit, half_width: Array) -> dict[int, float]:
+    """Index of a term -> how far its fitted numbers are from changing nothing, at most, in half widths (P,)."""
+    sure: dict[int, float] = {}
+    for u, width in zip(found.unknowns, half_width, strict=True):
+        if u.kind == "effect":
+            distance = abs(u.of(model) - u.neutral) / max(float(width), np.finfo(float).tiny)
+            sure[u.place] = max(sure.get(u.place, 0.0), float(distance))
+    return sure
+
+
+def with_law(model: Model, effect: type[Effect], joint: str, parameters: tuple[str, ...], scales: Scales) -> Model:
+    """The model with numbers of an effect free, expected as stated, in which they change nothing as yet."""
+    own = effect.parameters_at(scales)
+    expected = {key: (own[key].neutral, spreads(scales)[f"{effect.name}.{key}"]) for key in parameters}
+    for place, term in enumerate(model.terms):
+        if (term.effect, term.joint) == (effect, joint):
+            fitted = tuple(dict.fromkeys((*term.fitted, *parameters)))
+            more = replace(term, fitted=fitted, expected={**expected, **term.expected})
+            return replace(model, terms=(*model.terms[:place], more, *model.terms[place + 1 :]))
+    values = {key: p.neutral for key, p in own.items()}
+    values |= {"distance": scales.lever} if "distance" in own and not scales.slides else {}
+    return replace(model, terms=(*model.terms, Term(effect, joint, values, parameters, expected)))
+
+
+def soft_l1(error: Array, weight: Array) -> Array:
+    """Weights (G, R) of squared errors (G, R) in a soft-L1 loss, whose width follows most of the errors.
+
+    Errors of no weight (G, R) count in nothing.
+    Source: Huber, Robust Statistics, 1981; the loss is scipy.optimize.least_squares'.
+    """
+    seen = weight > 0.0
+    middle = float(np.median(error[seen])) / NORMAL_MEDIAN if seen.any() else 0.0
+    width = OUTLYING * max(middle, float(1.0 / weight.max()) if seen.any() else 1.0)
+    return np.asarray(1.0 / np.sqrt(1.0 + (error / width) ** 2))
