@@ -24,10 +24,13 @@ import yaml
 from benchmarks.real_machines.bam_xl330 import BamXl330
 from benchmarks.real_machines.dfki_double import DfkiDouble
 from benchmarks.real_machines.dfki_pendulum import DfkiPendulum
-from benchmarks.real_machines.emps import Emps
+from benchmarks.real_machines.emps import Emps, official_error
+from benchmarks.real_machines.pendulum_torque import PendulumTorque
+from benchmarks.real_machines.plain_least_squares import fitted, free_run_error
 from benchmarks.real_machines.shadow_lfj3 import ShadowLfj3
 from benchmarks.real_machines.so101_sage import So101Sage
 from benchmarks.real_machines.tx40 import Tx40
+from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.source import Source
 
@@ -36,6 +39,7 @@ MACHINES: dict[str, Callable[[Path], Source]] = {
     "emps": lambda data: Emps(str(data / "emps")),
     "dfki_double": lambda data: DfkiDouble(str(data / "dfki_double")),
     "dfki_pendulum": lambda data: DfkiPendulum(str(data / "dfki_pendulum" / "dfki_pendulum.npz")),
+    "pendulum_torque": lambda data: PendulumTorque(str(data / "pendulum_torque")),
     "bam_xl330": lambda data: BamXl330(str(data / "bam_xl330" / "xl330.npz")),
     "shadow_lfj3": lambda data: ShadowLfj3(str(data / "shadow_lfj3" / "lfj3_openloop.npz")),
     "so101_roll": lambda data: So101Sage(str(data / "so101_sage"), "Wrist_Roll"),
@@ -84,10 +88,23 @@ def loop(name: str, data: Path, out: Path) -> dict[str, Any]:
         for joint in one["joints"]
     ]
     answer = {"verdict": diagnosis["verdict"], "named": named, "sets": diagnosis.get("sets", []), "validation": errors}
+    answer |= {"standard": diagnosis["standard_model"], **plain(recording, diagnosed / "model.yaml")}
     kept = out / name / "seconds.json"
     if fresh:
         kept.write_text(json.dumps(round(time.perf_counter() - started, 1)))
     return answer | {"seconds": json.loads(kept.read_text()) if kept.is_file() else None}
+
+
+def plain(recording: Path, model: Path) -> dict[str, Any]:
+    """The plain least squares' error on the trials never fitted [rad] and its CPU seconds; EMPS's official error [m]."""
+    machine, validation = read_recording(recording), read_recording(recording / "validation")
+    if len(machine.joints) > 1:
+        return {"plain": None, "plain_seconds": None, "official": None}
+    started = time.process_time()
+    error = free_run_error(fitted(machine), validation)
+    spent = round(time.process_time() - started, 1)
+    official = official_error(validation, read_model(model)) if recording.parent.name == "emps" else None
+    return {"plain": error, "plain_seconds": spent, "official": official}
 
 
 def judged(answer: dict[str, Any], key: dict[str, Any]) -> str:
@@ -109,15 +126,17 @@ def table(results: dict[str, dict[str, Any]], key: dict[str, Any]) -> str:
         f"Answer key: `key.yaml`, SHA-256 `{digest}`. Errors are RMS of free runs from the first state on trials never "
         "fitted, nothing removed, in mrad (mm for `emps`).",
         "",
-        "| machine | verdict | named | documented effects named | as stated | found | reference | seconds |",
-        "|---|---|---|---|---|---|---|---|",
+        "| machine | verdict | named | documented effects named | as stated | plain least squares | found | reference | "
+        "seconds |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, one in results.items():
         stated, found = (f"{1e3 * one['validation'][label]['raw']:.3g}" for label in ("stated", "found"))
         reference = key[name].get("reference")
+        least = "-" if one["plain"] is None else f"{1e3 * one['plain']:.3g}"
         beside = f"{reference['value']} {reference['unit']} ({reference['what']})" if reference else "-"
         lines.append(
-            f"| {name} | `{one['verdict']}` | {', '.join(one['named']) or '-'} | {judged(one, key[name])} | {stated} | "
+            f"| {name} | `{one['verdict']}` | {', '.join(one['named']) or '-'} | {judged(one, key[name])} | {stated} | {least} | "
             f"**{found}** | {beside} | {one['seconds']} |"
         )
     return "\n".join(lines)

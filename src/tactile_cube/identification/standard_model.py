@@ -22,7 +22,7 @@ from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.fitting.base import base_unknowns, every_effect
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.held_out import ALIKE, HeldOut
+from tactile_cube.identification.fitting.held_out import HeldOut
 from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
@@ -37,11 +37,11 @@ from tactile_cube.measurement.units import milli
 Array = NDArray[np.float64]
 WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short ones from far off, long ones for what is slow
 FEWEST_ROWS = 8
-LONGEST_FITTED = 24.0  # [s] of a finger: enough data for a first answer
+LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data for a first answer
 MISSED = (
     0.25  # of the squared error: `criteria.large_gain`, from which an effect is needed though its interval reaches 0
 )
-ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
+ROUNDS, ITERATIONS = 2, 4  # of the robust weights in windows of one length; Gauss-Newton steps in each
 OUTLYING = 2.0  # robust standard deviations from which on an error counts in proportion, not squared
 NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal number
 Laws = Mapping[str, tuple[str, ...]]
@@ -163,10 +163,10 @@ class _Fitting:
         return StandardModel(best.model, best.fit, self.added(best.model), best.half_width, stated, best.error)
 
     def grown(self, before: _Tried, laws: Laws, gain: float) -> _Tried:
-        """The best fit with these laws too, in windows that grow; what it was before where none gains as much."""
+        """The best fit with these laws too, in windows that grow or those that did best; else what it was before."""
         best, model = before, self.with_laws(before.model, laws)
         longest = max(len(trial.time) for trial in self.recording.trials)
-        lengths = [round(seconds * self.shooting.time / self.recording.step) for seconds in WINDOWS]
+        lengths = [before.rows] if before.rows else [round(seconds * self.shooting.time / self.recording.step) for seconds in WINDOWS]
         for rows in dict.fromkeys(min(max(length, FEWEST_ROWS), longest) for length in lengths):
             tried = self.robust(model, rows)
             if tried.error**2 < (1.0 - gain) * before.error**2 and tried.error < best.error:
@@ -176,7 +176,9 @@ class _Fitting:
 
     def robust(self, model: Model, rows: int) -> _Tried:
         """A fit in windows of so many rows with a soft-L1 loss, by weights that are taken anew."""
-        segments = max(1, round(LONGEST_FITTED * self.shooting.time / (rows * self.recording.step)))
+        segments = max(
+            1, round(LONGEST_FITTED * self.shooting.time / (len(self.recording.joints) * rows * self.recording.step))
+        )
         windows = some(self.shooting.cut(self.recording, self.noise, segment=rows), segments)
         sizes = self.shooting.sizes
         unknowns = (*base_unknowns(self.recording, self.start.constants, sizes), *model_unknowns(model, sizes))

@@ -16,6 +16,7 @@ FAST = 0.995  # quantile of the speeds
 CROSSING = 0.11  # [s] in which the usual torque moves a finger's joint through its range
 COARSE, FASTER = 10, 3.0  # rows between which a motion is no noise; its usual speed over the mean one
 VELOCITY_WINDOW = 0.03  # [s] of a finger
+IDLE = 0.1  # of the torque that the motion takes: a drive that gives less does not set the joint's sizes
 SMALL = 1e-9  # part of another size that stands for nothing at all
 
 
@@ -31,8 +32,8 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     speeds = _quantile([np.abs(trial.velocity(VELOCITY_WINDOW * time)) for trial in recording.trials], FAST)
     speeds = np.maximum(speeds, SMALL * spans / time)
     torques = _torques(recording, VELOCITY_WINDOW * time)
-    accelerating = inertia * speeds**2 / spans  # where the drive does nothing and somebody else moves the joint
-    often, usual, seldom = (np.maximum(_quantile(torques, q), SMALL * accelerating) for q in (OFTEN, USUAL, SELDOM))
+    accelerating = inertia * speeds**2 / spans  # by gravity, or somebody's hand, where the drive does nothing
+    often, usual, seldom = (np.maximum(_quantile(torques, q), IDLE * accelerating) for q in (OFTEN, USUAL, SELDOM))
     commanded = [np.abs(np.diff(trial.command, axis=0)) / trial.step for trial in recording.trials]
     command_speed = speeds if recording.torque_controlled else _quantile(commanded, FAST)
     masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.coupled.values()}
