@@ -3,13 +3,18 @@
 Source: Janot, Gautier, Brunot, Data Set and Reference Models of EMPS, Nonlinear System Identification Benchmarks 2019.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from tactile_cube.measurement.recordings.description import TrialEntry
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
+from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.nominal import no_offsets
+from tactile_cube.measurement.replay.simulator import Simulator
+from tactile_cube.measurement.replay.windows import whole_trials
 from tactile_cube.measurement.sources.source import described
 from tactile_cube.untrusted_file import read_npz
 
@@ -55,3 +60,21 @@ class Emps:
         return TrialTable(
             TrialEntry(file=f"trials/{name}.parquet", kind=name), np.arange(len(force)) / RATE, force, position
         )
+
+
+INITIAL = 20  # samples that initialise, by the benchmark's rule
+STEP = 0.00025  # [s] of the simulation
+
+
+def official_error(pulses: Recording, model: Model) -> float:
+    """RMSE [m] of a free run of the pulses from a state that the first samples give, over all samples after them.
+
+    Source: rules of the nonlinear benchmark, nonlinearbenchmark.org, EMPS.
+    """
+    (trial,) = pulses.trials
+    simulator = Simulator(pulses, [term.effect for term in model.terms], STEP)
+    _, speed, position = np.polyfit(trial.time[:INITIAL], trial.position[:INITIAL, 0], 2)
+    windows = whole_trials(pulses, pulses.trials, simulator.substeps)
+    begun = replace(windows, position=np.full((1, 1, 1), position), speed=np.full((1, 1, 1), speed))
+    run = simulator.simulate([model.with_offsets(no_offsets(pulses))], [begun])[0, 0, 0, :, 0]
+    return float(np.sqrt(np.mean((run[INITIAL:] - trial.position[INITIAL:, 0]) ** 2)))

@@ -12,8 +12,8 @@ from tactile_cube.identification.diagnosis_json import safety_as_json
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.safe_commands import FASTEST, excitations
-from tactile_cube.identification.verdict import Kind, Verdict
 from tactile_cube.identification.standard_model import StandardModel
+from tactile_cube.identification.verdict import Kind, Verdict
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.identification.easy_safety import half_used

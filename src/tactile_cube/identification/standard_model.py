@@ -166,7 +166,8 @@ class _Fitting:
         """The best fit with these laws too, in windows that grow or those that did best; else what it was before."""
         best, model = before, self.with_laws(before.model, laws)
         longest = max(len(trial.time) for trial in self.recording.trials)
-        lengths = [before.rows] if before.rows else [round(seconds * self.shooting.time / self.recording.step) for seconds in WINDOWS]
+        growing = [round(seconds * self.shooting.time / self.recording.step) for seconds in WINDOWS]
+        lengths = [before.rows] if before.rows else growing
         for rows in dict.fromkeys(min(max(length, FEWEST_ROWS), longest) for length in lengths):
             tried = self.robust(model, rows)
             if tried.error**2 < (1.0 - gain) * before.error**2 and tried.error < best.error:
