@@ -41,7 +41,7 @@ LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data fo
 MISSED = (
     0.25  # of the squared error: `criteria.large_gain`, from which an effect is needed though its interval reaches 0
 )
-ROUNDS, ITERATIONS = 2, 4  # of the robust weights in windows of one length; Gauss-Newton steps in each
+ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
 OUTLYING = 2.0  # robust standard deviations from which on an error counts in proportion, not squared
 NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal number
 Laws = Mapping[str, tuple[str, ...]]

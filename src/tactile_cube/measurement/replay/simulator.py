@@ -18,7 +18,7 @@ from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.comparing.noise_floor import sensor_noise
+from tactile_cube.measurement.comparing.noise_floor import LEAST, sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
@@ -311,7 +311,9 @@ class Simulator:
 
 def sensors(recording: Recording) -> tuple[Array, Array]:
     """Noise (n,) of the position sensors [rad], and how well the speed at a trial's start is to be read [rad/s]."""
-    return sensor_noise(recording), START_SPEED * np.array([one.of("rad/s") for one in joint_scales(recording)])
+    return np.maximum(sensor_noise(recording), LEAST), START_SPEED * np.array(
+        [one.of("rad/s") for one in joint_scales(recording)]
+    )
 
 
 def _zero_links(shown: Array, windows: Windows, joints: int) -> None:
