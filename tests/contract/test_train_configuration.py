@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from hydra.utils import get_class, instantiate
 from omegaconf import DictConfig, OmegaConf
+from torchrl.objectives import SACLoss
 
 from tactile_cube import composition
 from tactile_cube.agent.networks import Sizes
@@ -39,11 +40,11 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
     RunSettings(name=config.name, seed=config.seed)
 
 
-def test_the_readable_agent_runs_the_recipe() -> None:
-    recipe, readable = composed("+experiment=taught"), composed("+experiment=taught", "agent=sac")
-    differing = {key for key in recipe.agent if recipe.agent[key] != readable.agent[key]}
-    assert differing == {"_target_"}
-    assert instantiate(readable.agent, _partial_=True)(Sizes(120, 25, 12)).loss.demonstration_weight == 2
+def test_torchrls_own_loss_runs_the_recipe() -> None:
+    recipe, theirs = composed("+experiment=alone"), composed("+experiment=alone", "agent=sac")
+    differing = {key for key in recipe.agent if recipe.agent[key] != theirs.agent[key]}
+    assert differing == {"_target_", "precision"}
+    assert type(instantiate(theirs.agent, _partial_=True)(Sizes(120, 25, 12)).loss) is SACLoss
 
 
 def test_loggers_write_into_the_run_folder(tmp_path: Path) -> None:

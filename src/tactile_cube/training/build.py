@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from filelock import BaseFileLock, FileLock, Timeout
 
-from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.agent import Agent
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import load_actor, require_sizes
 from tactile_cube.errors import InputError

@@ -16,7 +16,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.agent import Agent
 from tactile_cube.env import Conditions
 from tactile_cube.training.collection import Collection, CollectionError, Progress
 from tactile_cube.training.episodes import EpisodeStatistics
