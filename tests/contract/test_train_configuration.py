@@ -32,7 +32,7 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
     environment = as_environment(instantiate(config.env))
     assert environment.sizes == Sizes(120, 25, 12)
     weights = environment.reward_weights(Conditions(0.12, 1.0, 1.0))
-    assert weights.shape == (environment.reward_terms,)
+    assert weights.shape == (len(environment.terms),)
     agent = instantiate(config.agent, _partial_=True)(environment.sizes)
     assert agent.sizes == environment.sizes
     CollectorSettings(**plain["collector"])

@@ -148,11 +148,11 @@ def _build_learner(
         held.callback(collection.close)
         learner = Learner(
             agent=agent,
-            replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
+            replay=Replay(training.replay_size, environment.sizes, len(environment.terms), seed),
             collection=collection,
             episodes=EpisodeStatistics(
                 environment.outcomes,
-                environment.logged_terms,
+                environment.terms,
                 environment.learnability() if environment.learnability is not None else None,
             ),
             settings=training,

@@ -23,20 +23,18 @@ class Environment:
     Attributes:
         make: makes a batch of worlds, in whichever process.
         sizes: widths of observation, privileged state and action.
-        reward_terms: number of reward terms.
+        terms: names of the reward terms, in the order of "reward_terms".
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
-        logged_terms: names of the last reward terms, whose means the training curves show.
         learnability: makes what keeps account of the worlds; None: nothing does.
         approximations: what its worlds compute less well than they could, in words.
     """
 
     make: MakeEnv
     sizes: Sizes
-    reward_terms: int
+    terms: tuple[str, ...]
     reward_weights: Callable[[Conditions], Tensor]
     outcomes: tuple[str, ...] = ()
-    logged_terms: tuple[str, ...] = ()
     learnability: Callable[[], Learnability] | None = None
     approximations: tuple[str, ...] = ()
 
@@ -47,10 +45,9 @@ def rotation_environment(config: EnvConfig) -> Environment:
     return Environment(
         make=partial(make_env, config),
         sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
-        reward_terms=len(config.reward.terms),
+        terms=config.reward.terms,
         reward_weights=partial(_weights, config),
         outcomes=OUTCOMES,
-        logged_terms=config.reward.borne_terms,
         learnability=partial(config.randomization.learnability, config.constants),
         approximations=tuple(config.approximations()),
     )
