@@ -91,6 +91,9 @@ def build_run(
             barrier_steps=collector.worlds * training.steps_per_iteration * training.barrier_iterations,
             approximations=[*environment.approximations, *learner.agent.approximations()],
             best_angle=saved["best_angle"] if saved is not None else 0.0,
+            trial=environment.trial,
+            tried=saved.get("tried", {}) if saved is not None else {},
+            best_score=saved.get("best_score", 0.0) if saved is not None else 0.0,
         )
         held.pop_all()  # it is the run's from here
     return run

@@ -22,6 +22,9 @@ HEAD = b"tactile_cube checkpoint 2, sha256 "
 FREE_KEYS = {
     "training.steps",
     "training.policy_every",
+    "training.usual_steps",
+    "training.trial_every",
+    "training.trial_episodes",
     "training.log_iterations",
     "training.resume",
     "training.stop_if_no_regrasp_by",

@@ -8,11 +8,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from tactile_cube.agent.networks import Sizes
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.env import OUTCOMES, Conditions
 from tactile_cube.env.rotation import OBJECT
 from tactile_cube.randomization import Learnability
 from tactile_cube.training.collection import MakeEnv
+from tactile_cube.training.trial import Trial
 from tactile_cube.transforms import EnvConfig, make_env
 
 
@@ -27,6 +28,7 @@ class Environment:
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
         learnability: makes what keeps account of the worlds; None: nothing does.
+        trial: tries an actor in so many episodes an engine, see `Trial`; None: nothing does.
         approximations: what its worlds compute less well than they could, in words.
     """
 
@@ -36,6 +38,7 @@ class Environment:
     reward_weights: Callable[[Conditions], Tensor]
     outcomes: tuple[str, ...] = ()
     learnability: Callable[[], Learnability] | None = None
+    trial: Callable[[Actor, int], dict[str, float]] | None = None
     approximations: tuple[str, ...] = ()
 
 
@@ -49,6 +52,7 @@ def rotation_environment(config: EnvConfig) -> Environment:
         reward_weights=partial(_weights, config),
         outcomes=OUTCOMES,
         learnability=partial(config.randomization.learnability, config.constants),
+        trial=Trial(config),
         approximations=tuple(config.approximations()),
     )
 
