@@ -42,7 +42,7 @@ def main(folder: Path) -> None:
     loaded = Checkpoints(folder).load()
     assert loaded is not None
     print(f"read and checked in {time.perf_counter() - began:.2f} s; equal: ", end="")
-    print(torch.equal(loaded["learner"]["replay"]["rows"], replay.rows))
+    print(torch.equal(loaded["learner"]["replay"]["rows"], replay.rows[:]))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,18 @@ from tactile_cube.env import Conditions
 from tactile_cube.training.environment import as_environment
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 
-GROUPS = ("task", "reward", "randomization", "start", "exploration", "curriculum", "agent", "collector", "training")
+GROUPS = (
+    "task",
+    "reward",
+    "randomization",
+    "start",
+    "exploration",
+    "curriculum",
+    "agent",
+    "replay",
+    "collector",
+    "training",
+)
 CHOICES = [f"{group}={file.stem}" for group in GROUPS for file in sorted((CONFIG / group).glob("*.yaml"))]
 CHOICES += [f"+experiment={file.stem}" for file in sorted((CONFIG / "experiment").glob("*.yaml"))]
 

@@ -137,6 +137,7 @@ def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int, **cha
         ),
         loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
         config=plain,
+        make_replay=instantiate(config.replay),
     )
     run.line.stage, run.line.later = stage, later
     return run
