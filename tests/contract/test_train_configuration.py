@@ -54,7 +54,7 @@ def test_choice_composes_and_instantiates(choice: str) -> None:
 def test_torchrls_own_loss_runs_the_recipe() -> None:
     recipe, theirs = composed("+experiment=alone"), composed("+experiment=alone", "agent=sac")
     differing = {key for key in recipe.agent if recipe.agent[key] != theirs.agent[key]}
-    assert differing == {"_target_", "precision"}
+    assert differing <= {"_target_", "precision"}
     assert type(instantiate(theirs.agent, _partial_=True)(Sizes(120, 25, 12)).loss) is SACLoss
 
 
