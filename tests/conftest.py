@@ -35,6 +35,9 @@ class ScriptedWorld:
     def q_m(self) -> Any:
         return self.q + 0.01
 
+    def normal_forces(self) -> Any:
+        return np.zeros((2, 4))
+
     def step(self, q_n: Any) -> None:
         self.commands.append(np.array(q_n))
         self.q_f = self.q_f + 0.5 * (q_n - self.q_f)

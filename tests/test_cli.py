@@ -33,7 +33,7 @@ from tactile_cube.usage_error import usage_error
         (lambda: Sac(Sizes(3, 2, 1), gamma=2.0), "agent.gamma=2.0: Input should be less than 1"),
         (
             lambda: Sac(Sizes(3, 2, 1), SACLoss, demonstration_weight=2.0),
-            "agent.demonstration_weight=2: SACLoss does not imitate; set it to 0",
+            "agent.demonstration_weight=2: TorchRL's losses do not imitate; set it to 0",
         ),
         (
             lambda: Sac(Sizes(3, 2, 1), TD3Loss),

@@ -15,7 +15,7 @@ from hydra import initialize
 from hydra.core.global_hydra import GlobalHydra
 
 from tactile_cube import gymnasium_env
-from tactile_cube.env import REWARD_TERMS, Task
+from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 from tactile_cube.evaluation.policies import ScriptedPolicy
@@ -144,7 +144,7 @@ def test_time_limit_is_truncation_and_the_info_is_named(env: GymnasiumRotation) 
     for _ in range(5):
         *_, terminated, truncated, info = env.step(np.zeros(12, dtype=np.float32))
     assert (terminated, truncated, info["outcome"]) == (False, True, "time_limit")
-    assert tuple(info["reward_terms"]) == REWARD_TERMS
+    assert {"spin", "leaving"} < info["reward_terms"].keys()
     assert info["privileged"].shape == (25,)
 
 

@@ -19,7 +19,7 @@ def main(folder: Path) -> None:
     config = composed("train", ["+experiment=taught"])
     environment = as_environment(instantiate(config.env))
     agent = instantiate(config.agent, _partial_=True)(environment.sizes)
-    replay = Replay(config.training.replay_size, environment.sizes, environment.reward_terms, 0)
+    replay = Replay(config.training.replay_size, environment.sizes, len(environment.terms), 0)
     fresh = config.collector.worlds * config.training.steps_per_iteration * config.training.barrier_iterations
     checkpoints = Checkpoints(folder)
     for barrier in range(5):
@@ -42,7 +42,7 @@ def main(folder: Path) -> None:
     loaded = Checkpoints(folder).load()
     assert loaded is not None
     print(f"read and checked in {time.perf_counter() - began:.2f} s; equal: ", end="")
-    print(torch.equal(loaded["learner"]["replay"]["rows"], replay.rows))
+    print(torch.equal(loaded["learner"]["replay"]["rows"], replay.rows[:]))
 
 
 if __name__ == "__main__":

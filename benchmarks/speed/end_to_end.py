@@ -16,9 +16,9 @@ from benchmarks.speed.report import Figure, Section
 from benchmarks.speed.sb3_sac import learning_sac
 from benchmarks.speed.the_task import table_config, table_environment
 from benchmarks.speed.timing import Timing, in_turns
-from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.agent import Agent
+from tactile_cube.agent.plain_sac import PlainSac
 from tactile_cube.agent.sac import Sac
-from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.training.build import build_run
 from tactile_cube.training.environment import Environment
@@ -50,10 +50,10 @@ def end_to_end(
     frames = worlds * steps
     title = f"table task, {frames} environment steps and {updates} updates of batch 256 an iteration"
     section = Section("end_to_end", title, YARDSTICK)
-    bullet, fast = table_environment(), partial(FastSac, precision="bf16")
+    bullet, fast = table_environment(), partial(PlainSac, precision="bf16")
     learners: dict[str, tuple[Environment, Callable[..., Agent]]] = {
-        "tactile_cube, sac_fast bf16": (bullet, fast),
-        "tactile_cube, sac_fast bf16, engine=mujoco": (table_environment("mujoco"), fast),
+        "tactile_cube, plain_sac bf16": (bullet, fast),
+        "tactile_cube, plain_sac bf16, engine=mujoco": (table_environment("mujoco"), fast),
         "tactile_cube, SACLoss": (bullet, Sac),
     }
     with ExitStack() as stack:

@@ -14,10 +14,10 @@ from benchmarks.speed.products import multiplying, update_products
 from benchmarks.speed.report import Growth, Section, durations, rates
 from benchmarks.speed.sb3_sac import filled_sac
 from benchmarks.speed.timing import in_turns
-from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.agent import Agent
 from tactile_cube.agent.networks import Sizes
+from tactile_cube.agent.plain_sac import PlainSac
 from tactile_cube.agent.sac import Sac
-from tactile_cube.agent.sac_fast import FastSac
 from tactile_cube.training.build import keep_freed_memory
 from tactile_cube.training.replay import Replay
 
@@ -45,8 +45,8 @@ def update(rounds: int, peers: bool = True, calls: int = CALLS, hidden: int = 51
     keep_freed_memory()
     section = Section("update", f"one SAC update, batch 256, 2 x {hidden}, sampling included, one thread", YARDSTICK)
     cases = {
-        "tactile_cube sac_fast, bf16": _updating(FastSac(SIZES, precision="bf16", hidden=(hidden, hidden))),
-        "tactile_cube sac_fast, fp32": _updating(FastSac(SIZES, precision="fp32", hidden=(hidden, hidden))),
+        "tactile_cube plain_sac, bf16": _updating(PlainSac(SIZES, precision="bf16", hidden=(hidden, hidden))),
+        "tactile_cube plain_sac, fp32": _updating(PlainSac(SIZES, precision="fp32", hidden=(hidden, hidden))),
         "TorchRL SACLoss (agent=sac)": _updating(Sac(SIZES, hidden=(hidden, hidden))),
         "TorchRL SACLoss (agent=sac), bf16": _updating(Sac(SIZES, precision="bf16", hidden=(hidden, hidden))),
     }
@@ -62,15 +62,11 @@ def update(rounds: int, peers: bool = True, calls: int = CALLS, hidden: int = 51
 
 
 def _parts(hidden: int) -> dict[str, Callable[[], object]]:
-    """Where the time of the fast update goes, and what no implementation goes below."""
+    """What an update cannot do without, and what no implementation goes below."""
     replay, weights = filled_replay(20_000), torch.ones(REWARD_TERMS)
-    agent = _fast(hidden)
-    batch = replay.sample(256, weights)
     shapes = update_products(SIZES, 256, hidden)
     return {
-        "bf16: losses and gradients": lambda: agent.compute_gradients(batch),
-        "bf16: optimiser, targets, casts": agent.step,
-        "bf16: sampling": lambda: replay.sample(256, weights),
+        "sampling": lambda: replay.sample(256, weights),
         "limit: matrix products alone, bf16": multiplying(shapes, torch.bfloat16),
         "limit: matrix products alone, fp32": multiplying(shapes, torch.float32),
     }
@@ -98,16 +94,16 @@ def _peer(sb3: ModuleType, hidden: int) -> Callable[[], Any]:
 
 
 def _growth(rounds: int, hidden: int) -> list[Growth]:
-    by_batch = {str(n): _updating(_fast(hidden), n) for n in BATCHES}
-    by_width = {str(n): _updating(_fast(n)) for n in WIDTHS}
+    by_batch = {str(n): _updating(_plain(hidden), n) for n in BATCHES}
+    by_width = {str(n): _updating(_plain(n)) for n in WIDTHS}
     return [
         _curve("update time against batch", "batch", by_batch, rounds),
         _curve("update time against width", "width of two hidden layers", by_width, rounds),
     ]
 
 
-def _fast(hidden: int) -> FastSac:
-    return FastSac(SIZES, precision="bf16", hidden=(hidden, hidden))
+def _plain(hidden: int) -> PlainSac:
+    return PlainSac(SIZES, precision="bf16", hidden=(hidden, hidden))
 
 
 def _curve(name: str, x_name: str, cases: dict[str, Callable[[], object]], rounds: int) -> Growth:

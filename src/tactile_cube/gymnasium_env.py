@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 
 from tactile_cube.api.environment import env_config
-from tactile_cube.env import BORNE_TERMS, OUTCOMES, REWARD_TERMS, RotationEnv
+from tactile_cube.env import OUTCOMES, RotationEnv
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.rollout import Recorder
 from tactile_cube.evaluation.verdict import judge_episode
@@ -60,6 +60,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         self._recorder: Recorder | None = None
         self._scene: Scene | None = None
         self._env = make_env(config, worlds=1, seed=0, evaluation=True)
+        self._terms = config.reward.terms
         shape = tuple(self._env.observation_spec["observation"].shape[1:])
         self.observation_space = gymnasium.spaces.Box(-FULL_TURN, FULL_TURN, shape, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (config.hand.joints,), np.float32)
@@ -77,7 +78,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         data = self._env.reset()
         self._recorder = Recorder(self._env) if self._judged else None
         self._close_scene()  # the next object may be of another size
-        return data["observation"][0].numpy().copy(), _info(data)
+        return data["observation"][0].numpy().copy(), _info(data, self._terms)
 
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One policy step of 0.1 s.
@@ -90,7 +91,7 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
             raise InputError(f"action {action}: give {self.action_space.shape} finite numbers from -1 to 1")
         command = torch.as_tensor(np.clip(action, -1.0, 1.0), dtype=torch.float32)[None]
         data = self._env.step(TensorDict({"action": command}, batch_size=[1]))["next"]
-        info, ends = _info(data), (bool(data["terminated"]), bool(data["truncated"]))
+        info, ends = _info(data, self._terms), (bool(data["terminated"]), bool(data["truncated"]))
         if self._recorder is not None:
             self._recorder.add(data)
             if any(ends):
@@ -119,12 +120,12 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
         self._env.close()
 
 
-def _info(data: TensorDictBase) -> dict[str, Any]:
+def _info(data: TensorDictBase, terms: Sequence[str]) -> dict[str, Any]:
     return {
         "theta": float(data["theta"]),
         "outcome": OUTCOMES[int(data["outcome"])],
         "faulty": bool(data["faulty"]),
-        "reward_terms": dict(zip(REWARD_TERMS + BORNE_TERMS, data["reward_terms"][0].tolist(), strict=False)),
+        "reward_terms": dict(zip(terms, data["reward_terms"][0].tolist(), strict=True)),
         "privileged": data["privileged"][0].numpy().copy(),
     }
 

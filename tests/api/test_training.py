@@ -154,4 +154,4 @@ def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_poli
     with (parts / "metrics.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [(row["stage"], int(row["steps"])) for row in rows][3:5] == [("gaiting", 32), ("holding", 40)]
-    assert {"tips", "links", "link_force", "climb"} <= rows[0].keys()
+    assert {"reward_tips", "reward_links", "reward_spin", "reward_climb"} <= rows[0].keys()

@@ -38,7 +38,7 @@ def loaded_modules(argument: str, folder: Path) -> tuple[set[str], str]:
 def test_help_lists_verbs_and_groups_without_importing_anything_slow(tmp_path: Path) -> None:
     modules, text = loaded_modules("--help", tmp_path)
     assert not modules & {"torch", "torchrl", "pybullet", "hydra"}
-    for word in ("python -m tactile_cube.train", "task=", "table", "experiment=", "curriculum", "agent=", "sac_fast"):
+    for word in ("python -m tactile_cube.train", "task=", "table", "experiment=", "curriculum", "agent=", "plain_sac"):
         assert word in text
 
 

@@ -9,7 +9,7 @@ import pytest
 from torchrl.envs import TransformedEnv
 
 from tactile_cube.env import Task
-from tactile_cube.env.rotation import TOUCH_FORCE
+from tactile_cube.env.reward import TOUCH_FORCE
 from tactile_cube.evaluation.evaluation import Evaluation, NearlyEqualStart
 from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy, ScriptedPolicy
 from tactile_cube.evaluation.protocol import Protocol

@@ -7,8 +7,9 @@ import mujoco
 import numpy as np
 import polars as pl
 import pytest
+from scipy.spatial.transform import Rotation
 
-from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
+from tactile_cube.hand import DLR_HAND2, Hand, grasp_angles, tip_positions
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 
@@ -124,3 +125,48 @@ def columns(paths: list[Path]) -> list[np.ndarray]:
         np.concatenate([table.select(names).to_numpy().astype(float)[:rows] for table in tables], axis=1)
         for names in parts
     ]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_normal_forces_are_those_of_the_contacts_by_finger_and_kind_of_link_to_the_bit(engine: str) -> None:
+    world = World(options=SimulationOptions(engine))  # type: ignore[arg-type]
+    hand = DLR_HAND2
+    q = grasp_angles(hand, (0.08,) * 3, (0.0, 0.0, -0.01), (0.0, 0.0, 0.0, 1.0), clearance=-0.01)
+    q[1::3] += 0.05
+    world.reset(EpisodeConstants(table_height=-0.05, gravity_onset=0), Start(q, (0.0, 0.0, -0.01)))
+    seen = np.zeros((2, 4))
+    for step in range(40):
+        world.step(q + 0.3 * np.sin(0.7 * step + np.arange(12)))
+        expected = np.zeros((2, 4))
+        names = [finger.name for finger in hand.fingers]
+        for contact in world.contacts():
+            if contact.other == "cube" and contact.finger in names:
+                finger = names.index(contact.finger)
+                expected[int(contact.link == hand.fingers[finger].links[-1]), finger] += contact.force
+        assert np.array_equal(world.normal_forces(), expected)
+        seen += expected
+    assert (seen.sum(1) > 0.0).all(), "both tips and links have touched it"
+    world.close()
+
+
+def test_mujocos_state_of_the_cube_is_its_free_joint_in_the_world(world: World) -> None:
+    turn = Rotation.from_rotvec([0.3, -0.5, 0.9])
+    spin = np.array([2.0, -1.0, 3.0])
+    world.reset(
+        EpisodeConstants(),
+        Start(np.asarray(DLR_HAND2.start_angles), NOWHERE, turn.as_quat(), None, 0.0, (0.1, 0.2, 0.3), spin),
+    )
+    for _ in range(3):
+        world.step(np.asarray(DLR_HAND2.start_angles))
+        data = world._engine._data  # type: ignore[attr-defined]
+        w, x, y, z = data.qpos[-4:]
+        expected = [*data.qpos[-7:-4], x, y, z, w, *data.qvel[-6:-3]]
+        expected += Rotation.from_quat([x, y, z, w]).apply(data.qvel[-3:]).tolist()
+        np.testing.assert_allclose(world._engine.cube_state(), expected, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(world.cube_angular_velocity, spin, atol=1e-6)  # equal moments of inertia: it keeps it
+
+
+def test_fingertips_of_all_fingers_at_once_are_those_of_each() -> None:
+    q = np.random.default_rng(0).uniform(DLR_HAND2.lower, DLR_HAND2.upper)
+    each = [DLR_HAND2.finger_tips(k, q[DLR_HAND2.of_finger(k)][None])[0] for k in range(4)]
+    np.testing.assert_allclose(tip_positions(DLR_HAND2, q), each, rtol=0.0, atol=1e-12)

@@ -9,7 +9,7 @@ import torch
 
 from tactile_cube.errors import InputError
 from tactile_cube.training import checkpoint, replay_files
-from tactile_cube.training.checkpoint import BEFORE, FILE
+from tactile_cube.training.checkpoint import BEFORE, FILE, load_checkpoint
 from tests.training.tiny_run import finish, tiny_run
 
 
@@ -35,7 +35,7 @@ def test_the_replay_comes_back_row_for_row_after_the_ring_went_round(tmp_path: P
     finish(whole)
     resumed = tiny_run(tmp_path, steps=240)
     assert resumed.learner.replay.buffer.write_count > resumed.learner.replay.capacity
-    assert torch.equal(resumed.learner.replay.rows, whole.learner.replay.rows)
+    assert torch.equal(resumed.learner.replay.rows[:], whole.learner.replay.rows[:])
 
 
 @pytest.mark.parametrize("victim", [FILE, "replay/000000000080.f32"])
@@ -126,3 +126,9 @@ def test_a_full_disk_leaves_the_checkpoint_before_whole(
     resumed = tiny_run(tmp_path)
     assert resumed.learner.steps >= 80
     assert torch.equal(finish(resumed), reference)
+
+
+def test_a_checkpoint_of_an_older_version_is_told_as_that(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(b"tactile_cube checkpoint 2, sha256 " + b"0" * 64 + b"\n")
+    with pytest.raises(InputError, match=r"of another version of this program; begin with its policy\.safetensors"):
+        load_checkpoint(tmp_path / FILE)

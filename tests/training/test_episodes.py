@@ -59,15 +59,15 @@ def test_kept_says_nothing_before_the_window_is_full() -> None:
     assert statistics.kept == 1 - 2 / WINDOW
 
 
-def test_the_last_reward_terms_are_logged_and_lost_worlds_counted() -> None:
-    statistics = EpisodeStatistics((), ("tips",), Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
+def test_what_reward_terms_add_is_logged_and_lost_worlds_counted() -> None:
+    statistics = EpisodeStatistics((), ("spin", "tips"), Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
     steps = block([[1.0, 1.0]], [[False, True]], terminated=[[False, True]])
-    steps["next", "reward_terms"] = torch.tensor([[[9.0, 0.0], [9.0, 1.0]]])
+    steps["next", "reward_terms"] = torch.tensor([[[9.0, 0.0], [7.0, 1.0]]])
     steps["next", "places"] = torch.full((1, 2, 1), 0.99)
-    statistics.add(steps)
-    assert statistics.summary()["tips"] == 0.5
+    statistics.add(steps, torch.tensor([2.0, -0.5]))
+    assert [statistics.summary()[f"reward_{name}"] for name in ("spin", "tips")] == [16.0, -0.25]
     assert statistics.worlds.lost[0] == pytest.approx([0.5] * 7 + [0.525])
-    again = EpisodeStatistics((), ("tips",), Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
+    again = EpisodeStatistics((), ("spin", "tips"), Learnability({"cube_mass": Uniform(0.0, 1.0)}, 0.5))
     again.load_state_dict(statistics.state_dict())
     assert again.state_dict() == statistics.state_dict()
 

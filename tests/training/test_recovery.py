@@ -141,7 +141,7 @@ def test_a_world_that_fails_once_is_replaced(tmp_path: Path, reference: torch.Te
     asks = tmp_path / "asks"
     environment = tiny_environment()
     environment = type(environment)(
-        partial(FaultyEnv, asks=asks), environment.sizes, environment.reward_terms, environment.reward_weights
+        partial(FaultyEnv, asks=asks), environment.sizes, environment.terms, environment.reward_weights
     )
     run = disturbed(tmp_path / "run", 6, lambda _: asks.write_text(wish), environment)
     assert torch.equal(weights(run), reference)
@@ -165,7 +165,7 @@ def test_a_worker_stopped_while_it_starts_is_given_up_and_leaves_nothing_behind(
         return TinyEnv(worlds, seed)
 
     environment = tiny_environment()
-    environment = type(environment)(stopped, environment.sizes, environment.reward_terms, environment.reward_weights)
+    environment = type(environment)(stopped, environment.sizes, environment.terms, environment.reward_weights)
     collector = COLLECTOR | {"start_timeout": 5.0, "processes": 1}
     with pytest.raises(CollectionError, match=r"no simulation worker answered within collector\.start_timeout=5 s"):
         tiny_run(tmp_path / "run", collector=collector, environment=environment)

@@ -6,21 +6,22 @@ from tensordict import TensorDict
 
 from tactile_cube.agent.networks import Sizes
 from tactile_cube.errors import InputError
-from tactile_cube.training.replay import Replay
+from tactile_cube.training.replay import FLAGS, Replay
 
 SIZES = Sizes(observation=4, privileged=2, action=3)
 
 
 def rows(replay: Replay, values: list[float]) -> TensorDict:
     column = torch.tensor(values).unsqueeze(-1)
-    return TensorDict({key: column.expand(-1, width).clone() for key, width in replay.widths.items()}, [len(values)])
+    parts = {key: column.expand(-1, width).clone() for key, width in replay.widths.items()}
+    return TensorDict({key: part.bool() if key in FLAGS else part for key, part in parts.items()}, [len(values)])
 
 
 def test_block_larger_than_the_ring_leaves_its_end() -> None:
     replay = Replay(3, SIZES, 2, seed=0)
     replay.extend(rows(replay, [0.0]))
     replay.extend(rows(replay, [1.0, 2.0, 3.0, 4.0, 5.0]))
-    assert sorted(replay.rows[:, 0].tolist()) == [3.0, 4.0, 5.0]
+    assert sorted(replay.rows[:][:, 0].tolist()) == [3.0, 4.0, 5.0]
 
 
 def test_rewards_are_weighed_when_sampled() -> None:
@@ -51,7 +52,7 @@ def test_restored_replay_samples_the_same(count: int) -> None:
     assert torch.equal(first.sample(8, weights)["observation"], second.sample(8, weights)["observation"])
     for replay in (first, second):
         replay.extend(rows(replay, [99.0]))
-    assert torch.equal(first.rows, second.rows)
+    assert torch.equal(first.rows[:], second.rows[:])
 
 
 def test_replay_of_other_size_is_refused() -> None:

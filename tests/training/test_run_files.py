@@ -72,7 +72,7 @@ def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytes
     clock = iter([100.0, 101.0, 110.0, 120.0])
     monkeypatch.setattr(progress.time, "perf_counter", lambda: next(clock))
     stream = io.StringIO()
-    line = ProgressLine(total=10_000, steps=1000, updates=50, stream=stream)
+    line = ProgressLine(total=10_000, steps=1000, updates=50, usual=7000, stream=stream)
     summary = {"final_angle": 1.234, "episode_length": 88.0, "ended_time_limit": 0.9}
     line.stage, line.later = "stage 1 of 2", 3000
     line.show(1010, 51, summary, {"T_s": 0.25})
@@ -80,7 +80,7 @@ def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytes
     line.show(4000, 1050, summary, {"T_s": 0.25})
     assert stream.getvalue() == (
         "stage 1 of 2 |      4.0 k of 10 k steps |  300 steps/s  100 updates/s | final angle  1.23 rad,  88 steps | "
-        "90 % kept | T_s 0.25 | at most 0 min 30 s left\n"
+        "90 % kept | T_s 0.25 | usually 0 min 20 s left\n"
     )
     line.later = 0
     line.show(12_000, 3000, summary, {"T_s": 0.25})  # the last barrier lies beyond the end

@@ -13,7 +13,7 @@ from tactile_cube.env import Conditions
 from tactile_cube.training.environment import Environment
 
 SIZES = Sizes(observation=6, privileged=3, action=2)
-TERMS = 2
+TERMS = ("push", "lost")
 LENGTH = 7
 
 
@@ -31,7 +31,7 @@ class TinyEnv(EnvBase):
             episode_step=Unbounded((n, 1), dtype=torch.int64),
             exploring=flag.clone(),
             faulty=flag.clone(),
-            reward_terms=Unbounded((n, TERMS)),
+            reward_terms=Unbounded((n, len(TERMS))),
             shape=(n,),
         )
         self.action_spec = Bounded(-1.0, 1.0, (n, SIZES.action))
@@ -68,7 +68,7 @@ class TinyEnv(EnvBase):
         fresh = self.scale * 0.1 * torch.randn_like(self._theta)
         self._theta = torch.where(mask, fresh, self._theta)
         self._count = torch.where(mask, 0, self._count)
-        nothing = {"faulty": torch.zeros_like(mask), "reward_terms": torch.zeros(*mask.shape[:1], TERMS)}
+        nothing = {"faulty": torch.zeros_like(mask), "reward_terms": torch.zeros(*mask.shape[:1], len(TERMS))}
         return TensorDict(self._observe() | nothing, batch_size=self.batch_size)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:

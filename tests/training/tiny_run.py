@@ -5,7 +5,7 @@ from typing import Any
 
 import torch
 
-from tactile_cube.agent.sac import Sac
+from tactile_cube.agent.plain_sac import PlainSac
 from tactile_cube.training.build import build_run
 from tactile_cube.training.environment import Environment
 from tactile_cube.training.loggers import CsvLogger
@@ -30,7 +30,7 @@ def tiny_run(
     seed: int = 0,
     collector: dict[str, Any] | None = None,
     environment: Environment | None = None,
-    agent: Any = Sac,
+    agent: Any = PlainSac,
     agent_settings: dict[str, Any] | None = None,
     **training: Any,
 ) -> Run:

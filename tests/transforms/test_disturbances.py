@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
-from torchrl.envs import TransformedEnv
+from torchrl.envs import Compose, GymEnv, TransformedEnv
 from torchrl.envs.utils import step_mdp
 
 from tactile_cube.randomization import Constant, Uniform
@@ -92,3 +92,19 @@ def test_the_policys_action_stays_in_the_data(transformed: MakeEnv) -> None:
         data = env.step(data.set("action", action))
         assert torch.equal(data["action"], action)
         data = step_mdp(data)
+
+
+def test_disturbances_work_on_any_environment_by_their_keys() -> None:
+    plain = GymEnv("Pendulum-v1")
+    offset = JointOffset(Constant(0.3), torch.ones(3), in_keys=["observation"], in_keys_inv=[])
+    noise, sticky = SensorNoise(0.1, in_keys=["observation"], opposite=[]), StickyAction(1.0)
+    disturbed = TransformedEnv(GymEnv("Pendulum-v1"), Compose(offset, noise, sticky))
+    seen = []
+    for env in (plain, disturbed):
+        env.set_seed(0)
+        torch.manual_seed(0)
+        seen.append(env.reset()["observation"])
+    shift = seen[1] - seen[0] - 0.3
+    assert 0.0 < shift.abs().max() < 0.5
+    assert offset.offset.tolist() == pytest.approx([0.3] * 3)
+    assert disturbed.rollout(20)["next", "reward"].isfinite().all()

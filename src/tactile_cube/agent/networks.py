@@ -2,8 +2,9 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -37,11 +38,6 @@ def perceptron(sizes: Sequence[int], layer_norm: bool = False) -> nn.Sequential:
     return nn.Sequential(*layers, nn.Linear(sizes[-2], sizes[-1]))
 
 
-def linear_layers(body: nn.Sequential) -> list[nn.Linear]:
-    """The linear layers of a perceptron, the first one first."""
-    return [layer for layer in body if isinstance(layer, nn.Linear)]
-
-
 def log_scale(raw: Tensor) -> Tensor:
     """Squash the network's second half to log sigma in [LOG_SCALE_LOW, LOG_SCALE_HIGH]."""
     return LOG_SCALE_LOW + 0.5 * (LOG_SCALE_HIGH - LOG_SCALE_LOW) * (torch.tanh(raw) + 1.0)
@@ -54,6 +50,14 @@ def squashed_log_prob(noise: Tensor, log_sigma: Tensor, pre_tanh: Tensor) -> Ten
     return (normal - jacobian).sum(-1, keepdim=True)
 
 
+class Draw(NamedTuple):
+    """Actions drawn from a policy (batch, action), their log density (batch, 1), and the likeliest ones."""
+
+    action: Tensor
+    log_prob: Tensor
+    likeliest: Tensor
+
+
 class Actor(nn.Module):
     """Gaussian policy squashed by tanh to actions in [-1, 1]; it sees the stacked observation and nothing else."""
 
@@ -63,12 +67,23 @@ class Actor(nn.Module):
 
     def forward(self, observation: Tensor) -> tuple[Tensor, Tensor]:
         """Mean and scale of the Gaussian before tanh, each (batch, action)."""
-        mean, raw = self.body(observation).chunk(2, -1)
-        return mean, log_scale(raw).exp()
+        mean, log_sigma = self._gaussian(observation)
+        return mean, log_sigma.exp()
+
+    def _gaussian(self, observation: Tensor) -> tuple[Tensor, Tensor]:
+        mean, raw = self.body(observation).float().chunk(2, -1)
+        return mean, log_scale(raw)
+
+    def sample(self, observation: Tensor) -> Draw:
+        """The policy as it explores; noise is drawn from torch's global generator."""
+        mean, log_sigma = self._gaussian(observation)
+        noise = torch.randn_like(mean)
+        pre_tanh = mean + log_sigma.exp() * noise
+        return Draw(torch.tanh(pre_tanh), squashed_log_prob(noise, log_sigma, pre_tanh), torch.tanh(mean))
 
     def layers(self) -> list[nn.Linear]:
         """The linear layers, the first one first."""
-        return linear_layers(self.body)
+        return [layer for layer in self.body if isinstance(layer, nn.Linear)]
 
     def deterministic(self, observation: Tensor) -> Tensor:
         """The policy without exploration: tanh of the mean, (batch, action)."""
@@ -87,6 +102,11 @@ class Critic(nn.Module):
         """State-action value (batch, outputs); several outputs are its quantiles."""
         value: Tensor = self.body(torch.cat((observation, privileged, action), -1))
         return value
+
+
+def lowest(critics: Iterable[nn.Module], observation: Tensor, privileged: Tensor, action: Tensor) -> Tensor:
+    """The lower of the critics' values (batch, 1)."""
+    return torch.stack([critic(observation, privileged, action).float() for critic in critics]).amin(0)
 
 
 def build_networks(

@@ -16,7 +16,7 @@ def multiplies_bfloat16() -> bool:
 
 
 class AgentSettings(BaseModel):
-    """Hyperparameters of SAC, as the paper publishes them where it does; conf/agent/sac_fast.yaml explains each.
+    """Hyperparameters of SAC, as the paper publishes them where it does; conf/agent/plain_sac.yaml explains each.
 
     Imitation (`demonstration_weight`) is behaviour cloning with a Q filter, Nair et al. 2018. Collection stays on the
     CPU whatever the `device` ("cpu", "cuda" or "cuda:0"). Source: website table of the paper.

@@ -106,7 +106,7 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
     Args:
         job: what to train.
         stage: what lines of progress begin with where the run is a stage of several.
-        later: environment steps of the stages after it, at most.
+        later: environment steps that the stages after it usually take.
     """
     plain = plain_settings(job)
     before = Finished.of(job.folder, plain)
@@ -137,6 +137,7 @@ def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int, **cha
         ),
         loggers={name: instantiate(entry, _partial_=True) for name, entry in config.logger.items()},
         config=plain,
+        make_replay=instantiate(config.replay),
     )
     run.line.stage, run.line.later = stage, later
     return run
@@ -147,7 +148,7 @@ def _in_stages(job: Job, plain: dict[str, Any]) -> TrainingResult:
     stages, results = stages_of(job), list[TrainingResult]()
     settings = [TrainingSettings(**dict(stage.config.training)) for stage in stages]
     for number, stage in enumerate(stages):
-        goal, later = settings[number].goal, sum(one.steps for one in settings[number + 1 :])
+        goal, later = settings[number].goal, sum(one.usual_steps or one.steps for one in settings[number + 1 :])
         title = f"stage {number + 1} of {len(stages)}, {stage.folder.name}{f', until {goal}' if goal else ''}"
         print(f"{_overview(stages, results)}\n{title}", flush=True)
         results.append(run_training(stage, title, later))

@@ -1,14 +1,15 @@
 """The reward of one policy step: one function a term, weighed apart from being measured.
 
-The environment puts the measured terms next to the reward, so that a replay can weigh them anew when the weights
-follow a schedule.
+A term is a function with `@term` and a line in `conf/reward/`, its weight. The environment puts the measured terms next
+to the reward, so that a replay can weigh them anew when the weights follow a schedule.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,123 +17,203 @@ from numpy.typing import NDArray
 from tactile_cube.env.cube_pose import CubePose
 from tactile_cube.errors import InputError
 
-REWARD_TERMS = ("spin", "height", "plane", "tilt", "proximal", "off_centre", "leaving", "advance")
-"""Names and order of the terms in the key "reward_terms"; leaving is 1 in the step that loses the cube."""
-BORNE_TERMS = ("climb", "link_spin", "tips", "links", "link_force")
-"""Further terms, of how the object is held: measured, and part of that key, only where one of them has a weight."""
+TOUCH_FORCE = 0.02
+"""Smallest normal force that counts as touching [N]: a twenty-fifth of the cube's weight."""
+SUPPORTING_TIPS = 3
+"""Fingertips that must touch the cube for it to count as supported by tips."""
 
 
-def spin(before: CubePose, after: CubePose, direction: int, limit: float) -> float:
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What happened in a policy step.
+
+    Attributes:
+        first: the object's pose where the episode began.
+        before: at the begin of the step.
+        after: at its end.
+        direction: sense of rotation that is rewarded, +1 or -1.
+        limit: largest rotation that earns [rad].
+        lost: whether the step loses the object.
+        proximal_angles: q1 of each finger at the end [rad].
+        azimuths_before: of each fingertip about the object's middle `(fingers,)` [rad].
+        azimuths: the same at the end.
+        forces: normal force on the object of each finger's other links and of its tip `(2, fingers)` [N].
+    """
+
+    first: CubePose
+    before: CubePose
+    after: CubePose
+    direction: int
+    limit: float
+    lost: bool
+    proximal_angles: list[float]
+    azimuths_before: NDArray[np.float64]
+    azimuths: NDArray[np.float64]
+    forces: NDArray[np.float64]
+
+
+class Term(NamedTuple):
+    """A term's function, its sign in the reward, and whether a curriculum scales its penalty."""
+
+    measure: Callable[[Step], float]
+    sign: int
+    scaled: bool
+
+
+TERMS: dict[str, Term] = {}
+"""By name, which is that of the function and of the weight."""
+
+
+def term(sign: int, scaled: bool = False) -> Callable[[Callable[[Step], float]], Callable[[Step], float]]:
+    """Makes a function of a step a term of the reward: +1 earns, -1 costs."""
+
+    def register(measure: Callable[[Step], float]) -> Callable[[Step], float]:
+        TERMS[measure.__name__] = Term(measure, sign, scaled)
+        return measure
+
+    return register
+
+
+@term(+1)
+def spin(step: Step) -> float:
     """Rotation in the rewarded direction, at most `limit` a step [rad]. Source: paper, section II; website (clip)."""
-    return min(direction * (after.theta - before.theta), limit)
+    return min(step.direction * (step.after.theta - step.before.theta), step.limit)
 
 
-def height(before: CubePose, after: CubePose) -> float:
+@term(-1, scaled=True)
+def height(step: Step) -> float:
     """Vertical motion |d_z| [m]."""
-    return abs(after.z - before.z)
+    return abs(step.after.z - step.before.z)
 
 
-def plane(before: CubePose, after: CubePose) -> float:
+@term(-1, scaled=True)
+def plane(step: Step) -> float:
     """Horizontal motion |d_xy| [m]."""
-    return math.hypot(after.x - before.x, after.y - before.y)
+    return math.hypot(step.after.x - step.before.x, step.after.y - step.before.y)
 
 
-def tilt(before: CubePose, after: CubePose) -> float:
+@term(-1, scaled=True)
+def tilt(step: Step) -> float:
     """Tilting motion |d_psi| + |d_phi| [rad]."""
-    return abs(after.psi - before.psi) + abs(after.phi - before.phi)
+    return abs(step.after.psi - step.before.psi) + abs(step.after.phi - step.before.phi)
 
 
-def proximal(joint_angles: Sequence[float], joints_per_finger: int = 3) -> float:
-    """Sum over the fingers of q1^4 [rad^4] for joint angles (joints,): keeps the fingers from twisting."""
-    return sum(q**4 for q in joint_angles[::joints_per_finger])
+@term(-1)
+def proximal(step: Step) -> float:
+    """Sum over the fingers of q1^4 [rad^4]: keeps the fingers from twisting."""
+    return sum(q**4 for q in step.proximal_angles)
 
 
-def off_centre(first: CubePose, after: CubePose) -> float:
+@term(-1)
+def off_centre(step: Step) -> float:
     """Squared horizontal distance from where the episode began [m^2]. Not in the paper.
 
     A cube that is dragged aside is lost some twenty steps later, beyond what the discount lets the agent foresee.
     """
-    return (after.x - first.x) ** 2 + (after.y - first.y) ** 2
+    return (step.after.x - step.first.x) ** 2 + (step.after.y - step.first.y) ** 2
 
 
-def advance(turned: float, direction: int, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+@term(-1)
+def leaving(step: Step) -> float:
+    """1 in the step that loses the cube. Its weight must exceed what going on costs, or dropping pays."""
+    return float(step.lost)
+
+
+@term(+1)
+def advance(step: Step) -> float:
     """How far the fingertips went ahead of the object, against its rotation, in sum [rad]. Not in the paper.
 
     A finger that turns with the object adds nothing, one that goes back to grasp anew adds its way at once, long before
     the turn that this makes possible. The sum over an episode is bounded by the fingers' reach unless the object turns:
     going to and fro earns nothing.
-
-    Args:
-        turned: rotation of the object in the rewarded direction, as in `spin` [rad].
-        direction: that is rewarded, +1 or -1.
-        before: azimuth of each fingertip about the object's middle `(fingers,)` [rad].
-        after: the same after the step.
     """
-    way = np.remainder(after - before + np.pi, 2.0 * np.pi) - np.pi
-    return float(len(way) * turned - direction * way.sum())
+    way = np.remainder(step.azimuths - step.azimuths_before + np.pi, 2.0 * np.pi) - np.pi
+    return float(len(way) * spin(step) - step.direction * way.sum())
 
 
-def climb(first: CubePose, after: CubePose) -> float:
-    """Squared height above where the episode began [m^2]. Not in the paper.
+@term(-1)
+def climb(step: Step) -> float:
+    """Squared height above where the episode began [m^2]. Not in the paper, as all that follow.
 
     A cube that climbs into the hand runs with its upper edge against links that are no fingertips.
     """
-    return max(after.z - first.z, 0.0) ** 2
+    return max(step.after.z - step.first.z, 0.0) ** 2
 
 
-@dataclass(frozen=True)
+@term(-1)
+def link_spin(step: Step) -> float:
+    """Rotation in a step at whose end another link than a fingertip touches the object [rad].
+
+    With a weight below that of `spin` a hand that rests has nothing to gain by it.
+    """
+    return max(spin(step), 0.0) * links(step)
+
+
+@term(+1)
+def tips(step: Step) -> float:
+    """Whether three or more fingertips touch the object at the end of the step."""
+    return float(int((step.forces[1] > TOUCH_FORCE).sum()) >= SUPPORTING_TIPS)
+
+
+@term(-1)
+def links(step: Step) -> float:
+    """Whether another link does."""
+    return float((step.forces[0] > TOUCH_FORCE).any())
+
+
+@term(-1)
+def link_force(step: Step) -> float:
+    """Share of these links in the normal force; 0 without any."""
+    total = float(step.forces.sum())
+    return float(step.forces[0].sum()) / total if total > 0.0 else 0.0
+
+
+PUBLISHED = {
+    "spin": 16.0,  # lambda_spin [1/rad]
+    "height": 100.0,  # lambda_z [1/m]
+    "plane": 300.0,  # lambda_plane [1/m]
+    "tilt": 50.0,  # lambda_rot [1/rad]
+    "proximal": 25.0,  # lambda_proxy [1/rad^4]
+    "off_centre": 0.0,  # [1/m^2]
+    "leaving": 10.0,  # size not published
+    "advance": 0.0,  # [1/rad]
+}
+"""Source: website, table of the reward."""
+
+
+@dataclass(frozen=True, init=False)
 class Reward:
-    """Weights of the terms, all given as positive numbers. Source: website, table of the reward.
+    """Weights of the terms by name, all given as positive numbers: `Reward(tips=0.2)` adds one to the published ones.
+
+    All terms that are named are measured, also with a weight of 0: so runs with other weights can take over a replay.
 
     Attributes:
-        spin: lambda_spin [1/rad].
-        height: lambda_z [1/m].
-        plane: lambda_plane [1/m].
-        tilt: lambda_rot [1/rad].
-        proximal: lambda_proxy [1/rad^4].
-        off_centre: penalty for a cube away from where it began [1/m^2]; 0 in the paper.
-        leaving: penalty for losing the cube (size not published). Must exceed what going on costs, or dropping pays.
-        advance: of fingertips that go ahead of the object [1/rad]; 0 in the paper.
+        weight: by term, in the order of `TERMS`.
         fastest: rotation above this rate earns nothing more [rad/s].
-        climb: penalty for an object above where it began [1/m^2]; 0 in the paper, as all that follow.
-        link_spin: penalty for rotation in a step at whose end another link than a fingertip touches the object [1/rad].
-            Below `spin` a hand that rests has nothing to gain by it.
-        tips: of a step at whose end three or more fingertips touch the object.
-        links: penalty for one at whose end another link touches it.
-        link_force: penalty for the share of these links in the normal force.
     """
 
-    spin: float = 16.0
-    height: float = 100.0
-    plane: float = 300.0
-    tilt: float = 50.0
-    proximal: float = 25.0
-    off_centre: float = 0.0
-    leaving: float = 10.0
-    advance: float = 0.0
-    fastest: float = 1.0
-    climb: float = 0.0
-    link_spin: float = 0.0
-    tips: float = 0.0
-    links: float = 0.0
-    link_force: float = 0.0
+    weight: dict[str, float]
+    fastest: float
 
-    def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
-        for key in (*REWARD_TERMS, *BORNE_TERMS, "fastest"):
-            value = getattr(self, key)
+    def __init__(self, fastest: float = 1.0, **weights: float):
+        """Refuses terms that there are none of, and values without a meaning."""
+        given = PUBLISHED | weights
+        for key, value in (given | {"fastest": fastest}).items():
+            if key not in (*TERMS, "fastest"):
+                raise InputError(f"reward.{key[:40]}: no such term; there are {', '.join(TERMS)}")
             if not isinstance(value, (int, float)) or not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"reward.{key} is {value}; give a finite weight >= 0 (signs are built in)")
-
-    @property
-    def borne_terms(self) -> tuple[str, ...]:
-        """BORNE_TERMS where one of them has a weight, else none."""
-        return BORNE_TERMS if any(getattr(self, key) for key in BORNE_TERMS) else ()
+        object.__setattr__(self, "weight", {name: given[name] for name in TERMS if name in given})
+        object.__setattr__(self, "fastest", fastest)
 
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the terms that are measured, in their order."""
-        return REWARD_TERMS + self.borne_terms
+        return tuple(self.weight)
+
+    def measure(self, step: Step) -> NDArray[np.float64]:
+        """The terms of a step, before weighing, in the order of `terms`."""
+        return np.array([TERMS[name].measure(step) for name in self.weight])
 
     def weights(self, penalty_scale: float = 1.0) -> NDArray[np.float32]:
         """Signed weights in the order of `terms`: reward = reward_terms @ weights.
@@ -140,7 +221,6 @@ class Reward:
         Args:
             penalty_scale: factor on height, plane and tilt, from the curriculum.
         """
-        motion = [-penalty_scale * w for w in (self.height, self.plane, self.tilt)]
-        others = [-self.proximal, -self.off_centre, -self.leaving, self.advance]
-        borne = [-self.climb, -self.link_spin, self.tips, -self.links, -self.link_force] if self.borne_terms else []
-        return np.array([self.spin, *motion, *others, *borne], dtype=np.float32)
+        known = [(TERMS[name], weight) for name, weight in self.weight.items()]
+        signed = [one.sign * (penalty_scale if one.scaled else 1.0) * weight for one, weight in known]
+        return np.array(signed, dtype=np.float32)

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.env import reward as terms
 from tactile_cube.env.cube_pose import CubePose, cube_pose, frame_along, seen_along
-from tactile_cube.env.reward import Reward
+from tactile_cube.env.reward import Reward, Step
 from tactile_cube.env.task import DROPPED, FAULTY, LEFT_RANGE, LIFTED, RUNNING, TILTED, TIME_LIMIT, Task
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.randomization import GraspTable, Randomization, StartPoses, drawn_places
@@ -152,33 +151,26 @@ class RotationEnv:
         return cube_pose(self.world.cube_position.tolist(), quaternion, previous_theta)
 
     def _azimuths(self) -> Array:
-        """Where the fingertips stand about the object (fingers,) [rad]; none where that earns nothing."""
-        if self.reward.advance == 0.0:
-            return np.zeros(0)
+        """Where the fingertips stand about the object (fingers,) [rad]."""
         places = tip_positions(self.hand, self.world.q) - self.world.cube_position
         places = places if self._frame is None else self._frame.inv().apply(places)
         return np.arctan2(places[:, 1], places[:, 0])
 
     def _measure(self, before: CubePose, after: CubePose, outcome: int) -> Array:
-        turned = terms.spin(before, after, self.task.direction, self._limit)
         azimuths, self._tips = self._tips, self._azimuths()
-        held: tuple[float, ...] = ()
-        if self.reward.borne_terms:
-            tips, links, share = borne(normal_forces(self.world))
-            held = (terms.climb(self._first, after), max(turned, 0.0) * links, tips, links, share)
-        return np.array(
-            (
-                turned,
-                terms.height(before, after),
-                terms.plane(before, after),
-                terms.tilt(before, after),
-                terms.proximal(self.world.q.tolist(), self.hand.joints_per_finger),
-                terms.off_centre(self._first, after),
-                float(outcome in LOST),
-                terms.advance(turned, self.task.direction, azimuths, self._tips),
-                *held,
-            )
+        step = Step(
+            first=self._first,
+            before=before,
+            after=after,
+            direction=self.task.direction,
+            limit=self._limit,
+            lost=outcome in LOST,
+            proximal_angles=self.world.q[:: self.hand.joints_per_finger].tolist(),
+            azimuths_before=azimuths,
+            azimuths=self._tips,
+            forces=self.world.normal_forces(),
         )
+        return self.reward.measure(step)
 
     def _observe(self, measured: Array, outcome: int, step: int) -> TimeStep:
         world, pose = self.world, self._pose
@@ -192,28 +184,3 @@ class RotationEnv:
         theta = self.task.direction * (pose.theta - self._first.theta)
         reward = float(measured @ self._weights)
         return TimeStep(np.array(q_m), q_f - q_m, state, theta, measured, reward, outcome, step)
-
-
-TOUCH_FORCE = 0.02
-"""Smallest normal force that counts as touching [N]: a twenty-fifth of the cube's weight."""
-SUPPORTING_TIPS = 3
-"""Fingertips that must touch the cube for it to count as supported by tips."""
-
-
-def normal_forces(world: World) -> NDArray[np.float64]:
-    """Normal force on the object of each finger's other links and of its tip (2, fingers) [N]."""
-    fingers = [finger.name for finger in world.hand.fingers]
-    force = np.zeros((2, len(fingers)))
-    for contact in world.contacts():
-        if contact.other == "cube" and contact.finger in fingers:
-            finger = fingers.index(contact.finger)
-            force[int(contact.link == world.hand.fingers[finger].links[-1]), finger] += contact.force
-    return force
-
-
-def borne(force: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Whether enough tips touch, whether another link does, and these links' share of the force, of `normal_forces`."""
-    links, tips = force
-    total = float(force.sum())
-    supported = int((tips > TOUCH_FORCE).sum()) >= SUPPORTING_TIPS
-    return float(supported), float((links > TOUCH_FORCE).any()), float(links.sum()) / total if total > 0.0 else 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.env.rotation import SUPPORTING_TIPS, TOUCH_FORCE
+from tactile_cube.env.reward import SUPPORTING_TIPS, TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import EpisodeRecord
 
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")

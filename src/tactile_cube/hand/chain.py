@@ -111,11 +111,11 @@ class PlanarChain:
     reach: tuple[float, float, float]
 
     def tips(self, position: Array, rotation: Array, q: Array) -> Array:
-        """See `Chain.tips`."""
+        """See `Chain.tips`; position (n, 3) and rotation (n, 3, 3) may also differ from row to row."""
         a, b, c = self.reach
         planar = np.exp(1j * q[:, 1]) * (a + b * np.exp(1j * q[:, 2]) + c * np.exp(2j * q[:, 2]))
         local = np.stack([planar.real * np.cos(q[:, 0]), planar.real * np.sin(q[:, 0]), planar.imag], axis=1)
-        return np.asarray(position + local @ rotation.T)
+        return np.asarray(position + (local[:, None] @ np.swapaxes(rotation, -1, -2))[:, 0])
 
     def angles(self, position: Array, rotation: Array, targets: Array, lower: Array, upper: Array) -> Array:
         """Angles (n, 3) [rad] that bring the tip to world points (n, 3) [m]; limits are not applied.

@@ -177,10 +177,15 @@ class Hand:
         half_range = 0.5 * (self.action_upper - self.action_lower)
         return np.clip((angles - middle) / half_range, -1.0, 1.0)
 
+    @cached_property
+    def bases(self) -> tuple[Array, Array]:
+        """Positions (fingers, 3) [m] and rotations (fingers, 3, 3) of the first joints' frames in the world."""
+        positions = [self.position + self.rotation @ base.position for base in self.fingers]
+        return np.array(positions), np.array([self.rotation @ base.rotation for base in self.fingers])
+
     def base_in_world(self, finger: int) -> tuple[Array, Array]:
         """Position (3,) [m] and rotation (3, 3) of the first joint's frame in the world."""
-        base = self.fingers[finger]
-        return self.position + self.rotation @ base.position, self.rotation @ base.rotation
+        return self.bases[0][finger], self.bases[1][finger]
 
     def finger_tips(self, finger: int, q: Array) -> Array:
         """Centres of a fingertip's sphere in the world (n, 3) [m] for its joint angles (n, joints_per_finger) [rad]."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tactile_cube.hand.chain import PlanarChain
 from tactile_cube.hand.hand import Hand
 from tactile_cube.hand.object_shape import ObjectShape, tip_centres
 from tactile_cube.hand.urdf import Array
@@ -19,8 +20,11 @@ _REACHED = 1e-5
 
 def tip_positions(hand: Hand, angles: Array) -> Array:
     """Centres of the fingertip spheres in the world (fingers, 3) [m], for joint angles (joints,) [rad]."""
-    q = np.asarray(angles, dtype=np.float64).reshape(-1, 1, hand.joints_per_finger)
-    return np.concatenate([hand.finger_tips(k, q[k]) for k in range(len(hand.fingers))])
+    q = np.asarray(angles, dtype=np.float64).reshape(-1, hand.joints_per_finger)
+    chain = hand.fingers[0].chain
+    if isinstance(chain, PlanarChain) and all(finger.chain == chain for finger in hand.fingers):
+        return chain.tips(*hand.bases, q)  # all at once
+    return np.concatenate([hand.finger_tips(k, q[k : k + 1]) for k in range(len(hand.fingers))])
 
 
 def grasp_angles(

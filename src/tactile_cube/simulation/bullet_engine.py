@@ -171,6 +171,15 @@ class BulletEngine:
             found.append(named_contact(first, second, middle, -np.array(row[7]), row[8], row[9], -friction_on_first))
         return found
 
+    def normal_forces(self) -> Array:
+        """See `Engine.normal_forces`."""
+        force, tip = np.zeros((2, len(self.fingers))), self._links[-1]
+        for row in pybullet.getContactPoints(physicsClientId=self.client):
+            body, link = (row[2], row[4]) if row[1] == self.cube else (row[1], row[3])
+            if self.cube in row[1:3] and body in self.fingers:
+                force[int(link == tip), self.fingers.index(body)] += row[9]
+        return force
+
     def close(self) -> None:
         """Ends the physics server."""
         if pybullet.isConnected(self.client):

@@ -67,6 +67,10 @@ class Engine(Protocol):
         """Contacts on the cube and between fingers in the last physics step."""
         ...
 
+    def normal_forces(self) -> Array:
+        """Sums of the normal forces on the object of each finger's other links and of its tip (2, fingers) [N]."""
+        ...
+
     def close(self) -> None:
         """Ends the simulation."""
         ...

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +24,7 @@ class MujocoEngine:
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         """Describes the bodies; the model comes with each episode."""
         self._spec = HandSpec(hand, options, drive)
+        self._hand = hand
         self._dofs = hand.links_per_finger * len(hand.fingers)
         self._control, self._memory = drive.plant.kernel.control_step, drive.memory
 
@@ -40,6 +39,9 @@ class MujocoEngine:
         self._data.qvel[:] = [*v.ravel(), *np.asarray(start.cube_linear_velocity), *angular]
         data = self._data
         self._driven = data.qpos[: self._dofs], data.qvel[: self._dofs], data.qfrc_applied[: self._dofs]
+        self._free_joint = data.qpos[self._dofs :], data.qvel[self._dofs :]
+        self._cube = int(self._model.geom("cube").id)
+        self._fingers = [self._touching(shape) for shape in range(self._model.ngeom)]
         self.q, self.v = (joints.reshape(q.shape) for joints in self._driven[:2])
 
     def set_gravity(self, acceleration: Array) -> None:
@@ -52,17 +54,20 @@ class MujocoEngine:
         states = np.empty((steps + 1, OBJECT_STATE)) if record else None
         for i in range(steps):
             if states is not None:
-                states[i] = self._free_joint()
+                states[i] = self.cube_state()
             self._control(i, *self._driven, self._memory)
             mujoco.mj_step(self._model, self._data)
-        if states is None:
-            return None
-        states[steps] = self._free_joint()
-        return _in_world(states)
+        if states is not None:
+            states[steps] = self.cube_state()
+        return states
 
     def cube_state(self) -> Array:
         """See `Engine.cube_state`."""
-        return _in_world(self._free_joint()[None]).ravel()
+        state, pose, velocity = np.empty(OBJECT_STATE), *self._free_joint
+        state[:3], state[3:6], state[6] = pose[:3], pose[4:], pose[3]  # wxyz in MuJoCo
+        state[7:10] = velocity[:3]
+        mujoco.mju_rotVecQuat(state[10:], velocity[3:], pose[3:])  # of the cube's frame in MuJoCo
+        return state
 
     def gaps(self) -> list[float]:
         """See `Engine.gaps`."""
@@ -73,27 +78,36 @@ class MujocoEngine:
         """See `Engine.contacts`."""
         return [self._contact(index) for index in range(self._data.ncon)]
 
+    def normal_forces(self) -> Array:
+        """See `Engine.normal_forces`."""
+        force, wrench = np.zeros((2, len(self._hand.fingers))), np.zeros(6)
+        for index, (first, second) in enumerate(self._data.contact.geom.tolist()):
+            finger = self._fingers[first] or self._fingers[second]
+            if finger is not None and self._cube in (first, second):
+                mujoco.mj_contactForce(self._model, self._data, index, wrench)
+                force[finger] += wrench[0]
+        return force
+
     def close(self) -> None:
         """Nothing to end: MuJoCo has no server."""
 
-    def _free_joint(self) -> Array:
-        """State of the cube (13,) as MuJoCo has it."""
-        return np.concatenate([self._data.qpos[self._dofs :], self._data.qvel[self._dofs :]])
+    def _names(self, shape: int) -> tuple[str, str]:
+        """The body (finger, `cube` or `table`) and link of a shape."""
+        body, _, link = self._model.geom(shape).name.partition("#")[0].partition(" ")
+        return body, link
+
+    def _touching(self, shape: int) -> tuple[int, int] | None:
+        """Of a finger's shape: 1 for the tip's and 0 for another link's, and which finger; else None."""
+        body, link = self._names(shape)
+        found = [k for k, finger in enumerate(self._hand.fingers) if finger.name == body]
+        return (int(link == self._hand.fingers[found[0]].links[-1]), found[0]) if found else None
 
     def _contact(self, index: int) -> Contact:
         """One contact with names; MuJoCo's force is that on the second shape."""
         contact, wrench = self._data.contact[index], np.zeros(6)
         mujoco.mj_contactForce(self._model, self._data, index, wrench)
         frame = np.reshape(contact.frame, (3, 3))
-        names = [self._model.geom(shape).name.partition("#")[0].partition(" ") for shape in contact.geom]
-        first, second = ((body, link) for body, _, link in names)
+        first, second = map(self._names, contact.geom.tolist())
         friction = wrench[1:3] @ frame[1:]
         middle, normal = np.array(contact.pos), np.array(frame[0])
         return named_contact(first, second, middle, normal, float(contact.dist), float(wrench[0]), friction)
-
-
-def _in_world(states: Array) -> Array:
-    """Rows of MuJoCo's free joint (n, 13) as `OBJECT_STATE`: quaternion xyzw, angular velocity in the world."""
-    quaternion: Any = states[:, [4, 5, 6, 3]]
-    angular = Rotation.from_quat(quaternion).apply(states[:, 10:])
-    return np.concatenate([states[:, :3], quaternion, states[:, 7:10], angular], axis=1)

@@ -202,6 +202,10 @@ class World:
         """Contacts of the last physics step."""
         return self._engine.contacts()
 
+    def normal_forces(self) -> Array:
+        """Normal force on the object of each finger's other links and of its tip (2, fingers) [N], of `contacts`."""
+        return self._engine.normal_forces()
+
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
     def _run(self) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 
 import torch
 from filelock import BaseFileLock, FileLock, Timeout
+from torchrl.data import ReplayBuffer, TensorDictReplayBuffer
 
-from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.agent import Agent
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import load_actor, require_sizes
 from tactile_cube.errors import InputError
@@ -43,6 +44,7 @@ def build_run(
     training: TrainingSettings,
     loggers: Mapping[str, Callable[..., MetricLogger]],
     config: dict[str, Any],
+    make_replay: Callable[..., ReplayBuffer] = TensorDictReplayBuffer,
 ) -> Run:
     """A run in `folder`: gone on with where its checkpoint says, or new.
 
@@ -55,6 +57,7 @@ def build_run(
         training: schedule.
         loggers: makers of loggers by name, called with `folder`, `resumed_at` and `config`.
         config: the resolved configuration, as plain data.
+        make_replay: makes the buffer of transitions, see `Replay`.
 
     Raises:
         InputError: another process trains in the folder, a checkpoint that is damaged or made with other settings, an
@@ -71,7 +74,7 @@ def build_run(
         saved = None if training.resume == "never" else checkpoints.load()
         if saved is not None:
             require_same_settings(folder / FILE, saved["config"], config)
-        learner = _build_learner(seed, environment, make_agent, collector, _protected(training), saved)
+        learner = _build_learner(seed, environment, make_agent, collector, _protected(training), saved, make_replay)
         held.callback(learner.collection.close)  # worker processes would keep the program from ending
         if training.resume == "never":  # nothing refuses any more
             _clear(folder, checkpoints)
@@ -91,6 +94,9 @@ def build_run(
             barrier_steps=collector.worlds * training.steps_per_iteration * training.barrier_iterations,
             approximations=[*environment.approximations, *learner.agent.approximations()],
             best_angle=saved["best_angle"] if saved is not None else 0.0,
+            trial=environment.trial,
+            tried=saved.get("tried", {}) if saved is not None else {},
+            best_score=saved.get("best_score", 0.0) if saved is not None else 0.0,
         )
         held.pop_all()  # it is the run's from here
     return run
@@ -138,6 +144,7 @@ def _build_learner(
     collector: CollectorSettings,
     training: TrainingSettings,
     saved: dict[str, Any] | None,
+    make_replay: Callable[..., ReplayBuffer],
 ) -> Learner:
     """Agent, experience and workers: as a checkpoint's contents `saved` say, from `init_from`, or new."""
     agent = make_agent(environment.sizes)
@@ -148,11 +155,11 @@ def _build_learner(
         held.callback(collection.close)
         learner = Learner(
             agent=agent,
-            replay=Replay(training.replay_size, environment.sizes, environment.reward_terms, seed),
+            replay=Replay(training.replay_size, environment.sizes, len(environment.terms), seed, make_replay),
             collection=collection,
             episodes=EpisodeStatistics(
                 environment.outcomes,
-                environment.logged_terms,
+                environment.terms,
                 environment.learnability() if environment.learnability is not None else None,
             ),
             settings=training,

@@ -17,11 +17,14 @@ from tactile_cube.untrusted_file import regular
 from tactile_cube.whole_file import sync_folder, write_whole
 
 FILE, BEFORE = "checkpoint.pt", "checkpoint_before.pt"
-HEAD = b"tactile_cube checkpoint 2, sha256 "
+HEAD = b"tactile_cube checkpoint 3, sha256 "
 """First words of a file; its checksum follows, then a line break, then what torch.save wrote."""
 FREE_KEYS = {
     "training.steps",
     "training.policy_every",
+    "training.usual_steps",
+    "training.trial_every",
+    "training.trial_episodes",
     "training.log_iterations",
     "training.resume",
     "training.stop_if_no_regrasp_by",
@@ -152,6 +155,8 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
     try:
         content = memoryview(path.read_bytes())
         head, content = bytes(content[: len(HEAD) + 65]), content[len(HEAD) + 65 :]
+        if head.startswith(HEAD[:24]) and not head.startswith(HEAD):
+            raise ValueError("of another version of this program; begin with its policy.safetensors")
         if head != HEAD + hashlib.sha256(content).hexdigest().encode() + b"\n":
             raise ValueError("its checksum is wrong or missing")
         _require_uncompressed(content)

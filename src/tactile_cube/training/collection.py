@@ -59,8 +59,7 @@ class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Sample an action for each world."""
-        mean, scale = self.actor(tensordict["observation"])
-        action = torch.tanh(mean + scale * torch.randn_like(mean))
+        action = self.actor.sample(tensordict["observation"]).action
         if self.random:
             action = torch.rand_like(action) * 2.0 - 1.0
         return tensordict.set("action", action)

@@ -8,11 +8,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from tactile_cube.agent.networks import Sizes
+from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.env import OUTCOMES, Conditions
 from tactile_cube.env.rotation import OBJECT
 from tactile_cube.randomization import Learnability
 from tactile_cube.training.collection import MakeEnv
+from tactile_cube.training.trial import Trial
 from tactile_cube.transforms import EnvConfig, make_env
 
 
@@ -23,21 +24,21 @@ class Environment:
     Attributes:
         make: makes a batch of worlds, in whichever process.
         sizes: widths of observation, privileged state and action.
-        reward_terms: number of reward terms.
+        terms: names of the reward terms, in the order of "reward_terms".
         reward_weights: weights of the terms (terms,) under the conditions in force.
         outcomes: names of the codes in the key "outcome".
-        logged_terms: names of the last reward terms, whose means the training curves show.
         learnability: makes what keeps account of the worlds; None: nothing does.
+        trial: tries an actor in so many episodes an engine, see `Trial`; None: nothing does.
         approximations: what its worlds compute less well than they could, in words.
     """
 
     make: MakeEnv
     sizes: Sizes
-    reward_terms: int
+    terms: tuple[str, ...]
     reward_weights: Callable[[Conditions], Tensor]
     outcomes: tuple[str, ...] = ()
-    logged_terms: tuple[str, ...] = ()
     learnability: Callable[[], Learnability] | None = None
+    trial: Callable[[Actor, int], dict[str, float]] | None = None
     approximations: tuple[str, ...] = ()
 
 
@@ -47,11 +48,11 @@ def rotation_environment(config: EnvConfig) -> Environment:
     return Environment(
         make=partial(make_env, config),
         sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
-        reward_terms=len(config.reward.terms),
+        terms=config.reward.terms,
         reward_weights=partial(_weights, config),
         outcomes=OUTCOMES,
-        logged_terms=config.reward.borne_terms,
         learnability=partial(config.randomization.learnability, config.constants),
+        trial=Trial(config),
         approximations=tuple(config.approximations()),
     )
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from tensordict import TensorDictBase
+from torch import Tensor
 
 from tactile_cube.randomization import Learnability
 
@@ -19,7 +20,7 @@ class EpisodeStatistics:
 
     Args:
         outcomes: names of the outcome codes, e.g. ("running", "time", "dropped", ...); empty if the world has none.
-        terms: names of the last reward terms; their means over all steps of the last blocks are logged.
+        terms: names of the reward terms; what each adds to the reward of a step, over the last blocks, is logged.
         worlds: what becomes of the worlds that episodes draw.
     """
 
@@ -34,13 +35,14 @@ class EpisodeStatistics:
         self.endings: deque[int] = deque(maxlen=WINDOW)
         self.episodes = self.faulty = 0
 
-    def add(self, block: TensorDictBase) -> None:
-        """Count the episodes that end in a block (worlds, steps)."""
+    def add(self, block: TensorDictBase, weights: Tensor | float = 1.0) -> None:
+        """Count the episodes that end in a block (worlds, steps); `weights` are those of the terms (terms,)."""
         following = block["next"]
         ended = following["done"].squeeze(-1)
         faulty = following["faulty"].squeeze(-1)
         if self.terms:
-            self.measured.append(following["reward_terms"][..., -len(self.terms) :].flatten(0, -2).mean(0).tolist())
+            weighted = following["reward_terms"].masked_fill(following["faulty"], 0.0) * weights
+            self.measured.append(weighted.flatten(0, -2).mean(0).tolist())
         self.faulty += int((ended & faulty).sum())
         self.episodes += int(ended.sum())
         exploring = following.get("exploring", None)  # missing where no extra exploration is configured
@@ -81,7 +83,8 @@ class EpisodeStatistics:
             if name not in ("running", "faulty"):
                 result[f"ended_{name}"] = self.endings.count(code) / max(len(self.endings), 1)
         means = zip(*self.measured, strict=True) if self.measured else ([0.0] for _ in self.terms)
-        return result | {name: sum(values) / len(values) for name, values in zip(self.terms, means, strict=True)}
+        rewards = {name: sum(values) / len(values) for name, values in zip(self.terms, means, strict=True)}
+        return result | {f"reward_{name}": value for name, value in rewards.items()}
 
     def state_dict(self) -> dict[str, Any]:
         """The window and the counts."""

@@ -16,7 +16,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
-from tactile_cube.agent.interface import Agent
+from tactile_cube.agent.agent import Agent
 from tactile_cube.env import Conditions
 from tactile_cube.training.collection import Collection, CollectionError, Progress
 from tactile_cube.training.episodes import EpisodeStatistics
@@ -65,12 +65,13 @@ class Learner:
         """Collect a block and, meanwhile, learn from what was there before."""
         random = self.steps < self.settings.random_steps
         self.conditions = self.collection.launch(self.agent.policy(), random, self._progress())
+        weights = self.reward_weights(self.conditions)
         if self.steps >= self.settings.learning_starts:
-            self._learn(self.reward_weights(self.conditions))
+            self._learn(weights)
         block = self.collection.take()
         _require_finite(block)
         self.replay.extend(self.assembler.add(block))
-        self.episodes.add(block)
+        self.episodes.add(block, weights)
         self.steps += block.numel()
         self.iteration += 1
 

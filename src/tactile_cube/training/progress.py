@@ -16,15 +16,16 @@ class ProgressLine:
         total: environment steps of the whole run.
         steps: steps done before this session.
         updates: gradient steps done before this session.
+        usual: environment steps after which recorded runs were done; None: all.
         stream: where to print.
 
     Attributes:
         stage: what each line begins with where the run is a stage of several.
-        later: environment steps of the stages after it, at most.
+        later: environment steps that the stages after it usually take.
     """
 
-    def __init__(self, total: int, steps: int, updates: int, stream: TextIO | None = None):
-        self._total, self._stream = total, stream or sys.stdout
+    def __init__(self, total: int, steps: int, updates: int, usual: int | None = None, stream: TextIO | None = None):
+        self._total, self._usual, self._stream = total, min(usual or total, total), stream or sys.stdout
         self.stage, self.later = "", 0
         self._printed, self._at_print = time.perf_counter(), (steps, updates)
 
@@ -43,7 +44,9 @@ class ProgressLine:
             return
         step_rate, update_rate = (steps - self._at_print[0]) / elapsed, (updates - self._at_print[1]) / elapsed
         self._printed, self._at_print = now, (steps, updates)
-        left = (max(self._total - steps, 0) + self.later) / max(step_rate, 1e-9)  # the last barrier may lie beyond
+        sooner = steps < self._usual < self._total
+        end = self._usual if sooner else self._total
+        left = (max(end - steps, 0) + self.later) / max(step_rate, 1e-9)  # the last barrier may lie beyond
         parts = [
             self.stage,
             f"{steps / 1e3:8.1f} k of {self._total / 1e3:.0f} k steps",
@@ -51,7 +54,7 @@ class ProgressLine:
             f"final angle {summary['final_angle']:5.2f} rad, {summary['episode_length']:3.0f} steps",
             f"{100 * summary['ended_time_limit']:.0f} % kept" if "ended_time_limit" in summary else "",
             " ".join(f"{key} {value:.3g}" for key, value in conditions.items()),
-            f"{'at most ' if self.stage else ''}{_clock(left)} left",
+            f"{'usually' if sooner or self.later else 'at most'} {_clock(left)} left",
         ]
         self.say(" | ".join(filter(None, parts)), in_place=self._stream.isatty())
 

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from tactile_cube.errors import InputError
+from tactile_cube.training.replay import Rows
 from tactile_cube.whole_file import write_whole
 
 FOLDER = "replay"
@@ -34,7 +35,7 @@ class ReplayFiles:
             raise InputError(f"{self.folder}: is a link; a run keeps its replay in its own folder: delete the link")
         self._segments: list[Segment] = []
 
-    def append(self, rows: Tensor, written: int, capacity: int) -> list[Segment]:
+    def append(self, rows: Rows, written: int, capacity: int) -> list[Segment]:
         """Write the rows that are not on disk yet; gives the segments that hold the ring.
 
         Args:

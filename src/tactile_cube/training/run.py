@@ -2,13 +2,14 @@
 
 import contextlib
 import signal
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from filelock import BaseFileLock
 
+from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
 from tactile_cube.training.checkpoint import Checkpoints
 from tactile_cube.training.finished import Finished
@@ -16,6 +17,7 @@ from tactile_cube.training.ledger import Ledger
 from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
 from tactile_cube.training.progress import ProgressLine
+from tactile_cube.training.trial import ENGINES, MEASURED, SCORE
 
 INTERRUPTED = "interrupted"
 MASTERED = "mastered:"
@@ -33,6 +35,9 @@ class Run:
         barrier_steps: environment steps from one barrier, and so one checkpoint, to the next.
         approximations: which shortcuts are on, in words.
         best_angle: largest mean final angle at a barrier so far [rad].
+        trial: tries the policy every `training.trial_every` steps; None: nothing does.
+        tried: what it found last.
+        best_score: the largest score so far; the best policy has it.
         saved_at: environment steps at the last checkpoint.
         total: environment steps in all: those asked for, in whole iterations.
     """
@@ -47,13 +52,16 @@ class Run:
     barrier_steps: int
     approximations: list[str]
     best_angle: float
+    trial: Callable[[Actor, int], dict[str, float]] | None = None
+    tried: dict[str, float] = field(default_factory=dict)
+    best_score: float = 0.0
 
     def __post_init__(self) -> None:
         """A session begins."""
         settings = self.learner.settings
         iteration = self.barrier_steps // settings.barrier_iterations
         self.total = -(-settings.steps // iteration) * iteration
-        self.line = ProgressLine(self.total, self.learner.steps, self.learner.updates)
+        self.line = ProgressLine(self.total, self.learner.steps, self.learner.updates, settings.usual_steps)
         self.commit = current_commit()
         self.saved_at = self.learner.steps
 
@@ -68,6 +76,7 @@ class Run:
             while not reason:
                 self.learner.run_to_barrier(self._after_iteration)
                 reason = self._reason_to_stop()
+                self._try()
                 self._save()
         except KeyboardInterrupt:
             reason = INTERRUPTED
@@ -126,13 +135,14 @@ class Run:
         self.line.show(learner.steps, learner.updates, summary, conditions)
         if learner.iteration % learner.settings.log_iterations == 0:
             losses = {key: float(value) for key, value in learner.metrics.items()}
+            trial = {f"trial_{name}": self.tried.get(name, float("nan")) for name in self._tried_names()}
             costs = self.ledger.costs()
             hours = {"simulating_hours": costs.simulating / 3600, "learning_hours": costs.learning / 3600}
             # losses last: the columns of metrics.csv are those of the first row, so they must be there from the start
             blank = dict.fromkeys(("critic_loss", "actor_loss", "alpha", "entropy", "value"), float("nan"))
             counts = {"updates": learner.updates, "wall_hours": costs.wall / 3600}
             for logger in self.loggers:
-                logger.log(learner.steps, summary | conditions | counts | hours | blank | losses)
+                logger.log(learner.steps, summary | conditions | counts | hours | trial | blank | losses)
 
     def _reason_to_stop(self) -> str:
         settings, steps = self.learner.settings, self.learner.steps
@@ -145,18 +155,37 @@ class Run:
             return f"no regrasping (mean final angle never above {settings.regrasp_angle:g} rad) by {deadline} steps"
         return ""
 
+    def _tried_names(self) -> list[str]:
+        if self.trial is None or not self.learner.settings.trial_every:
+            return []
+        return [SCORE, *(f"{engine}_{name}" for engine in ENGINES for name in MEASURED)]
+
+    def _try(self) -> None:
+        """Try the policy if it is time, and keep it if it is the best so far."""
+        learner, every = self.learner, self.learner.settings.trial_every
+        if self.trial is None or not every or learner.steps // every == self.saved_at // every:
+            return
+        self.tried = self.trial(learner.agent.policy(), learner.settings.trial_episodes)
+        parts = (f"{name} {value:.3g}" for name, value in self.tried.items() if not name.endswith(("links", "return")))
+        self.line.say(f"{learner.steps} steps, without exploration: {', '.join(parts)}")
+        if self.tried.get(SCORE, 0.0) > self.best_score:
+            self.best_score = self.tried[SCORE]
+            self._save_policy(BEST_POLICY)
+
     def _save(self) -> None:
         """Write the latest policy, the best so far, and a checkpoint."""
         learner = self.learner
         full_window = len(learner.episodes.angles) == learner.episodes.angles.maxlen
         if full_window and learner.episodes.mean_angle > self.best_angle:
             self.best_angle = learner.episodes.mean_angle
-            self._save_policy(BEST_POLICY)
+            if not self.best_score:  # nothing better is known
+                self._save_policy(BEST_POLICY)
         self._save_policy(POLICY)
         every = learner.settings.policy_every
         if every and learner.steps // every > self.saved_at // every:
             self._save_policy(f"policy_{learner.steps}.safetensors")
-        self.checkpoints.save({"learner": learner.state_dict(), "best_angle": self.best_angle, "config": self.config})
+        best = {"best_angle": self.best_angle, "best_score": self.best_score, "tried": self.tried}
+        self.checkpoints.save({"learner": learner.state_dict(), **best, "config": self.config})
         self.saved_at = learner.steps
         self.ledger.write(learner.steps)
 

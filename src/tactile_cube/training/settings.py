@@ -63,7 +63,10 @@ class TrainingSettings(BaseModel):
     random_steps: NonNegativeInt = 10_000
     replay_size: PositiveInt = 150_000
     barrier_iterations: PositiveInt = 25
+    usual_steps: PositiveInt | None = None
     policy_every: NonNegativeInt = 0
+    trial_every: NonNegativeInt = 25_000
+    trial_episodes: PositiveInt = 4
     log_iterations: PositiveInt = 5
     resume: Literal["auto", "never"] = "auto"
     init_from: str | None = None

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
-from tensordict import TensorDictBase
+from tensordict import NestedKey, TensorDictBase
 from torch import Tensor
 from torchrl.envs.transforms import Transform
 
@@ -34,9 +36,22 @@ class JointOffset(Transform):  # type: ignore[misc]
 
     offset: Tensor
 
-    def __init__(self, distribution: Distribution, half_range: Tensor) -> None:
-        """Draws each joint's offset from `distribution` [rad]; an action of 1 means `half_range` (12,) [rad]."""
-        super().__init__()
+    def __init__(
+        self,
+        distribution: Distribution,
+        half_range: Tensor,
+        in_keys: Sequence[NestedKey] = ("joint_position",),
+        in_keys_inv: Sequence[NestedKey] = ("action",),
+    ) -> None:
+        """Draws each joint's offset from `distribution` [rad]; an action of 1 means `half_range` (joints,) [rad].
+
+        Args:
+            distribution: of the offsets.
+            half_range: of the actions, and the number of joints.
+            in_keys: readings that are offset.
+            in_keys_inv: actions that mean what the offset encoders would read.
+        """
+        super().__init__(in_keys=in_keys, out_keys=in_keys, in_keys_inv=in_keys_inv, out_keys_inv=in_keys_inv)
         self.distribution = distribution
         self.half_range = half_range
         self.offset = torch.zeros_like(half_range)
@@ -49,10 +64,14 @@ class JointOffset(Transform):  # type: ignore[misc]
         return self._call(tensordict_reset)
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        return next_tensordict.set("joint_position", next_tensordict.get("joint_position") + self.offset)
+        for key in self.in_keys:
+            next_tensordict.set(key, next_tensordict.get(key) + self.offset)
+        return next_tensordict
 
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
-        return tensordict.set("action", tensordict.get("action") - self.offset / self.half_range)
+        for key in self.in_keys_inv:
+            tensordict.set(key, tensordict.get(key) - self.offset / self.half_range)
+        return tensordict
 
 
 class SensorNoise(Transform):  # type: ignore[misc]
@@ -62,16 +81,23 @@ class SensorNoise(Transform):  # type: ignore[misc]
         >>> env = TransformedEnv(worlds, SensorNoise(0.002))
     """
 
-    def __init__(self, std: float) -> None:
-        """Noise of standard deviation `std` [rad]."""
-        super().__init__()
-        self.std = std
+    def __init__(
+        self,
+        std: float,
+        in_keys: Sequence[NestedKey] = ("joint_position",),
+        opposite: Sequence[NestedKey] = ("control_error",),
+    ) -> None:
+        """Noise of standard deviation `std` [rad] on each of `in_keys`; `opposite` are computed from the first."""
+        super().__init__(in_keys=in_keys, out_keys=in_keys)
+        self.std, self.opposite = std, tuple(opposite)
 
     def _call(self, next_tensordict: TensorDictBase) -> TensorDictBase:
-        position = next_tensordict.get("joint_position")
-        noise = self.std * torch.randn_like(position)
-        next_tensordict.set("joint_position", position + noise)
-        return next_tensordict.set("control_error", next_tensordict.get("control_error") - noise)
+        noises = [self.std * torch.randn_like(next_tensordict.get(key)) for key in self.in_keys]
+        for key, noise in zip(self.in_keys, noises, strict=True):
+            next_tensordict.set(key, next_tensordict.get(key) + noise)
+        for key in self.opposite:
+            next_tensordict.set(key, next_tensordict.get(key) - noises[0])
+        return next_tensordict
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
         return self._call(tensordict_reset)
@@ -87,9 +113,9 @@ class StickyAction(Transform):  # type: ignore[misc]
         >>> env = TransformedEnv(worlds, StickyAction(0.1))
     """
 
-    def __init__(self, probability: float) -> None:
-        """Repeats with `probability` at each step, independently in each world."""
-        super().__init__()
+    def __init__(self, probability: float, in_keys_inv: Sequence[NestedKey] = ("action",)) -> None:
+        """Repeats the action of the given key with `probability` at each step, independently in each world."""
+        super().__init__(in_keys_inv=in_keys_inv, out_keys_inv=in_keys_inv)
         self.probability = probability
         self._last: Tensor | None = None
         self._fresh: Tensor | None = None
@@ -100,7 +126,8 @@ class StickyAction(Transform):  # type: ignore[misc]
         return tensordict_reset
 
     def _inv_call(self, tensordict: TensorDictBase) -> TensorDictBase:
-        action = tensordict.get("action")
+        (key,) = self.in_keys_inv
+        action = tensordict.get(key)
         if self._fresh is None or self._last is None:
             self._last = action
         stick = torch.rand((*action.shape[:-1], 1)) < self.probability
@@ -108,4 +135,4 @@ class StickyAction(Transform):  # type: ignore[misc]
             stick &= ~self._fresh
         self._last = torch.where(stick, self._last, action)
         self._fresh = torch.zeros_like(stick)
-        return tensordict.set("action", self._last)
+        return tensordict.set(key, self._last)

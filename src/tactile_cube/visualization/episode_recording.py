@@ -11,7 +11,7 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 from scipy.spatial.transform import Rotation
 
-from tactile_cube.env.rotation import TOUCH_FORCE
+from tactile_cube.env.reward import TOUCH_FORCE
 from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
 from tactile_cube.evaluation.training_curve import Curve
 from tactile_cube.evaluation.verdict import EpisodeResult

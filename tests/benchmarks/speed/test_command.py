@@ -16,8 +16,8 @@ def speed(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_a_section_ends_in_a_table_a_page_numbers_and_a_picture(tmp_path: Path) -> None:
     run = speed("update", "--rounds", "1", "--no-peers", "--out", str(tmp_path))
     assert run.returncode == 0, run.stderr
-    assert "| tactile_cube sac_fast, bf16 " in run.stdout
-    assert "| tactile_cube sac_fast, bf16 " in (tmp_path / "benchmark.md").read_text()
+    assert "| tactile_cube plain_sac, bf16 " in run.stdout
+    assert "| tactile_cube plain_sac, bf16 " in (tmp_path / "benchmark.md").read_text()
     found = json.loads((tmp_path / "benchmark.json").read_text())
     assert found["machine"]["torch"]
     assert [section["name"] for section in found["sections"]] == ["update"]

@@ -1,0 +1,104 @@
+"""What training asks of an agent: soft actor-critic, whichever loss stands behind it."""
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from torch import Tensor, nn
+
+from tactile_cube.agent.networks import Actor, Critic, Sizes, build_networks
+from tactile_cube.agent.settings import AgentSettings
+
+
+class Agent(ABC):
+    """Actor, critics and temperature under one loss, with AdamW and soft target updates.
+
+    Args:
+        sizes: widths of the signals. Parameters are drawn from torch's global generator.
+        critics: how many of them.
+        quantiles: outputs of each critic, for losses that learn the distribution of the return.
+        settings: see `AgentSettings`.
+
+    Attributes:
+        actor: the policy that learns; its parameters belong to `loss`.
+        loss: all that is learned, the target critics and `log_alpha`.
+    """
+
+    def __init__(self, sizes: Sizes, critics: int = 2, quantiles: int = 1, **settings: Any):
+        self.sizes, self.settings = sizes, AgentSettings(**settings)
+        self.device = self.settings.torch_device()
+        self.actor, networks = build_networks(sizes, self.settings.hidden, self.settings.layer_norm, critics, quantiles)
+        self.loss = self.build_loss(networks)
+        trained = {name: p for name, p in self.loss.named_parameters() if p.requires_grad}
+        log_alpha = trained.pop("log_alpha")
+        self.optimizer = self.settings.optimizer(list(trained.values()), log_alpha)
+
+    @abstractmethod
+    def build_loss(self, critics: list[Critic]) -> nn.Module:
+        """Make `loss` on the device."""
+
+    @abstractmethod
+    def losses(self, batch: TensorDictBase) -> Mapping[str, Tensor]:
+        """loss_qvalue, loss_actor and loss_alpha, to be summed; alpha, entropy and value, the mean Q of own actions."""
+
+    @abstractmethod
+    def follow(self) -> None:
+        """Let the target critics follow the critics by `settings.tau`."""
+
+    def update(self, batch: TensorDictBase) -> dict[str, Tensor]:
+        """One gradient step of critics, actor and temperature, then of the target critics.
+
+        Args:
+            batch: replayed transitions (size,), as TorchRL's losses read them. The reward sums "steps_to_next_obs"
+                discounted ones, "terminated" leaves out time limits, "demonstrated" marks demonstrations.
+
+        Returns:
+            Scalars on the agent's device: critic_loss, actor_loss (without imitation), alpha, entropy, value.
+        """
+        rough = self.settings.product_dtype == torch.bfloat16
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=rough):
+            losses = self.losses(batch.to(self.device))
+        total: Tensor = losses["loss_qvalue"] + losses["loss_actor"] + losses["loss_alpha"]
+        torch.autograd.backward(total)
+        self.optimizer.step()
+        self.optimizer.zero_grad()
+        self.follow()
+        alpha, entropy, value = losses["alpha"], losses["entropy"], losses["value"]
+        return {
+            "critic_loss": losses["loss_qvalue"].detach(),
+            "actor_loss": -alpha * entropy - value,
+            "alpha": alpha,
+            "entropy": entropy,
+            "value": value,
+        }
+
+    def policy(self) -> Actor:
+        """A copy of the actor on the CPU, detached from the learner."""
+        return copy.deepcopy(self.actor).cpu().requires_grad_(False)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything needed to go on bit for bit: networks, targets, temperature, optimiser."""
+        return {"loss": self.loss.state_dict(), "optimizer": self.optimizer.state_dict()}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Inverse of `state_dict`; refuses a state of other shapes."""
+        self.loss.load_state_dict(state["loss"])
+        self.optimizer.load_state_dict(state["optimizer"])
+
+    def load_networks(self, state: dict[str, Any]) -> None:
+        """Warm start: networks and targets of a state, fresh optimiser and temperature."""
+        self.loss.load_state_dict(state["loss"] | {"log_alpha": self.loss.state_dict()["log_alpha"]})
+
+    def load_actor(self, actor: Actor) -> None:
+        """Warm start of the actor alone, as from a policy file: critics stay fresh."""
+        self.actor.load_state_dict(actor.state_dict())
+
+    def approximations(self) -> list[str]:
+        """Deviations from exact float32 arithmetic, one sentence each, printed at the start of a run."""
+        if self.settings.product_dtype != torch.bfloat16:
+            return []
+        asked = f"agent.precision={self.settings.precision}"
+        return [f"{asked}: matrix products in bfloat16, parameters and optimiser in float32"]
