@@ -32,7 +32,8 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     speeds = np.maximum(speeds, SMALL * spans / time)
     torques = _torques(recording, VELOCITY_WINDOW * time)
     accelerating = inertia * speeds**2 / spans  # where the drive does nothing and somebody else moves the joint
-    often, usual, seldom = (np.maximum(_quantile(torques, q), SMALL * accelerating) for q in (OFTEN, USUAL, SELDOM))
+    least = accelerating * np.where(np.max([one.max(axis=0) for one in torques], axis=0) > 0.0, SMALL, 1.0)
+    often, usual, seldom = (np.maximum(_quantile(torques, q), least) for q in (OFTEN, USUAL, SELDOM))
     commanded = [np.abs(np.diff(trial.command, axis=0)) / trial.step for trial in recording.trials]
     command_speed = speeds if recording.torque_controlled else _quantile(commanded, FAST)
     masses, leaders = _moved_masses(tree), {coupling.joint for coupling in recording.coupled.values()}
