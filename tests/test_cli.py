@@ -8,6 +8,7 @@ import pytest
 from hydra.errors import HydraException
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
+from omegaconf.errors import MissingMandatoryValue
 from torchrl.objectives import REDQLoss, SACLoss, TD3Loss
 
 from tactile_cube import cli
@@ -17,6 +18,7 @@ from tactile_cube.api.environment import env_config
 from tactile_cube.command_help import help_text
 from tactile_cube.composition import composed, refuse_unknown_keys
 from tactile_cube.curriculum import NoCurriculum
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.errors import InputError
 from tactile_cube.sweep import sweep_folder
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
@@ -59,6 +61,23 @@ def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:
     wrapped = RuntimeError("Error in call to target")
     wrapped.__cause__ = InputError("row 3: NaN")
     assert usage_error(wrapped) == "row 3: NaN"
+
+
+@pytest.mark.parametrize(("key", "said"), [("out", " (folder to write)"), ("nothing", "")])
+def test_a_missing_value_is_told_with_its_meaning(key: str, said: str) -> None:
+    with pytest.raises(MissingMandatoryValue) as info:
+        _ = OmegaConf.create({key: "???"})[key]
+    assert usage_error(info.value) == f"{key}=... is missing{said}"
+
+
+@pytest.mark.parametrize(
+    ("word", "near"), [("stribek", "stribeck_friction"), ("coulom", "coulomb_friction"), ("s", "")]
+)
+def test_the_beginning_of_a_name_tells_it(word: str, near: str) -> None:
+    offered = suggestion(
+        word, ["viscous_friction", "coulomb_friction", "stribeck_friction"] if word != "s" else ["torque"]
+    )
+    assert offered == (near and f"; did you mean {near}?")
 
 
 @pytest.mark.parametrize("choice", ["task=1", "task=[1]"])

@@ -1,12 +1,15 @@
 """What a mistyped name may have meant: a command, an option, a key, a policy, an effect or a joint."""
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import yaml
 
 from tactile_cube.command_help import CONFIG
+
+SHORTEST = 5  # letters of the beginning of a name that tell it
 
 
 def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
@@ -22,8 +25,18 @@ def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
         '; did you mean evaluate?'
     """
     names = [*known]
+    beginnings = {name[: len(word) + 1]: name for name in reversed(names) if len(word) >= SHORTEST}
     near = difflib.get_close_matches(word, names, 1, 0.75) or [name for name in names if word and word in name]
+    near = near or [beginnings[one] for one in difflib.get_close_matches(word, beginnings, 1, 0.75)]
     return f"; did you mean {prefix}{near[0]}?" if near else ""
+
+
+def meaning(key: str) -> str:
+    """Return what the configuration says in brackets of a key that must be set, or nothing."""
+    line = re.compile(rf"^ *{re.escape(key.rpartition('.')[2])}: \?\?\? *# *(.*)$", re.MULTILINE)
+    files = sorted(CONFIG.rglob("*.yaml"), key=lambda path: len(path.parts))
+    found = next((match for file in files if (match := line.search(file.read_text(encoding="utf-8")))), None)
+    return f" ({found[1]})" if found else ""
 
 
 def near_key(name: str) -> str:

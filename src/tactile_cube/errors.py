@@ -1,4 +1,6 @@
-"""The one error that a user's input can cause."""
+"""The one error that a user's input can cause, and what is said of input that is odd but can be used."""
+
+import sys
 
 
 class InputError(ValueError):
@@ -7,3 +9,9 @@ class InputError(ValueError):
     The message names the file, key, column or row, the value received and what to do. The command line prints it as
     one line and exits with status 2.
     """
+
+
+def warn(line: str) -> None:
+    """Say what is odd or in doubt, in yellow on a terminal."""
+    yellow, plain = ("\x1b[33m", "\x1b[0m") if sys.stderr.isatty() else ("", "")
+    print(f"{yellow}warning: {line}{plain}", file=sys.stderr)

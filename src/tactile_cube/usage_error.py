@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Iterator
 from typing import Any
 
-from tactile_cube.did_you_mean import near_key, suggestion
+from tactile_cube.did_you_mean import meaning, near_key, suggestion
 from tactile_cube.errors import InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -50,10 +50,12 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 def _one_line(error: BaseException) -> str:
     from hydra.errors import InstantiationException, MissingConfigException
-    from omegaconf.errors import OmegaConfBaseException
+    from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
     from pydantic import ValidationError
 
     cause = error.__cause__ or error.__context__
+    if isinstance(error, MissingMandatoryValue):
+        return f"{error.full_key}=... is missing{meaning(str(error.full_key))}"
     if isinstance(error, ValidationError):
         return "; ".join(_described(error.title, dict(entry)) for entry in error.errors())
     if isinstance(error, MissingConfigException) and error.missing_cfg_file:

@@ -43,7 +43,7 @@ def test_columns_that_are_said_are_taken(tmp_path: Path) -> None:
 
 def test_an_error_names_the_row(tmp_path: Path) -> None:
     file, urdf = log(tmp_path, HEAD + "\n".join([*ROWS[:50], ROWS[20], *ROWS[51:]]))
-    with pytest.raises(InputError, match=r"run.csv: column 'time', row 50: time runs backwards"):
+    with pytest.raises(InputError, match=r"run.csv: column 't', row 50: time runs backwards"):
         import_logs(tmp_path / "out", [file], urdf, GAINS)
     assert not (tmp_path / "out").exists()
 

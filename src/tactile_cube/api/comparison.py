@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import ModelFile, as_model
+from tactile_cube.errors import warn
 from tactile_cube.identification.contact.trial import compare_contact
 from tactile_cube.measurement.bench import has_free_motion, with_object, without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
@@ -111,7 +111,7 @@ def opened(recording: Recording | PathLike) -> Recording:
         return recording
     read = read_recording(str(recording))  # on the command line 2026 is a number
     for line in read.warnings:
-        print(f"warning: {line}", file=sys.stderr)
+        warn(line)
     return read
 
 

@@ -164,7 +164,7 @@ def in_time(
         say: takes a line where they become earlier.
         known: the model to begin with; None: what the recording's owner states.
     """
-    if recording.description.controller.mode == "torque":
+    if recording.torque_controlled:
         return recording
 
     rows, (error, reading) = 0, _fitted(recording, effects, known)

@@ -24,6 +24,7 @@ from tactile_cube.measurement.recordings.writing import (
 )
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
 from tactile_cube.measurement.sources.csv_files import CsvFiles, kinds_of
+from tactile_cube.measurement.sources.log_file import read_logs
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import write_whole
 
@@ -97,11 +98,11 @@ def preview(file: Path, urdf: Path) -> Preview:
     Raises:
         InputError: a file that cannot be read.
     """
-    table = read_table(file, only_numbers=False)
+    table = read_logs(file)[0].table
     joints = [name for name, joint in read_rig(urdf).joints.items() if joint.mimics is None]
     rows = [[float(column[k]) for column in table.values()] for k in range(min(SHOWN, len(next(iter(table.values())))))]
     try:
-        guess, doubt = map_columns(list(table), joints, {}, False), ""
+        guess, doubt = map_columns(list(table), joints, {}), ""
     except InputError as error:
         guess, doubt = None, str(error)
     return Preview(joints, list(table), rows, guess, doubt)
@@ -163,7 +164,8 @@ def _added(before: Recording, made: RecordingTables, controller: Mapping[str, An
             note=table.entry.note,
         )
         new.append(replace(table, entry=entry))
-    return RecordingTables(before.description, before.urdf, [*old, *new])
+    doubts = [*before.description.doubts, *made.description.doubts]
+    return RecordingTables(before.description.model_copy(update={"doubts": doubts}), before.urdf, [*old, *new])
 
 
 def _in_a_line(what: str, how: str, by: str) -> str:

@@ -6,7 +6,6 @@ import numpy as np
 import polars
 import pytest
 
-from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recordings
@@ -55,8 +54,7 @@ def test_stated_damping_is_a_free_effect_of_the_nominal_model(tmp_path: Path) ->
     assert (term.label, term.values["damping"], term.fitted) == ("viscous_friction@a", 0.04, ("damping",))
 
 
-def test_motors_leave_the_gains_to_the_user(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"source\.controller\.kp and source\.controller\.kd"):
-        imported(tmp_path, MOTORS)
+def test_motors_leave_the_gains_unknown(tmp_path: Path) -> None:
+    assert imported(tmp_path, MOTORS).description.unknown[:2] == ["kp", "kd"]
     (tmp_path / "torques").mkdir()
     assert imported(tmp_path / "torques", MOTORS, controller={"mode": "torque"}).torque_controlled

@@ -22,7 +22,7 @@ TOLERANCE = {
     "stiffness": (0.8, 1.25),
 }
 """Part of the nominal value at which a constant still counts as the nominal one; more is an effect that is missing."""
-MEASURED = (0.2, 5.0)
+MEASURED, UNKNOWN = (0.2, 5.0), (0.02, 50.0)
 SPREAD = 0.12  # relative standard deviation of a true constant about its nominal value
 OFFSET, OFFSET_SPREAD = 0.05, 0.01  # [rad] of a finger
 READING_SPREAD = 0.3  # rows: as if a reading came at any time within half a row of its stamp
@@ -44,7 +44,7 @@ def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
         wide["kp"] = MEASURED
     if any(trial.clamped for trial in recording.trials):
         wide["stiffness"] = MEASURED
-    return TOLERANCE | wide
+    return TOLERANCE | wide | dict.fromkeys(recording.description.unknown, UNKNOWN)
 
 
 def base_unknowns(
@@ -53,7 +53,7 @@ def base_unknowns(
     """Constants that a refit may change, about their `nominal` values, and the joint offsets of each initialisation."""
     joints = range(len(recording.joints))
     constants = [
-        _around_nominal(key, j, float(nominal[key][j]), low, high)
+        _around_nominal(key, j, float(nominal[key][j]), low, high, key in recording.description.unknown)
         for key, (low, high) in tolerance(recording).items()
         for j in joints
         if 0.0 < nominal[key][j] < np.inf
@@ -92,7 +92,6 @@ def _reading_delay(joint: int, row: float) -> Unknown:
     return Unknown("constant", "reading_delay", joint, -row, row, 0.1 * row, spread=READING_SPREAD * row)
 
 
-def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float) -> Unknown:
-    return Unknown(
-        "constant", key, joint, nominal * low, nominal * high, 0.2 * nominal, centre=nominal, spread=SPREAD * nominal
-    )
+def _around_nominal(key: str, joint: int, nominal: float, low: float, high: float, unknown: bool) -> Unknown:
+    spread = (high if unknown else SPREAD) * nominal
+    return Unknown("constant", key, joint, nominal * low, nominal * high, 0.2 * nominal, centre=nominal, spread=spread)

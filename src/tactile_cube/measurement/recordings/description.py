@@ -37,7 +37,9 @@ class Controller(Strict):
     kp: PerJoint = 0.0  # [N m/rad], a number for all joints or one per joint
     kd: PerJoint = 0.0  # [N m s/rad]
     torque_limit: PerJoint = float("inf")  # [N m]
-    mode: Literal["position", "torque"] = "position"  # torque: commands are torques [N m]; kp and kd are not used
+    # torque: commands are torques [N m]; kp and kd are not used. voltage: so much of a motor's voltage, kt / R u [N m],
+    # beside which kd, kt^2 / R of its back-EMF, acts
+    mode: Literal["position", "torque", "voltage"] = "position"
     rate_hz: Rate | None = None  # how often it computes its torque; None: not known, so all the time
 
 
@@ -134,6 +136,9 @@ class Description(Strict):
     object: HeldObject | None = None  # what is held in trials that say so
     trials: Annotated[list[TrialEntry], Field(min_length=1)]
     source: str = ""  # where the data come from
+    # what nobody states; the numbers given for it are guesses, and identification begins with them
+    unknown: list[Literal["kp", "kd", "reflected_inertia"]] = Field(default_factory=list)
+    doubts: list[str] = Field(default_factory=list)  # what the import could not prove, and what it left out
 
     @model_validator(mode="after")
     def _consistent(self) -> "Description":

@@ -20,6 +20,7 @@ IN_MILLIMETRES = "this looks like mm, recordings are in m: import it by record s
 SLACK = 0.1  # [rad] beyond a joint's limit that offsets and soft stops explain
 WRAP = 0.5  # [rad] within which a jump is a whole turn; no joint turns so far in a row
 SMOOTH = 0.05  # of the command's scatter, below which a position is none that a sensor measured
+MIRRORED = 0.7  # of a command's size and of the gain of slow motion, below which a sign is not flipped for sure
 LEAST_FOLLOWED = 0.2  # part of a motor's motion that a link makes, whatever the gap between them
 MOVES = 0.02  # [rad] range below which a signal says nothing about its neighbours
 
@@ -68,18 +69,27 @@ def _check_one_in_degrees(joint: str, command: Array, position: Array, path: Pat
             )
 
 
-def _check_gain(joint: str, columns: TrialColumns, index: int, gains: Gains, path: Path) -> list[str]:
-    """Torque against the impedance law: its slope is 1 in the right units, whatever friction does."""
+def torque_over_law(columns: TrialColumns, index: int, gains: Gains) -> float | None:
+    """Times the impedance law that a joint's measured torque is: 1 in the right units, whatever friction does.
+
+    None: the one does not go with the other.
+    """
     if columns.torque is None:
-        return []
+        return None
     position, torque = columns.position[:, index], columns.torque[:, index]
     velocity = np.gradient(np.convolve(np.pad(position, 5, mode="edge"), np.ones(11) / 11, "valid"), columns.time)
     expected = gains.kp[index] * (columns.command[:, index] - position) - gains.kd[index] * velocity
     if np.std(expected) == 0 or _correlation(expected, torque) < 0.8:
+        return None
+    return float(np.std(torque) / np.std(expected))
+
+
+def _check_gain(joint: str, columns: TrialColumns, index: int, gains: Gains, path: Path) -> list[str]:
+    slope, position = torque_over_law(columns, index, gains), columns.position[:, index]
+    if slope is None:
         return []
-    slope = float(np.std(torque) / np.std(expected))
     if 0.8 < slope / DEGREE < 1.25:
-        row = int(np.argmax(np.abs(expected)))
+        row = int(np.argmax(np.abs(columns.command[:, index] - position)))
         raise InputError(
             f"{path}: column '{joint}.position', row {row}: {position[row]:.4g}, and the torque is pi/180 of "
             f"kp (command - position): {IN_DEGREES}"
@@ -110,10 +120,13 @@ def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) 
         own = _correlation(command, position)
         row = int(np.argmax(np.abs(position - command)))
         if own < -0.8:
-            raise InputError(
+            said = (
                 f"{path}: column '{joint.name}.position', row {row}: {position[row]:.4g} at command "
-                f"{command[row]:.4g}: the joint moves against its command (correlation {own:.2f}); flip the sign"
+                f"{command[row]:.4g}: the joint moves against its command (correlation {own:.2f}); "
             )
+            if _mirrored(command, position):
+                raise InputError(said + "flip the sign")
+            warnings.append(said + "is its sign flipped, or is the command faster than the joint's resonance?")
         others = [_correlation(other, position) if np.ptp(other) > MOVES else 0.0 for other in columns.command.T]
         leader = int(np.argmax(others))
         if own < 0.4 and others[leader] > 0.9:
@@ -126,6 +139,24 @@ def check_assignment(columns: TrialColumns, joints: list[RigJoint], path: Path) 
                 raise InputError(said + "are the joints swapped?")
             warnings.append(said + "does the neighbour drag it along, or is it a copy of the neighbour's column?")
     return warnings
+
+
+def _mirrored(command: Array, position: Array) -> bool:
+    """Whether a joint moves as far as its command and against it, in slow motion as in fast.
+
+    Beyond its resonance it moves against its command too, but the less the faster.
+    """
+    asked, moved = (np.fft.rfft(one - one.mean())[1:] for one in (command, position))
+    power = np.cumsum(np.abs(asked) ** 2)
+    slow = power <= power[-1] / 2
+    slow[0] = True
+    if slow.all():
+        return False
+    gains = [
+        -float(np.vdot(asked[band], moved[band]).real / np.vdot(asked[band], asked[band]).real)
+        for band in (slow, ~slow)
+    ]
+    return MIRRORED < gains[0] < 1 / MIRRORED and gains[1] > MIRRORED * gains[0]
 
 
 def check_roles(columns: TrialColumns, joints: tuple[str, ...], path: Path) -> list[str]:

@@ -71,10 +71,10 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     file, joints = folder / DESCRIPTION, tuple(description.joints)
     nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
     check_nominal(nominal, joints)
-    warnings = [f"{file}: {line}" for line in check_coupling(description, rig)]
+    warnings = [f"{file}: {line}" for line in (*description.doubts, *check_coupling(description, rig))]
     trials, gains, left = [], gains_of(description, None, "controller"), limits.NUMBERS
     undamped = [joint for joint, kd in zip(joints, gains.kd, strict=True) if kd == 0]
-    if description.controller.mode != "torque" and undamped:
+    if description.controller.mode == "position" and undamped:
         warnings.append(f"{file}: key 'controller.kd': 0 for {', '.join(undamped)}: no damping")
     for index, entry in enumerate(description.trials):
         path = below(folder, entry.file, f"{file}: key 'trials.{index}.file'")

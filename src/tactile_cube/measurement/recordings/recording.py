@@ -89,8 +89,8 @@ class Recording:
 
     @property
     def torque_controlled(self) -> bool:
-        """Whether commands are torques [N m]."""
-        return self.description.controller.mode == "torque"
+        """Whether commands are torques [N m], of a motor's voltage too."""
+        return self.description.controller.mode != "position"
 
     @property
     def units(self) -> dict[str, str]:
@@ -100,7 +100,9 @@ class Recording:
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
         values = getattr(self.gains, constant, self.nominal.get(constant))
-        return None if values is None else float(values[self.joints.index(joint)])
+        return (
+            None if values is None or constant in self.description.unknown else float(values[self.joints.index(joint)])
+        )
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
         """The mechanism.

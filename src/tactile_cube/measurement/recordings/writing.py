@@ -2,7 +2,6 @@
 
 import io
 import shutil
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +13,7 @@ import polars
 import yaml
 from numpy.typing import NDArray
 
-from tactile_cube.errors import InputError
+from tactile_cube.errors import InputError, warn
 from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
@@ -132,8 +131,7 @@ def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
     try:
         for name, tables in parts.items():
             _say_understood(tables.understood)
-            write_recording(aside / name, tables)
-            recording = _read_back(aside / name, tables, out / name)
+            recording = _written(aside / name, tables, out / name)
             seconds = sum(trial.duration for trial in recording.trials)
             kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
             count = "1 trial" if len(recording.trials) == 1 else f"{len(recording.trials)} trials"
@@ -146,13 +144,16 @@ def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
 
 def _say_understood(rows: Sequence[tuple[str, str, str]]) -> None:
     if rows:
-        widths = [max(len(row[k]) for row in rows) for k in (0, 1)]
+        widths = [max(len(row[0]) for row in rows), max((len(row[1]) for row in rows if row[2]), default=0)]
         lines = [f"  {what:<{widths[0]}}  {how:<{widths[1]}}  {by}".rstrip() for what, how, by in rows]
         print("\n".join(["understood, and what told it:", *lines]))
 
 
-def _read_back(folder: Path, tables: RecordingTables, place: Path) -> Recording:
-    """Read what was written; messages name the user's files in place of those that were made from them."""
+def _written(folder: Path, tables: RecordingTables, place: Path) -> Recording:
+    """Write a recording and read it back, without those of its trials that cannot be used, the fewer half at most.
+
+    Messages name the user's files in place of those that were made from them.
+    """
 
     def with_origins(message: str) -> str:
         for table in tables.tables:
@@ -160,10 +161,24 @@ def _read_back(folder: Path, tables: RecordingTables, place: Path) -> Recording:
                 message = message.replace(str(folder / table.entry.file), str(table.origin))
         return message.replace(str(folder), str(place))
 
-    try:
-        recording = read_recording(folder)
-    except InputError as error:
-        raise InputError(with_origins(str(error))) from None
+    left: list[str] = []
+    while True:
+        write_recording(folder, tables)
+        try:
+            recording = read_recording(folder)
+            break
+        except InputError as error:
+            said = str(error)
+            rest = [table for table in tables.tables if f"{folder / table.entry.file}:" not in said]
+            left.append(with_origins(said))
+            if len(rest) == len(tables.tables):
+                raise InputError(left[-1]) from None
+            if len(rest) < len(left):
+                raise InputError(left[0]) from None
+        doubts = [*tables.description.doubts, f"left out: {left[-1]}"]
+        description = tables.description.model_copy(update={"doubts": doubts})
+        tables = replace(tables, tables=rest, description=description)
+        shutil.rmtree(folder)
     for line in recording.warnings:
-        print(f"warning: {with_origins(line)}", file=sys.stderr)
+        warn(with_origins(line))
     return recording

@@ -102,7 +102,8 @@ def _drawn(estimate: Estimate, spread: float, rng: np.random.Generator) -> float
 def _estimates(recording: Recording, known: ModelFile | None) -> dict[str, list[Estimate]]:
     believed = {key: getattr(recording.gains, key) for key in CONTROLLER}
     if recording.torque_controlled:
-        believed |= {"kp": np.full(len(recording.joints), TORQUE_MODE_GAIN), "kd": np.zeros(len(recording.joints))}
+        back_emf = recording.gains.kd * (recording.description.controller.mode == "voltage")
+        believed |= {"kp": np.full(len(recording.joints), TORQUE_MODE_GAIN), "kd": back_emf}
     for key, value in DEFAULTS.items():
         believed[key] = recording.nominal.get(key, np.full(len(recording.joints), value))
     rows = {key: [Estimate(value=float(v), low=float(v), high=float(v)) for v in row] for key, row in believed.items()}

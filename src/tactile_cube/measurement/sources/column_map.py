@@ -1,11 +1,12 @@
 """Which column is which signal of which joint, as far as the user did not say, guessed from the names."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.columns import SIGNALS
-from tactile_cube.measurement.sources.units import UNITS, of_motor, words
+from tactile_cube.measurement.sources.units import NO_TORQUE, UNITS, of_motor, words
 
 Given = Mapping[str, str | Mapping[str, str]]
 EXAMPLE = "source.columns='{time: TIME, JOINT: {command: COLUMN, position: COLUMN, torque: COLUMN}}'"
@@ -15,18 +16,22 @@ def _vocabulary(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-TIME = _vocabulary("time timestamp stamp elapsed clock zeit millis micros secs sec seconds")
+TIME = _vocabulary("time timestamp stamp elapsed clock zeit uhrzeit millis micros secs sec seconds")
 COMMAND = _vocabulary(
     "command cmd commanded goal target desired des ref reference setpoint sp soll action demand demanded"
 )
-POSITION = _vocabulary("position pos angle q measured meas actual present state encoder enc ist theta feedback joint")
+POSITION = _vocabulary(
+    "position pos angle q measured meas actual present state observation encoder enc ist theta feedback joint"
+)
 LINK, FEEDFORWARD = _vocabulary("link load output secondary"), _vocabulary("feedforward forward ff")
 ANGLE = _vocabulary("position pos angle q encoder enc theta")  # a "Present Load" is none
 TORQUE = _vocabulary("torque tau effort moment force nm mnm")
 NOT_USED = _vocabulary(  # load: of hobby servos, a share of something
     "velocity vel speed dq qdot qvel omega acc acceleration ddq current curr voltage volt temperature temp pwm "
-    "error err status index frame load link"
+    "volts duty enable enabled flag error err status index frame load link"
 )
+VOLTAGE, SUPPLY = _vocabulary("voltage volt volts"), _vocabulary("bus vbus supply battery input vin")
+ELEMENT = re.compile(r"\[\d+\]$")  # of an array
 DESIRED = (["q", "d"], ["qd"])  # desired position in some papers, speed in others
 
 
@@ -37,6 +42,7 @@ class ColumnMap:
     time: str | None  # None where the rows have no time of their own
     joints: dict[str, dict[str, str]]  # joint -> one of SIGNALS -> column
     unused: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -45,30 +51,56 @@ class ColumnMap:
         return signals if self.time is None else [self.time, *signals]
 
 
-def map_columns(names: Sequence[str], joints: Sequence[str], given: Given, torque_mode: bool) -> ColumnMap:
+def time_of(names: Sequence[str]) -> str | None:
+    """The column of time, by its name."""
+    return min((name for name in names if _signal_of(name) == "time"), key=lambda name: len(words(name)), default=None)
+
+
+def map_columns(
+    names: Sequence[str], joints: Sequence[str], given: Given, mode: str = "position", flags: Collection[str] = ()
+) -> ColumnMap:
     """The map of a table's columns: joints as `given`, or else all of `joints` that the names of columns show.
+
+    Args:
+        names: of the columns.
+        joints: that may be meant, in the URDF's order.
+        given: what the user said.
+        mode: position, torque, voltage or free, which needs no command.
+        flags: columns of 0 and 1 alone, which are no torques.
 
     Raises:
         InputError: something is missing or can be read in two ways.
     """
     said = {joint: dict(entry) for joint, entry in given.items() if isinstance(entry, Mapping)}
-    chosen = said or _guessed(names, joints, torque_mode)
-    _require_whole(chosen, names, torque_mode)
-    stamps = [name for name in names if _signal_of(name) == "time"]
-    time = given.get("time", min(stamps, key=lambda name: len(words(name)), default=None))
+    chosen = said or _guessed(names, joints, mode, flags)
+    _require_whole(chosen, names, mode)
+    time = given.get("time", time_of(names))
     used = {time, *(column for entry in chosen.values() for column in entry.values())}
-    return ColumnMap(str(time) if time is not None else None, chosen, tuple(n for n in names if n not in used))
+    unused, doubts = tuple(name for name in names if name not in used), []
+    arrays = [name for name in unused if ELEMENT.search(name) and ELEMENT.sub("[0]", name) in used]
+    if arrays and not said:
+        doubts = [
+            f"{', '.join(arrays)}: more columns than joints of the URDF ({', '.join(joints)}), taken in its order"
+        ]
+    return ColumnMap(str(time) if time is not None else None, chosen, unused, tuple(doubts))
 
 
-def _guessed(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> dict[str, dict[str, str]]:
-    signals = _signals(names, joints, torque_mode)
+def _guessed(
+    names: Sequence[str], joints: Sequence[str], mode: str, flags: Collection[str]
+) -> dict[str, dict[str, str]]:
+    signals = _signals(names, joints, mode, flags)
     owners = _owners(list(signals), joints)
     free = {signal: name for name, signal in signals.items() if not owners[name]}
-    if {"command", "position"} <= set(free) and not any(owners.values()):
+    if set(NEEDED[mode]) <= set(free) and not any(owners.values()):
+        command = f"'{free['command']}' looks like a command and " if "command" in free else ""
         raise InputError(
-            f"source.columns: '{free['command']}' looks like a command and '{free['position']}' like a position, but "
+            f"source.columns: {command}'{free['position']}' {'looks ' * (not command)}like a position, but "
             f"of which joint? The URDF has {', '.join(joints)}: say it by {EXAMPLE}"
         )
+    for name, signal in signals.items():
+        # what names no joint is the only joint's if it has no such signal yet
+        if len(joints) == 1 and not owners[name] and list(signals.values()).count(signal) == 1:
+            owners[name] = joints[0]
     found: dict[str, dict[str, str]] = {}
     for name, signal in signals.items():
         entry = found.setdefault(owners[name], {})
@@ -85,24 +117,25 @@ def _guessed(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> 
     for entry in found.values():
         if "link_position" in entry and "position" not in entry:
             entry["position"] = entry.pop("link_position")  # the only sensor there is
-    return {joint: found[joint] for joint in joints if len({"command", "position"} & set(found.get(joint, ()))) == 2}
+    return {joint: found[joint] for joint in joints if set(NEEDED[mode]) <= set(found.get(joint, ()))}
 
 
-def _signals(names: Sequence[str], joints: Sequence[str], torque_mode: bool) -> dict[str, str]:
+def _signals(names: Sequence[str], joints: Sequence[str], mode: str, flags: Collection[str]) -> dict[str, str]:
     """Column -> command, position or torque."""
     signals: dict[str, str] = {}
     for name in names:
         signal = _signal_of(name)
         if signal is None and any(_without_unit(name) == words(joint) for joint in joints):
             signal = "position"
-        if signal is not None and signal != "time":
+        if signal is not None and signal != "time" and not (name in flags and signal.startswith("torque")):
             signals[name] = signal
     if "command" not in signals.values():
         plain = {name: [word for word in _without_unit(name) if not word.isdigit()] for name in names}
         signals |= {name: "command" for name in names if plain[name] in DESIRED}
-    if not torque_mode:
-        return {name: signal for name, signal in signals.items() if signal != "torque_command"}
-    asked = next((one for one in ("torque_command", "torque") if one in signals.values()), "command")
+    if mode == "position":
+        return {name: signal for name, signal in signals.items() if signal in SIGNALS}
+    wanted = {"torque": ("torque_command", "torque"), "voltage": ("voltage",), "free": ("",)}[mode]
+    asked = next((one for one in wanted if one in signals.values()), "command" if mode != "free" else "")
     kept = {name: signal for name, signal in signals.items() if signal in ("position", "link_position", asked)}
     return {name: "command" if signal == asked else signal for name, signal in kept.items()}
 
@@ -112,6 +145,9 @@ def _owners(names: Sequence[str], joints: Sequence[str]) -> dict[str, str]:
     named = {n: max((joint for joint in joints if _names(n, joint)), key=len, default="") for n in names}
     if any(named.values()):
         return named
+    places = {name: int(words(name)[-1]) if ELEMENT.search(name) else -1 for name in names}
+    if min(places.values(), default=-1) == 0:
+        return {name: joints[place] if place < len(joints) else "" for name, place in places.items()}
     numbers = {name: [int(word) for word in words(name) if word.isdigit()][-1:] for name in names}
     known = [number for last in numbers.values() for number in last]
     if known and min(known) <= 1 and max(known) - min(known) < len(joints):
@@ -119,16 +155,21 @@ def _owners(names: Sequence[str], joints: Sequence[str]) -> dict[str, str]:
     return dict.fromkeys(names, joints[0] if len(joints) == 1 else "")
 
 
-def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str], torque_mode: bool) -> None:
-    what = "command (a torque)" if torque_mode else "command"
+NEEDED = {mode: ("command", "position") for mode in ("position", "torque", "voltage")} | {"free": ("position",)}
+"""Mode -> signals that a joint must have."""
+COMMANDED = {"position": "command", "torque": "command (a torque)", "voltage": "command (a voltage)"}
+
+
+def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str], mode: str) -> None:
     if not chosen:
-        hint = "" if torque_mode else ", or source.controller.mode=torque where torques were commanded"
+        what = "a position" if mode == "free" else f"both a {COMMANDED[mode]} and a position"
+        hint = ", or source.controller.mode=torque, voltage or free (a swing without command)"
         raise InputError(
-            f"source.columns: no joint of the URDF has both a {what} and a position among the columns {list(names)}; "
-            f"say which they are: {EXAMPLE}{hint}"
+            f"source.columns: no joint of the URDF has {what} among the columns {list(names)}; "
+            f"say which they are: {EXAMPLE}{hint if mode == 'position' else ''}"
         )
     for joint, entry in chosen.items():
-        missing = [signal for signal in ("command", "position") if signal not in entry]
+        missing = [signal for signal in NEEDED[mode] if signal not in entry]
         if missing:
             raise InputError(
                 f"source.columns.{joint}: {' and '.join(missing)} missing, received {dict(entry)}; expected "
@@ -139,7 +180,7 @@ def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str]
 
 
 def _signal_of(name: str) -> str | None:
-    """What a column's name promises: time, one of SIGNALS, torque_command or None."""
+    """What a column's name promises: time, one of SIGNALS, torque_command, voltage or None."""
     said = words(name)
     if TIME & set(said) or (said[:1] == ["t"] and len(said) <= 2):
         return "time"
@@ -147,6 +188,10 @@ def _signal_of(name: str) -> str | None:
     if FEEDFORWARD & set(said):
         torque = TORQUE & set(said) or (said[-1] == "feedforward" and not NOT_USED & set(said))
         return "feedforward" if torque else None
+    if VOLTAGE & set(said):
+        return None if SUPPLY & set(said) else "voltage"
+    if TORQUE & set(said) and NO_TORQUE & set(said):
+        return None
     if TORQUE & set(said):
         return "torque_command" if commanded else "torque"
     if LINK & set(said) and ANGLE & set(said) and not commanded:

@@ -1,23 +1,28 @@
 """In which unit a column is: what the user says, or its name, or its values."""
 
+import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.rig import RigJoint
+from tactile_cube.untrusted_file import read_text
 
 Array = NDArray[np.float64]
-WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+Spans = Mapping[str, float]
+WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+")
 UNITS: dict[str, tuple[str, ...]] = {
     "deg": ("deg", "degs", "degree", "degrees"), "rad": ("rad", "rads", "radian", "radians"), "mrad": ("mrad",),
     "turn": ("turn", "turns", "rev", "revs", "revolutions"),
     "s": ("s", "sec", "secs", "second", "seconds"), "ms": ("ms", "msec", "millis", "milliseconds"),
-    "us": ("us", "usec", "micros", "microseconds"), "ns": ("ns", "nsec", "nanos", "nanoseconds"),
-    "mm": ("mm", "millimetres", "millimeters"), "um": ("um",),
+    "us": ("us", "µs", "μs", "usec", "micros", "microseconds"), "ns": ("ns", "nsec", "nanos", "nanoseconds"),
+    "mm": ("mm", "millimetres", "millimeters"), "um": ("um",), "V": ("v", "volt", "volts"), "mV": ("mv",),
 }  # fmt: skip
 TORQUE_UNIT = re.compile(r"(?<![a-z])(?:([mc]?)n[ .*·_]?m|n[ .*·_]?([mc])m)(?![a-z])", re.IGNORECASE)
 TORQUE_PREFIX = {"": "Nm", "m": "mNm", "c": "Ncm"}
@@ -26,6 +31,11 @@ LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TORQUE_UNITS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2}
 FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+VOLT_UNITS = {"V": 1.0, "mV": 1e-3}
+NO_TORQUE = frozenset({"voltage", "volt", "volts", "current", "curr", "pwm", "duty", "load", "status"})
+NO_TORQUE |= {"enable", "enabled", "flag", "mode", "limit"}
+"""Words of a name that say that it is no torque."""
+RANGE, LEROBOT = "range", re.compile(r"(action|observation)(?![a-z])", re.IGNORECASE)
 TICKS = frozenset({"tick", "ticks", "count", "counts", "raw"})
 USUAL_TICKS, FEWEST_TICKS = 4096, 16  # of a turn: of hobby servos, and of any encoder that tells an angle
 GEARED = 1.5  # turns of a motor a turn of its link, from which on there is a gear between them
@@ -65,6 +75,7 @@ class Unit:
     size: float
     source: str
     zero: float = 0.0
+    doubt: str = ""  # what nothing proves
 
     @property
     def said(self) -> bool:
@@ -93,43 +104,105 @@ def chosen_unit(said: str | int | None, name: str, units: Mapping[str, float], k
 def time_unit(said: str | None, name: str, time: Array) -> Unit:
     """Unit of time stamps; steps of more than 0.1 cannot be seconds, of more than 100 no milliseconds, and so on."""
     chosen = chosen_unit(said, name, TIME_UNITS, "time_unit")
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    steps = np.diff(time)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     if chosen is not None and (said is not None or step * chosen.size <= 10 * SLOWEST):
         return chosen
     unit = next((unit for unit, size in TIME_UNITS.items() if step * size <= SLOWEST * 1.001), "ns")
     return Unit(unit, TIME_UNITS[unit], f"steps of {step:g}")
 
 
-def position_unit(said: str | int | None, name: str, values: Array, joint: RigJoint) -> Unit:
+def position_unit(
+    said: str | int | None, name: str, values: Array, joint: RigJoint, spans: Spans = MappingProxyType({})
+) -> Unit:
     """Unit of angles (or metres of a sliding joint): the first that fits the joint's limits.
 
-    `said` may be the ticks of an encoder's turn.
+    `said` may be the ticks of an encoder's turn, or `range`: LeRobot's share of the calibrated range of each motor,
+    in which `spans` (motor -> [rad]) or else the joint's limits are -100 .. 100 (0 .. 100 of a gripper).
 
     Raises:
         InputError: no such unit, or ticks of which nothing tells how many a turn has.
     """
-    values = values[np.isfinite(values)]
-    if not values.size:
-        raise InputError(f"column '{name}': has no number")
-    if not joint.prismatic and said is not None and str(said).isdecimal():
-        return _ticks(int(said), values, joint, "source.angle_unit")
-    if not joint.prismatic and said is None and TICKS & set(words(name)) and not (values % 1.0).any():
+    if said == RANGE:
+        return _share(name, joint, spans)
+    lerobot = LEROBOT.match(name) is not None and not joint.prismatic
+    if lerobot and said in (None, "deg") and _grips(name, joint) and (spans or np.isfinite(joint.upper - joint.lower)):
+        share = _share(name, joint, spans)  # LeRobot's grippers have no degrees
+        return replace(share, doubt="" if said else f"taken for {share.name}, as LeRobot writes grippers")
+    if isinstance(said, int):
+        return _ticks(said, values, joint, "source.angle_unit")
+    if said is None and TICKS & set(words(name)) and not (values % 1.0).any():
         if not 0.0 <= values.min() <= values.max() < USUAL_TICKS:
             raise InputError(
                 f"column '{name}': ticks from {values.min():g} to {values.max():g}; of how many is a turn? "
                 "source.angle_unit=TICKS, for instance 4096"
             )
-        return _ticks(USUAL_TICKS, values, joint, f"its name; {USUAL_TICKS} a turn is assumed")
+        ticks = _ticks(USUAL_TICKS, values, joint, f"its name; {USUAL_TICKS} a turn is assumed")
+        return replace(ticks, doubt=f"{USUAL_TICKS} ticks a turn are assumed; source.angle_unit=TICKS if not")
     units = LENGTH_UNITS if joint.prismatic else ANGLE_UNITS
     chosen = chosen_unit(said, name, units, "length_unit" if joint.prismatic else "angle_unit")
     if chosen is not None:
         return chosen
-    by = "the joint's limits" if np.isfinite(joint.upper - joint.lower) else "no limits of the joint that would tell"
+    unit = _fitting(values, joint)
+    if lerobot and np.abs(values).max() <= 100.0:
+        doubt = "LeRobot writes degrees or -100 .. 100 of the calibrated range: source.angle_unit=deg or range"
+        return replace(unit, doubt=f"taken for {unit.name}; {doubt}")
+    return unit
+
+
+def _fitting(values: Array, joint: RigJoint) -> Unit:
+    """The first unit in which values fit the joint's limits, in doubt where there are none."""
+    key, names = ("length_unit", LENGTH_UNITS) if joint.prismatic else ("angle_unit", ANGLE_UNITS)
+    limited = bool(np.isfinite(joint.upper - joint.lower))
+    by = "the joint's limits" if limited else "no limits of the joint that would tell"
+    range_ = f"values {values.min():.3g} .. {values.max():.3g}"
     for unit in ("m", "mm") if joint.prismatic else ("rad", "deg"):
-        if joint.reaches(values * units[unit]):
-            return Unit(unit, units[unit], f"values {values.min():.3g} .. {values.max():.3g} and {by}")
-    first = next(iter(units))
-    return Unit(first, 1.0, "assumed: no unit fits the joint's limits")
+        if joint.reaches(values * names[unit]):
+            doubt = (
+                "" if limited else f"taken for {unit}, which no limits of the joint prove; source.{key}={unit} if so"
+            )
+            return Unit(unit, names[unit], f"{range_} and {by}", doubt=doubt)
+    first = next(iter(names))
+    doubt = f"taken for {first}, which does not fit the joint's limits ({range_}); source.{key}=UNIT"
+    return Unit(first, 1.0, "assumed: no unit fits the joint's limits", doubt=doubt)
+
+
+def _grips(name: str, joint: RigJoint) -> bool:
+    return "gripper" in {*words(name), *words(joint.name)}
+
+
+def _share(name: str, joint: RigJoint, spans: Spans) -> Unit:
+    """-100 .. 100 of a range about its middle, or 0 .. 100 of a gripper's from its lower limit on."""
+    motor = next((one for one in spans if set(words(one)) <= {*words(name), *words(joint.name)}), None)
+    span = spans[motor] if motor is not None else joint.upper - joint.lower
+    if not 0.0 < span < np.inf:
+        raise InputError(
+            f"source.angle_unit=range: joint '{joint.name}' has no limits; give source.calibration=FILE of the arm"
+        )
+    if spans and motor is None:
+        raise InputError(f"source.calibration: no motor of joint '{joint.name}'; it has {', '.join(spans)}")
+    by = f"source.calibration: {span:.4g} rad" if motor else f"source.angle_unit, {span:.4g} rad between its limits"
+    lower = joint.lower if np.isfinite(joint.lower) else 0.0
+    if _grips(name, joint):
+        return Unit("0 .. 100 of its range", span / 100.0, by, zero=-lower * 100.0 / span)
+    middle = 0.0 if motor is not None else 0.5 * (joint.lower + joint.upper)
+    return Unit("-100 .. 100 of its range", span / 200.0, by, zero=-middle * 200.0 / span)
+
+
+def calibrated_spans(path: Path) -> dict[str, float]:
+    """Motor -> range of motion [rad] of LeRobot's calibration file.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        motors = json.loads(read_text(path))
+        ticks = {name: float(one["range_max"]) - float(one["range_min"]) for name, one in motors.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(
+            f"{path}: not LeRobot's calibration, {{MOTOR: {{range_min: TICKS, range_max: TICKS}}}}: {error!r}"
+        ) from None
+    return {name: 2 * np.pi * one / USUAL_TICKS for name, one in ticks.items()}
 
 
 def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
@@ -144,7 +217,7 @@ def _ticks(turn: int, values: Array, joint: RigJoint, source: str) -> Unit:
     def outside(zero: float) -> tuple[float, float]:
         return max(float(np.max(joint.beyond((values - zero) * size))), 0.0), abs(middle - zero)
 
-    zero = min(0.0, turn / 2, key=outside)
+    zero = 0.0 if values.min() < 0.0 else min(0.0, turn / 2, key=outside)  # a counter that starts anew, or absolute
     return Unit(f"ticks, {zero:g} is zero", size, source, zero)
 
 
@@ -196,7 +269,29 @@ def same_unit(command: Unit, position: Unit, ratio: float) -> tuple[Unit, Unit]:
     return smaller, smaller
 
 
-def torque_unit(said: str | None, name: str, prismatic: bool) -> Unit:
-    """Unit of torques, or of a sliding joint's forces; N m or N where nothing is said."""
+def torque_unit(said: str | None, name: str, prismatic: bool, values: Array) -> Unit:
+    """Unit of torques, or of a sliding joint's forces; N m or N where nothing is said, in doubt.
+
+    Raises:
+        InputError: the column is no torque: its name says so, or it holds 0 and 1 alone.
+    """
     units = FORCE_UNITS if prismatic else TORQUE_UNITS
-    return chosen_unit(said, name, units, "torque_unit") or Unit(next(iter(units)), 1.0, "assumed")
+    unit, first = chosen_unit(said, name, units, "torque_unit"), next(iter(units))
+    if unit is None and (NO_TORQUE & set(words(name)) or is_flag(values)):
+        raise InputError(
+            f"column '{name}': {'0 and 1 alone are' if is_flag(values) else 'by its name'} no torque; leave it out of "
+            f"source.columns, use source.controller.mode=voltage with kt and R, or say source.torque_unit={first}"
+        )
+    doubt = f"taken for {first}, which nothing says; source.torque_unit={first} if so"
+    return unit or Unit(first, 1.0, "assumed", doubt=doubt)
+
+
+def is_flag(values: Array) -> bool:
+    """Whether a column holds both 0 and 1, and nothing else."""
+    return bool(np.isin(values, (0.0, 1.0)).all() and np.ptp(values) > 0)
+
+
+def voltage_unit(name: str, torque: float) -> Unit:
+    """Unit of a motor's voltage, which makes `torque` [N m] at standstill a volt."""
+    unit = chosen_unit(None, name, VOLT_UNITS, "") or Unit("V", 1.0, "assumed")
+    return Unit(f"{unit.name} x kt / R", unit.size * torque, f"source.controller.kt, R; {unit.source}")

@@ -1,0 +1,89 @@
+"""Gains of a position controller as a log shows them: a start for unknown ones, doubts about stated ones."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from tactile_cube import limits
+from tactile_cube.errors import InputError
+from tactile_cube.hand.rigid_body import RigidBodyTree
+from tactile_cube.measurement.recordings.rig import Rig
+from tactile_cube.measurement.recordings.writing import TrialTable
+
+Array = NDArray[np.float64]
+WINDOW = 0.05  # [s] over which a velocity is taken
+MOST, FEWEST = 600, 20  # samples of all trials, of one trial
+FOUND = ("kp", "kd", "reflected_inertia", "told")
+NO_ROTOR = 0.1  # part of the links' inertia that a rotor begins with at least
+TELLING = 0.2  # part of the error that the links' torque must explain before stated gains are doubted
+FAR = 15.0  # times by which a stated gain may differ: units differ by 57 and by 1000
+
+
+def estimated_gains(
+    trials: Sequence[TrialTable], joints: Sequence[str], rig: Rig, gravity: Sequence[float]
+) -> dict[str, list[float]]:
+    """Estimate kp [N m/rad], kd [N m s/rad] and reflected_inertia [kg m^2] of each joint.
+
+    Least squares with coefficients that are not negative: the error of the loop is (M dv + g(q) + J dv + kd v +
+    friction) / kp. Without weight or inertia of the links nothing tells kp, and a rotor as heavy as they is assumed.
+    `told` is the part of the error (0 .. 1) that the links explain.
+    """
+    try:
+        tree = RigidBodyTree.from_urdf(rig.text, tuple(joints))
+    except InputError as error:
+        raise InputError(f"{rig.path}: {error}") from None
+    usable = [trial for trial in trials if len(trial.time) > FEWEST and np.abs(trial.position).max() < limits.NUMBER]
+    motion = np.concatenate([_motion(trial) for trial in usable] or [np.zeros((0, 4, len(joints)))])
+    motion = motion[np.isfinite(motion).all(axis=(1, 2))][:: max(1, len(motion) // MOST)]
+    if not len(motion):
+        return {key: [float(key != "told")] * len(joints) for key in FOUND}
+    q, v, a, apart = motion.transpose(1, 0, 2)
+    links = tree.inverse_dynamics(q, v, a, np.asarray(gravity))
+    inertia = tree.actuated_mass_matrix(q.mean(axis=0)).diagonal().tolist()
+    rows = [_loop(*columns) for columns in zip(apart.T, links.T, v.T, a.T, inertia, strict=True)]
+    return {key: [row[k] for row in rows] for k, key in enumerate(FOUND)}
+
+
+def _motion(trial: TrialTable) -> Array:
+    """Position, velocity, acceleration and error of the loop (n, 4, joints)."""
+    step = float(np.median(np.diff(trial.time)))
+    rows = max(1, min(round(WINDOW / max(step, 1e-9)), len(trial.time) // 4))
+    smooth = np.stack([np.convolve(column, np.ones(rows) / rows, "valid") for column in trial.position.T], axis=1)
+    with np.errstate(all="ignore"):
+        velocity = np.gradient(smooth, step, axis=0)
+        acceleration = np.gradient(velocity, step, axis=0)
+    error = (trial.command - trial.position)[(rows - 1) // 2 :][: len(smooth)]
+    return np.stack([smooth, velocity, acceleration, error], axis=1)
+
+
+@np.errstate(all="ignore")
+def _loop(error: Array, links: Array, v: Array, a: Array, inertia: float) -> tuple[float, float, float, float]:
+    sliding = np.tanh(v / max(float(np.std(v)) / 5.0, 1e-9))
+    columns = np.stack([links, a, v, sliding, np.ones_like(v), -np.ones_like(v)], axis=1)
+    sizes = np.maximum(np.abs(columns).max(axis=0), 1e-12)
+    if not np.isfinite(columns / sizes).all():
+        return 1.0, 1.0, 1.0, 0.0
+    found, left = nnls(columns / sizes, error)
+    without = nnls(columns[:, 1:] / sizes[1:], error)[1]
+    softness, rotor, damping = (found / sizes)[:3]
+    told = 1.0 - left / without if without > 0.0 and softness > 0.0 else 0.0
+    if softness <= 0.0:
+        softness = (
+            rotor / inertia if rotor > 0.0 and inertia > 0.0 else float(np.std(error)) / max(float(np.std(links)), 1e-9)
+        )
+    kp = 1.0 / max(softness, 1e-6)
+    return kp, kp * damping or 0.01 * kp, max(kp * rotor, NO_ROTOR * inertia, 1e-6), told
+
+
+def gain_doubts(kp: Array, found: Mapping[str, Sequence[float]], unknown: bool) -> Iterator[str]:
+    """What to say of stated gains (joints,) that the links contradict, or of unknown ones that they leave open."""
+    if unknown and min(found["told"]) < TELLING:
+        yield "the links' weight and inertia tell little of kp: of gains and inertia only the ratios are known"
+    for one, seen, told in zip(kp, found["kp"], found["told"], strict=True):
+        if not unknown and told > TELLING and not 1.0 / FAR < one / seen < FAR:
+            yield (
+                f"controller.kp is {one:.3g} N m/rad, but the log with the URDF's masses looks like {seen:.3g}: is it "
+                "in N m/deg, or a gain of the firmware?"
+            )
