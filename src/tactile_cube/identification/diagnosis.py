@@ -16,7 +16,7 @@ from tactile_cube.identification.disturbances import Disturbance, in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import resolved, stated_error
+from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import judge
@@ -35,9 +35,8 @@ from tactile_cube.measurement.replay.simulator import Engine, free_run
 from tactile_cube.measurement.replay.windows import steps_per_row
 
 UNPROVEN = 3
-FAR_OFF = 10.0  # a model as many times further off than its steps hides them, until it is known what it lacks
 MOST_STEPS = 1000  # from row to row: more are a sign of a wrong inertia, and would take days
-MUCH_LONGER = 4  # times as long are steps that are worth a search of their own
+Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -116,9 +115,8 @@ def diagnose_recording(
         criteria: what decides.
     """
     recording = in_time(recording, effects, say, known)
-    inquiry, left_out, suspected = beside_disturbances(
-        in_long_steps_first(Inquiry(recording, effects, engine, step, seed, say, known, criteria))
-    )
+    recording = in_steps(recording, effects, known, say)
+    inquiry, left_out, suspected = beside_disturbances(Inquiry(recording, effects, seed, say, known, criteria))
     search, findings, simulations, verdict = inquiry.answer
     _, held_out, tested = inquiry.parts
     fitted = simulations.final(verdict.chosen)
@@ -154,33 +152,20 @@ def diagnose_recording(
     return replace(diagnosis, experiment=experiment)
 
 
-def in_long_steps_first(asked: Inquiry) -> Inquiry:
-    """An inquiry in the steps that its sensors call for; what much longer ones find is asked of first.
+def in_steps(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None, say: Say) -> Recording:
+    """The recording in the steps of simulation that its sensors call for.
 
-    Far from the noise nothing is gained by steps as short as the noise calls for; where an answer stays far from it,
-    they are never needed.
+    Raises:
+        InputError: gains and inertias call for more steps than any search can make.
     """
-    recording, effects, known, said = asked.recording, asked.effects, asked.known, list[str]()
-    fine = resolved(recording, effects, said.append, known)
-    off = stated_error(recording, effects, known) / FAR_OFF
+    fine = resolved(recording, effects, say, known)
     if _steps(fine) > MOST_STEPS:
         raise InputError(
             f"{recording.rig.path}: gains and inertias call for {_steps(fine)} steps of simulation a row, at most "
             f"{MOST_STEPS} are made; check kp, kd, nominal.reflected_inertia and the inertias of the URDF"
         )
-    quick = resolved(recording, effects, said.append, known, off) if off > 1.0 else fine
-    if MUCH_LONGER * _steps(quick) > _steps(fine):
-        asked.say(f"{_steps(fine)} steps of simulation a sample")
-        return replace(asked, recording=fine)
-    asked.say(f"{_steps(quick)} steps of simulation a sample, {_steps(fine)} where the noise is reached")
-    first = replace(asked, recording=quick, finer=_steps(fine) // _steps(quick))
-    verdict = first.first.verdict
-    needed = resolved(recording, effects, said.append, known, verdict.chosen.error / FAR_OFF)
-    if _steps(needed) == _steps(quick):
-        return first
-    asked.say(f"{_steps(needed)} steps of simulation a sample")
-    answer = (verdict.chosen, *verdict.rivals) if verdict.chosen.effects else ()
-    return replace(asked, recording=needed, known_answer=answer)
+    say(f"{_steps(fine)} steps of simulation a sample")
+    return fine
 
 
 def _steps(recording: Recording) -> int:

@@ -65,7 +65,7 @@ def fit(
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
     best = _linearised(problem, model, unknowns, everything, frozen)
     damping = DAMPING
-    for _ in range(iterations):
+    for iteration in range(iterations):
         weight = noise_inflation(problem, best.cost)
         for _ in range(SHORTER):
             tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
@@ -79,15 +79,9 @@ def fit(
         best = tried
         if gain < converged:
             break
-        if unknowns:
+        if unknowns and iteration < iterations - 1:
             best = _linearised(problem, best.model, unknowns, everything, frozen)
     return best
-
-
-def full_step(problem: Problem, model: Model, unknowns: Sequence[Unknown]) -> Array:
-    """Values (P,) of the unknowns one step from a model: the best ones, were the problem linear."""
-    near = _linearised(problem, model, unknowns, tuple(unknowns), None)
-    return read_all(_stepped(problem, near, 1.0, DAMPING), tuple(unknowns))
 
 
 def _linearised(

@@ -108,10 +108,12 @@ class Simulator:
         known = tuple(dict.fromkeys([*catalogue().values(), *effects]))
         self.plant = Plant([self.tree], recording.step / self.substeps, known, recording.joints)
         self.workers = min(4, len(os.sched_getaffinity(0)))
+        self._pool = ThreadPoolExecutor(self.workers)
         self._world = _pybullet(self.plant) if engine == "pybullet" else None
 
     def close(self) -> None:
-        """End the physics server, if there is one."""
+        """End the threads, and the physics server if there is one."""
+        self._pool.shutdown()
         if self._world is not None:
             self._world.close()
 
@@ -158,10 +160,10 @@ class Simulator:
         whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
         if self._world is not None:
             whole = 0
-        with ThreadPoolExecutor(self.workers) as pool:
-            list(pool.map(lambda *one: self._one(*one, near=near), models[:whole], windows[:whole], corrections, out))
-            for k in range(whole, len(models)):
-                self._one(models[k], windows[k], corrections[k], out[k], pool, near)
+        pool = self._pool
+        list(pool.map(lambda *one: self._one(*one, near=near), models[:whole], windows[:whole], corrections, out))
+        for k in range(whole, len(models)):
+            self._one(models[k], windows[k], corrections[k], out[k], pool, near)
         return out
 
     def path(self, model: Model, windows: Windows) -> Path:
@@ -169,8 +171,7 @@ class Simulator:
         out = np.zeros((1, *windows.measured.shape))
         steps = out.shape[2] * windows.substeps * self.plant.kernel.PATH_WIDTH
         path = Path(out[0], self._mechanics(self.memory(model)), np.zeros((len(windows), steps)))
-        with ThreadPoolExecutor(self.workers) as pool:
-            self._one(model, windows, np.zeros(2 * len(self.recording.joints)), out, pool, path, follows=False)
+        self._one(model, windows, np.zeros(2 * len(self.recording.joints)), out, self._pool, path, follows=False)
         return path
 
     def _mechanics(self, memory: Array) -> Array:
