@@ -124,7 +124,7 @@ class Problem:
         """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
         moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
         base = self.windows.by_segment(self.path(model).position)
-        predictions = self.predictions([one for one, _ in moved], model) if moved else []
+        predictions = self.predictions([one for one, _ in moved], model)
         found = {
             _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / step * self.weight)
             for unknown, p, (_, step) in zip(_simulated(unknowns), predictions, moved, strict=True)

@@ -67,7 +67,7 @@ def find(search: Search) -> Findings:
     looked = max(len(first.scores), 1) if first else 1
     judged = [search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]]
     good = [one for one in judged if proven(one, search.criteria)]
-    if good:
+    if good and first:
         chosen = simplest(good, search.criteria)
         others = [search.explained(one, looked) for one in twins(search, chosen, first, judged)]
         judged = [*judged, *others]
@@ -136,7 +136,7 @@ def cheapest(found: Sequence[Proposal], search: Search) -> list[Proposal]:
     return list(first.values())
 
 
-def twins(search: Search, chosen: Explanation, first: Looks | None, judged: Sequence[Explanation]) -> list[Proposal]:
+def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:
     """Sets with another law in the place of one of the chosen ones that fit as well with everything free."""
     known = {named_by(one.effects) for one in judged}
     itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
@@ -144,7 +144,7 @@ def twins(search: Search, chosen: Explanation, first: Looks | None, judged: Sequ
         looks = first
         if len(chosen.effects) > 1:
             looks = look(search, without(search, itself, place), list(effect.joints))
-        for candidate, fitted in looks.tried if looks else []:
+        for candidate, fitted in looks.tried:
             names = named_by((*looks.parent.effects, candidate))
             if len(found) < JUDGED and names not in known and near(search, looks, fitted, [itself]):
                 known.add(names)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Literal, Self, get_args
 
 import numpy as np
@@ -32,7 +33,17 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Engine = Literal["fast", "pybullet"]
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
-MECHANICS = ("ratio", "offset", "mass", "placement_translation", "axis", "com", "placement_rotation", "inertia", "gravity")
+MECHANICS = (
+    "ratio",
+    "offset",
+    "mass",
+    "placement_translation",
+    "axis",
+    "com",
+    "placement_rotation",
+    "inertia",
+    "gravity",
+)
 """What the equations of motion of a path depend on, but for rotors."""
 
 
@@ -161,7 +172,7 @@ class Simulator:
         if self._world is not None:
             whole = 0
         pool = self._pool
-        list(pool.map(lambda *one: self._one(*one, near=near), models[:whole], windows[:whole], corrections, out))
+        list(pool.map(partial(self._one, near=near), models[:whole], windows[:whole], corrections, out))
         for k in range(whole, len(models)):
             self._one(models[k], windows[k], corrections[k], out[k], pool, near)
         return out
