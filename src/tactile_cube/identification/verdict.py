@@ -49,6 +49,7 @@ def decide(findings: Findings, criteria: Criteria = STANDARD) -> Verdict:
     chosen = simplest(plausible, criteria)
     share = chosen.explained(base)
     whole = chosen.largest_error <= criteria.tolerated or share > criteria.nearly_whole
+    whole &= chosen.error <= criteria.adequate or share >= criteria.most
     if not whole and share < criteria.most:
         return Verdict("unknown_effect", closest(plausible, findings))
     rivals = find_rivals(chosen, plausible, criteria)
@@ -80,10 +81,11 @@ def at_bound(one: Explanation) -> bool:
 def find_rivals(
     chosen: Explanation, found: Sequence[Explanation], criteria: Criteria = STANDARD
 ) -> tuple[Explanation, ...]:
-    """Sets of as few effects within the band of the chosen one, but for laws that contain it, which always are."""
+    """Sets of as few effects and numbers within the band of the chosen one, but for laws that contain it."""
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
         other_law = named(other) != named(chosen) and len(named(other)) <= len(named(chosen))
+        other_law &= other.size <= chosen.size + 1
         if other_law and not contains(other, chosen) and not worse(other.judgement, chosen.judgement, criteria):
             rivals.setdefault(named(other), other)
     return tuple(rivals.values())

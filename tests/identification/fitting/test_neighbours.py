@@ -12,14 +12,16 @@ from tactile_cube.identification.search.division import some
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.replay.nominal import nominal_model
-from tests.shared import shared_recording
+
+SHARED = Path(__file__).parents[4] / "shared" / "recordings" / "finger_friction"
 
 ALIKE = 0.97
 STARTS = 1.0  # sensor noise that an effect makes at least, to be seen at all
 
 
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared recordings are not here")
 def test_each_law_moves_the_reading_along_a_path_as_by_itself() -> None:
-    recording = read_recording(shared_recording("finger_friction"))
+    recording = read_recording(SHARED)
     effects = tuple(catalogue().values())
     shooting, model = Shooting(recording, effects), nominal_model(recording)
     windows = some(shooting.cut(recording, noise_with_links(recording)), 11)

@@ -18,6 +18,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
+TINY = np.finfo(float).tiny
 FEWEST_BLOCKS = 5  # that a scatter is told from
 SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
 FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
@@ -115,7 +116,16 @@ def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> b
     difference = other.costs - best.costs
     unexplained = max(float(best.costs.sum() - best.samples.sum()), 0.0)
     allowed = criteria.least_gain * float(best.samples.sum()) + criteria.detail * unexplained
-    return bool(difference.sum() > allowed and standing_out(difference, best) > criteria.band)
+    return bool(difference.sum() > allowed and standing_out(likelihood(other, best), best) > criteria.band)
+
+
+def likelihood(before: Judgement, after: Judgement) -> Array:
+    """Twice the log likelihood (G,) that each segment gains by the second model, the size of its errors unknown.
+
+    At the noise that is the difference of squared errors; far from it, ratios count, so that no single segment decides.
+    """
+    ratio = np.maximum(before.costs, TINY) / np.maximum(after.costs, TINY)
+    return np.asarray(before.samples * np.log(ratio))
 
 
 def standing_out(difference: Array, judged: Judgement) -> float:
@@ -132,7 +142,7 @@ def p_value(before: Judgement, after: Judgement) -> float:
 
     What is paired are blocks of segments as long as the differences remember themselves.
     """
-    difference = before.costs - after.costs
+    difference = likelihood(before, after)
     count = len(in_blocks(difference, after))
     return float(student_t.sf(standing_out(difference, after), max(count - 1, 1)))
 
