@@ -119,11 +119,18 @@ def diagnose_recording(
     inquiry, left_out, suspected = beside_disturbances(Inquiry(recording, effects, seed, say, known, criteria))
     search, findings, simulations, verdict = inquiry.answer
     _, held_out, tested = inquiry.parts
-    fitted = simulations.final(verdict.chosen)
     test = held_out if tested is None else tested
-    summaries, over_noise = test_errors(
-        search, test, {"refitted": findings.base.fit.model, "with_effects": fitted.model}, engine, step
-    )
+
+    def tested_with(chosen: Explanation) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
+        models = {"refitted": findings.base.fit.model, "with_effects": simulations.final(chosen).model}
+        return test_errors(search, test, models, engine, step)
+
+    summaries, over_noise = tested_with(verdict.chosen)
+    if over_noise["with_effects"] > over_noise["refitted"] and verdict.chosen.effects:
+        say(f"{verdict.chosen.label}: worse than without on the trials that test; not recommended")
+        verdict = Verdict("unknown_effect", findings.base)
+        summaries, over_noise = tested_with(findings.base)
+    fitted = simulations.final(verdict.chosen)
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
     rivals = tuple((one, simulations.final(one)) for one in verdict.rivals)
     diagnosis = Diagnosis(
