@@ -22,7 +22,8 @@ def readings(effect: Effect, command: np.ndarray, starts: np.ndarray, speeds: np
     out = np.zeros((1, ROWS, 1, 1))
     plant.kernel.segments_batch(
         command[None, :, None], np.array([0]), np.array([ROWS]), 0, 1, SEGMENT, starts[None, :, None],
-        speeds[None, :, None], np.zeros((1, 2)), np.zeros((1, 2)), memory, np.array([MOTOR_POSITION]), 0, 1, out,
+        speeds[None, :, None], np.zeros((1, 2)), np.zeros((1, 2)), memory,
+        np.zeros((1, 1)), np.array([MOTOR_POSITION]), 0, 1, out,
     )  # fmt: skip
     found: np.ndarray = out[0, :, 0, 0]
     return found

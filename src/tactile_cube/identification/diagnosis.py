@@ -16,7 +16,7 @@ from tactile_cube.identification.disturbances import Disturbance, in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.resolution import resolved, stated_error
+from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.evidence import gain, judge
@@ -37,9 +37,8 @@ from tactile_cube.measurement.replay.windows import steps_per_row
 from tactile_cube.measurement.units import common_unit
 
 UNPROVEN = 3
-FAR_OFF = 10.0  # a model as many times further off than its steps hides them, until it is known what it lacks
 MOST_STEPS = 1000  # from row to row: more are a sign of a wrong inertia, and would take days
-MUCH_LONGER = 4  # times as long are steps that are worth a search of their own
+Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -120,18 +119,26 @@ def diagnose_recording(
         criteria: what decides.
     """
     recording = in_time(recording, effects, say, known)
-    whole = Inquiry(recording, effects, engine, step, seed, say, known, criteria)
+    recording = in_steps(recording, effects, known, say)
+    whole = Inquiry(recording, effects, seed, say, known, criteria)
     standard = fit_standard_model(*whole.parts[:2], noise_with_links(recording), known, effects)
     say(standard.sentence(common_unit(recording.units.values())))
-    inquiry, left_out, suspected = beside_disturbances(in_long_steps_first(whole))
+    inquiry, left_out, suspected = beside_disturbances(whole)
     search, findings, simulations, verdict = inquiry.answer
     verdict = no_worse(verdict, standard, search, simulations)
     _, held_out, tested = inquiry.parts
-    fitted = simulations.final(verdict.chosen)
     test = held_out if tested is None else tested
-    summaries, over_noise = test_errors(
-        search, test, {"refitted": findings.base.fit.model, "with_effects": fitted.model}, engine, step
-    )
+
+    def tested_with(chosen: Explanation) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
+        models = {"refitted": findings.base.fit.model, "with_effects": simulations.final(chosen).model}
+        return test_errors(search, test, models, engine, step)
+
+    summaries, over_noise = tested_with(verdict.chosen)
+    if over_noise["with_effects"] > over_noise["refitted"] and verdict.chosen.effects:
+        say(f"{verdict.chosen.label}: worse than without on the trials that test; not recommended")
+        verdict = Verdict("unknown_effect", findings.base)
+        summaries, over_noise = tested_with(findings.base)
+    fitted = simulations.final(verdict.chosen)
     say(f"verdict {verdict.kind}: {verdict.chosen.label}")
     rivals = tuple((one, simulations.final(one)) for one in verdict.rivals)
     diagnosis = Diagnosis(
@@ -174,33 +181,20 @@ def no_worse(verdict: Verdict, standard: StandardModel, search: Search, simulati
     return Verdict("unknown_effect", Explanation(standard.effects, fitted, judged, 1.0, better))
 
 
-def in_long_steps_first(asked: Inquiry) -> Inquiry:
-    """An inquiry in the steps that its sensors call for; what much longer ones find is asked of first.
+def in_steps(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None, say: Say) -> Recording:
+    """The recording in the steps of simulation that its sensors call for.
 
-    Far from the noise nothing is gained by steps as short as the noise calls for; where an answer stays far from it,
-    they are never needed.
+    Raises:
+        InputError: gains and inertias call for more steps than any search can make.
     """
-    recording, effects, known, said = asked.recording, asked.effects, asked.known, list[str]()
-    fine = resolved(recording, effects, said.append, known)
-    off = stated_error(recording, effects, known) / FAR_OFF
+    fine = resolved(recording, effects, say, known)
     if _steps(fine) > MOST_STEPS:
         raise InputError(
             f"{recording.rig.path}: gains and inertias call for {_steps(fine)} steps of simulation a row, at most "
             f"{MOST_STEPS} are made; check kp, kd, nominal.reflected_inertia and the inertias of the URDF"
         )
-    quick = resolved(recording, effects, said.append, known, off) if off > 1.0 else fine
-    if MUCH_LONGER * _steps(quick) > _steps(fine):
-        asked.say(f"{_steps(fine)} steps of simulation a sample")
-        return replace(asked, recording=fine)
-    asked.say(f"{_steps(quick)} steps of simulation a sample, {_steps(fine)} where the noise is reached")
-    first = replace(asked, recording=quick, finer=_steps(fine) // _steps(quick))
-    verdict = first.first.verdict
-    needed = resolved(recording, effects, said.append, known, verdict.chosen.error / FAR_OFF)
-    if _steps(needed) == _steps(quick):
-        return first
-    asked.say(f"{_steps(needed)} steps of simulation a sample")
-    answer = (verdict.chosen, *verdict.rivals) if verdict.chosen.effects else ()
-    return replace(asked, recording=needed, known_answer=answer)
+    say(f"{_steps(fine)} steps of simulation a sample")
+    return fine
 
 
 def _steps(recording: Recording) -> int:

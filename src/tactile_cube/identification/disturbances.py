@@ -16,6 +16,8 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.search.division import Division
 from tactile_cube.identification.search.evidence import judge, segment_errors
+from tactile_cube.identification.search.explanation import Proposal
+from tactile_cube.identification.search.proposals import look
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links, repeats_of
 from tactile_cube.measurement.recordings.description import MOST_LATE
@@ -204,15 +206,16 @@ def _late_beside_effects(
     if as_logged <= STANDARD.adequate:
         return False
     earlier = _beside_an_effect(_earlier(recording, rows), effects, known)
-    return earlier**2 < (1.0 - STANDARD.large_gain) * as_logged**2
+    return earlier**2 < (1.0 - STANDARD.detail) * as_logged**2
 
 
 def _beside_an_effect(recording: Recording, effects: Sequence[type[Effect]], known: ModelFile | None) -> float:
     """Error of the base model with the one effect that explains most [sensor noise]."""
     noise = noise_with_links(recording)
     search = Search(recording, recording, noise, effects, lambda line: None, known, segments=SEGMENTS)
-    frozen, raced = search.raced(search.base, search.base)
-    return min(search.over_noise(fitted) for fitted in (frozen, *(fitted for _, fitted in raced)))
+    looks = look(search, Proposal((), search.base.fit), recording.joints)
+    least = min([looks.frozen.cost, *(fitted.cost for _, fitted in looks.tried)])
+    return float(np.sqrt(least / np.count_nonzero(looks.problem.weight)))
 
 
 def _earlier(recording: Recording, rows: int) -> Recording:

@@ -168,7 +168,7 @@ def _told(
         pull = np.einsum("grp,gr->p", columns, one, optimize=True)
         gram = np.einsum("grp,grq->pq", columns, slopes, optimize=True)
         left = float(np.sum(residual * one) - pull @ np.linalg.pinv(gram + known) @ pull)
-        times.append(left / (criteria.clear + criteria.large_gain * float(blurred[rows].sum())))
+        times.append(left / (criteria.band**2 + criteria.detail * float(blurred[rows].sum())))
     return np.array(times)
 
 

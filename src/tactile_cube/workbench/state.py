@@ -27,6 +27,7 @@ from tactile_cube.identification.model_files import UNITS, model_file
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
 from tactile_cube.identification.search.division import BRIEF
 from tactile_cube.identification.search.evidence import Judgement
+from tactile_cube.identification.search.proposals import wanted
 from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques
 from tactile_cube.identification.search.screening import Score, Screen, resized, screen
 from tactile_cube.measurement.bench import without_touches
@@ -199,12 +200,12 @@ class Workbench:
         None: `stop`, which is called every second or so, said so.
         """
         frozen = self._frozen(self.stage.fit)
-        wanted = [one for one in self.search.wanted(frozen) if one.joints == (joint,)]
+        tried = [one for one in wanted(self.search, self.search.problem, frozen) if one.joints == (joint,)]
         best: dict[str, Score] = {}
-        for first in range(0, len(wanted), AT_ONCE):
+        for first in range(0, len(tried), AT_ONCE):
             if stop():
                 return None
-            for score in screen(self.search.problem, frozen, wanted[first : first + AT_ONCE]):
+            for score in screen(self.search.problem, frozen, tried[first : first + AT_ONCE]):
                 name = effect_path(score.candidate.effect)
                 best[name] = max(score, best.get(name, score), key=lambda one: one.gain)
         ranked = sorted((one for one in best.values() if one.gain > 0.0), key=lambda one: -one.gain)[:RANKED]
@@ -250,7 +251,7 @@ class Workbench:
                     raise InputError(f"{label}: name it when the workbench starts, own_effects=[{effect_path(effect)}]")
                 self.say(f"refitting with {label}")
                 added = with_effect(self.search, self._frozen(stages[-1].fit), effect, joint)
-                stages = (*stages, self._stage(f"+ {label}", self.search.quickly_refitted(added.model)))
+                stages = (*stages, self._stage(f"+ {label}", self.search.refitted(added.model)))
         return self._push(stages)
 
     def remove(self, label: str) -> ModelStage:

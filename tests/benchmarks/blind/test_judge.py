@@ -3,7 +3,6 @@
 import importlib.util
 import json
 import sys
-from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +11,12 @@ import polars as pl
 import pytest
 import yaml
 
-from benchmarks.blind import criteria, generator, hidden, judge, page
+from benchmarks.blind import generator, hidden, judge, page
 from benchmarks.blind.dynamics import mass_and_bias
 from benchmarks.blind.physics import simulate
 from benchmarks.blind.plant import neutral
 from benchmarks.blind.rig import RIGS
 from benchmarks.blind.scoring import pushes_found, score
-from tactile_cube.identification.criteria import STANDARD, Criteria
 
 QUICK = 3.0
 
@@ -296,23 +294,3 @@ def test_diagnosis_of_a_short_recording(seed: int, names: list[str], tmp_path: P
     answer = judge.run_command("diagnose", tmp_path / "answer", f"recording={tmp_path / 'recording'}", "engine=fast")
     assert answer is not None, (tmp_path / "answer" / "words.txt").read_text()
     assert score(truth, answer, None).outcome in ("right", "acceptable"), answer["verdict"]
-
-
-def test_each_number_that_decides_is_halved_and_doubled_in_what_it_means() -> None:
-    found = criteria.variants()
-    assert len(found) == 1 + 2 * len(fields(Criteria))
-    assert (found["floor half"].floor, found["floor double"].floor) == pytest.approx((1.05, 1.2))
-    assert (found["most half"].most, found["most double"].most) == pytest.approx((0.95, 0.8))
-    assert (found["clear half"].clear, found["clear double"].clear) == (6.0, 24.0)
-    assert found["few_segments half"] == replace(STANDARD, few_segments=30)
-
-
-def test_the_table_counts_the_answers_that_differ() -> None:
-    def answer(label: str) -> dict[str, Any]:
-        missed = label == "far half"
-        return {"outcome": "wrong" if missed else "right", "confident": missed, "answer": "adequate" if missed else "x"}
-
-    lines = [{"draw": "draw_1", "answers": {label: answer(label) for label in criteria.variants()}}] * 2
-    table = criteria.page(lines, "command")
-    assert "| far half | 4 -> 2.5 | 0, 0, 2 (2) | 2 |" in table
-    assert "| far double | 4 -> 7 | 2, 0, 0 (0) | 0 |" in table

@@ -16,6 +16,7 @@ from numba import cfunc, types
 from tactile_cube.compiled import borrowed, compiled, compiled_once
 
 from .engine_step import control
+from .free_step import PATH_WIDTH as PATH_WIDTH
 from .free_step import free_step, roll, roll_segments, start_window
 from .plant import C, N
 
@@ -33,7 +34,8 @@ def control_step(i: int, q: Array, v: Array, torque: Array, memory: Array) -> No
 @compiled_once
 def step(command: Array, memory: Array) -> None:
     """One step of the mechanism without contacts, for a command (C n,)."""
-    free_step(command, borrowed(memory))
+    own = borrowed(memory)
+    free_step(command, own, own[:0], 0)
 
 
 @compiled_once
@@ -55,6 +57,7 @@ def segments_batch(
     initial_state: Array,
     correction: Array,
     memory: Array,
+    paths: Array,
     rows: Integers,
     first: int,
     last: int,
@@ -63,7 +66,8 @@ def segments_batch(
     """Multiple shooting: blocks first..last of memory (B, size) into `out` (B, T, R, C n).
 
     Block b plays commands[which[b]], (H + T, C n) each, and starts anew every `segment` rows from the measured
-    `position` and `speed` (S, K, C n).
+    `position` and `speed` (S, K, C n). `paths` (S, T PATH_WIDTH) are noted, or followed by blocks that say so; (S, 1)
+    for neither.
     """
     for b in range(first, last):
         s = which[b]
@@ -78,6 +82,7 @@ def segments_batch(
             initial_state[s],
             correction[b],
             borrowed(memory[b]),
+            borrowed(paths[s]),
             rows,
             out[b],
         )

@@ -1,9 +1,13 @@
-"""Stepping the mechanism without contacts: single steps, rollouts, multiple shooting."""
+"""Stepping the mechanism without contacts: single steps, rollouts, multiple shooting, and neighbours of a model.
+
+A neighbour follows the path of another model: it has a drive, laws and dry friction of its own, and the equations of
+motion of that path, linearised about it. These are what a step costs most, and they are found once for all neighbours.
+"""
 
 import numpy as np
 import numpy.typing as npt
 
-from tactile_cube.compiled import compiled
+from tactile_cube.compiled import compiled, shaped_view
 from tactile_cube.drivetrain.coupled_joints import expand
 from tactile_cube.drivetrain.signals import (
     ACCELERATION,
@@ -17,6 +21,7 @@ from tactile_cube.drivetrain.signals import (
     SENSOR_VELOCITY,
     TIME,
     VELOCITY,
+    WEIGHT,
 )
 
 from . import plant
@@ -27,17 +32,80 @@ Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 
+PATH_WIDTH = C * (3 * n + 2 * n * n)
+"""Numbers of a step, for each chain: position, bias, weight (n each); mass matrix without rotors, slope (n, n)."""
+SLOPE_EVERY = 4  # steps; the slope of the equations of motion changes with the posture, slowly
+SLOPE_STEP = 1e-5  # [rad]
+
+
 @compiled
-def free_step(command: Array, memory: Array) -> None:
-    """One step of the mechanism without contacts: semi-implicit Euler, as Bullet."""
-    dt = memory[plant.DT]
+def equations_at(c: int, q: Array, v: Array, memory: Array) -> None:
+    """The equations of motion of chain c where its joints are."""
+    q_all, v_all = block(memory, plant.Q_ALL, (N,)), block(memory, plant.V_ALL, (N,))
+    ratio, offset = block(memory, plant.RATIO, (N,), c), block(memory, plant.OFFSET, (N,), c)
+    expand(plant.FOLLOW, ratio, offset, q, v, q_all, v_all)
+    find_equations(c, q_all, v_all, memory)
+
+
+@compiled
+def note_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> None:
+    """Position, bias, weight and mass matrix without rotors, into a path's step."""
+    for j in range(n):
+        here[j], here[n + j], here[2 * n + j] = q[j], memory[plant.JOINT_BIAS + j], x[WEIGHT, j]
+        for k in range(n):
+            rotor = memory[plant.REFLECTED_INERTIA + c * n + j] if j == k else 0.0
+            here[3 * n + j * n + k] = memory[plant.JOINT_MASS_MATRIX + j * n + k] - rotor
+
+
+@compiled
+def note_slope(c: int, q: Array, v: Array, here: Array, memory: Array) -> None:
+    """Slope of M a + h over the positions, at the accelerations of the step, into a path's step."""
+    for k in range(n):
+        there = q[k]
+        q[k] = there + SLOPE_STEP
+        equations_at(c, q, v, memory)
+        q[k] = there
+        for j in range(n):
+            change = memory[plant.JOINT_BIAS + j] - here[n + j]
+            for i in range(n):
+                rotor = memory[plant.REFLECTED_INERTIA + c * n + j] if i == j else 0.0
+                mass = memory[plant.JOINT_MASS_MATRIX + j * n + i] - rotor - here[3 * n + j * n + i]
+                change += mass * memory[plant.JOINT_ACCELERATION + i]
+            here[3 * n + n * n + j * n + k] = change / SLOPE_STEP
+
+
+@compiled
+def take_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> None:
+    """The equations of motion of a path's step, linearised about its positions, with this model's own rotors."""
+    for j in range(n):
+        load = here[n + j]
+        for k in range(n):
+            load += here[3 * n + n * n + j * n + k] * (q[k] - here[k])
+            rotor = memory[plant.REFLECTED_INERTIA + c * n + j] if j == k else 0.0
+            memory[plant.JOINT_MASS_MATRIX + j * n + k] = here[3 * n + j * n + k] + rotor
+        memory[plant.JOINT_BIAS + j] = load
+        x[WEIGHT, j] = here[2 * n + j]
+
+
+@compiled
+def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
+    """One step of the mechanism without contacts: semi-implicit Euler, as Bullet.
+
+    A model that `follows` takes the equations of motion from step `row` of a path (steps PATH_WIDTH,), which another
+    one has noted that went along it before; a path of less than a step is none.
+    """
+    dt, follows = memory[plant.DT], memory[plant.FOLLOWS] != 0.0
     for c in range(C):
         x = signals_of(c, memory)
         q, v = block(memory, plant.Q, (n,), c), block(memory, plant.V, (n,), c)
-        q_all, v_all = block(memory, plant.Q_ALL, (N,)), block(memory, plant.V_ALL, (N,))
-        ratio, offset = block(memory, plant.RATIO, (N,), c), block(memory, plant.OFFSET, (N,), c)
-        expand(plant.FOLLOW, ratio, offset, q, v, q_all, v_all)
-        find_equations(c, q_all, v_all, memory)
+        width = PATH_WIDTH // C if len(path) >= PATH_WIDTH else 0
+        here = shaped_view(path, (row * C + c) * width, (width,))
+        if follows:
+            take_equations(c, x, q, here, memory)
+        else:
+            equations_at(c, q, v, memory)
+            if width > 0:
+                note_equations(c, x, q, here, memory)
         for j in range(n):
             x[POSITION, j] = q[j]
             x[VELOCITY, j] = v[j]
@@ -48,6 +116,13 @@ def free_step(command: Array, memory: Array) -> None:
         plant.effects_command(x, c, dt, memory)
         drive(x, c, dt, memory)
         next_speeds(x, c, dt, memory)
+        if width > 0 and not follows:
+            if row % SLOPE_EVERY == 0:
+                note_slope(c, q, v, here, memory)
+            else:
+                last = shaped_view(path, ((row - 1) * C + c) * width, (width,))
+                for k in range(n * n):
+                    here[3 * n + n * n + k] = last[3 * n + n * n + k]
         for j in range(n):
             x[ACCELERATION, j] = memory[plant.JOINT_ACCELERATION + j]
             v[j] = memory[plant.SPEED + j]
@@ -67,7 +142,7 @@ def advance_commands(command: Array, memory: Array) -> None:
 
 @compiled
 def row_of_steps(
-    k: int, command: Array, history: int, substeps: int, memory: Array, rows: Integers, out: Array
+    k: int, command: Array, history: int, substeps: int, memory: Array, path: Array, rows: Integers, out: Array
 ) -> None:
     """The steps of command row k; its signals are read at one of them, the last one or memory[READING] if earlier."""
     reading = min(int(memory[plant.READING]), substeps - 1)
@@ -75,7 +150,7 @@ def row_of_steps(
         if k < history:
             advance_commands(command, memory)
             continue
-        free_step(command, memory)
+        free_step(command, memory, path, (k - history) * substeps + s)
         if s == reading:
             for r in range(len(rows)):
                 for a in range(C * n):
@@ -85,8 +160,9 @@ def row_of_steps(
 @compiled
 def roll(commands: Array, length: int, history: int, substeps: int, memory: Array, rows: Integers, out: Array) -> None:
     """Signals of each command row after the history."""
+    path = memory[:0]
     for k in range(history + length):
-        row_of_steps(k, commands[k], history, substeps, memory, rows, out)
+        row_of_steps(k, commands[k], history, substeps, memory, path, rows, out)
 
 
 @compiled
@@ -105,7 +181,9 @@ def copy_into(trial: Array, memory: Array) -> None:
 
 
 @compiled
-def look_ahead(commands: Array, first: int, last: int, memory: Array, trial: Array, free: Array) -> None:
+def look_ahead(
+    commands: Array, history: int, first: int, last: int, memory: Array, path: Array, trial: Array, free: Array
+) -> None:
     """Notes free joints in the steps first..last of `commands` to come, if any joint has a gap at all."""
     gaps = 0.0
     for a in range(C * n):
@@ -113,7 +191,7 @@ def look_ahead(commands: Array, first: int, last: int, memory: Array, trial: Arr
     if gaps > 0.0:
         copy_into(trial, memory)
         for k in range(first, min(last, len(commands))):
-            free_step(commands[k], trial)
+            free_step(commands[k], trial, path, k - history)
             note_free(trial, free)
 
 
@@ -143,12 +221,19 @@ def move(by: Array, memory: Array) -> None:
 
 @compiled
 def start_first(
-    command: Array, position: Array, speed: Array, initial_state: Array, free: Array, trial: Array, memory: Array
+    command: Array,
+    position: Array,
+    speed: Array,
+    initial_state: Array,
+    free: Array,
+    trial: Array,
+    memory: Array,
+    path: Array,
 ) -> None:
     """The first start of a window, moved by its `initial_state`; the torque there is a guess at first."""
     for _ in range(4):
         copy_into(trial, memory)
-        free_step(command, trial)
+        free_step(command, trial, path, 0)
         start_segment(position, speed, free, trial, memory)
         for a in range(C * n):  # torques that are added after the closed form bend the drive from the start
             memory[plant.EXTRA + a] = trial[plant.EXTRA + a]
@@ -168,12 +253,14 @@ def roll_segments(
     initial_state: Array,
     correction: Array,
     memory: Array,
+    path: Array,
     rows: Integers,
     out: Array,
 ) -> None:
     """As `roll`, started anew from the measured `position` and `speed` (K, C n) every `segment` rows.
 
-    `initial_state` (2 C n,) moves the first start in position and speed, `correction` (2 C n,) every start.
+    `initial_state` (2 C n,) moves the first start in position and speed, `correction` (2 C n,) every start. A `path`
+    is noted, or followed, see `free_step`; its rows are single steps.
     """
     trial, free = memory.copy(), np.zeros(C * n)
     around = round(memory[plant.UNSURE] / memory[plant.DT])  # steps from which the measured speed is read
@@ -181,18 +268,18 @@ def roll_segments(
         if k >= history and (k - history) % segment == 0:
             part = (k - history) // segment
             if part == 0:
-                start_first(commands[k], position[0], speed[0], initial_state, free, trial, memory)
+                start_first(commands[k], position[0], speed[0], initial_state, free, trial, memory, path)
             else:
-                look_ahead(commands, k, k + around, memory, trial, free)
+                look_ahead(commands, history, k, min(k + around, history + length), memory, path, trial, free)
                 copy_into(trial, memory)
-                free_step(commands[k], trial)
+                free_step(commands[k], trial, path, k - history)
                 start_segment(position[part], speed[part], free, trial, memory)
             move(correction, memory)
             for a in range(C * n):
                 free[a] = 0.0
         elif (k - history) % segment >= segment - around:
             note_free(memory, free)
-        row_of_steps(k, commands[k], history, substeps, memory, rows, out)
+        row_of_steps(k, commands[k], history, substeps, memory, path, rows, out)
 
 
 @compiled
@@ -202,4 +289,5 @@ def start_window(
     """Plays the history (rows of `commands`) and puts the joints to the start of the row after it."""
     for k in range(history):
         advance_commands(commands[k], memory)
-    start_first(commands[history], position, speed, initial_state, np.zeros(C * n), memory.copy(), memory)
+    free, trial = np.zeros(C * n), memory.copy()
+    start_first(commands[history], position, speed, initial_state, free, trial, memory, memory[:0])

@@ -65,10 +65,10 @@ def fit(
     everything = (*(frozen.unknowns if frozen else ()), *unknowns)
     best = _linearised(problem, model, unknowns, everything, frozen)
     damping = DAMPING
-    for _ in range(iterations):
+    for iteration in range(iterations):
         weight = noise_inflation(problem, best.cost)
         for _ in range(SHORTER):
-            tried, prediction = _evaluated(problem, best, _stepped(problem, best, weight, damping))
+            tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
             if tried.cost + weight * tried.prior_penalty < best.cost + weight * best.prior_penalty:
                 break
             damping *= 10.0
@@ -80,15 +80,9 @@ def fit(
         best = tried
         if gain < converged:
             break
-        if unknowns:
-            best = _linearised(problem, best.model, unknowns, everything, frozen, prediction)
+        if unknowns and iteration < iterations - 1:
+            best = _linearised(problem, best.model, unknowns, everything, frozen)
     return best
-
-
-def full_step(problem: Problem, model: Model, unknowns: Sequence[Unknown]) -> Array:
-    """Values (P,) of the unknowns one step from a model: the best ones, were the problem linear."""
-    near = _linearised(problem, model, unknowns, tuple(unknowns), None)
-    return read_all(_stepped(problem, near, 1.0, DAMPING), tuple(unknowns))
 
 
 def _linearised(
@@ -97,10 +91,9 @@ def _linearised(
     unknowns: Sequence[Unknown],
     everything: tuple[Unknown, ...],
     frozen: Fit | None,
-    prediction: Array | None = None,
 ) -> Fit:
-    """A model with its derivatives: one simulation for each unknown, and one where its prediction is not known."""
-    prediction, fresh = problem.columns(model, unknowns, prediction)
+    """A model with its derivatives, which are neighbours along its path."""
+    prediction, fresh = problem.columns(model, unknowns)
     residual = problem.residual(prediction)
     columns = np.concatenate([frozen.columns, fresh], axis=-1) if frozen else fresh
     cost = float(problem.cost(residual).sum())
@@ -109,12 +102,11 @@ def _linearised(
     )
 
 
-def _evaluated(problem: Problem, near: Fit, model: Model) -> tuple[Fit, Array]:
-    """A model with the derivatives of one close to it, and its prediction: one simulation."""
-    prediction = problem.predictions([model])[0]
-    residual = problem.residual(prediction)
+def _evaluated(problem: Problem, near: Fit, model: Model) -> Fit:
+    """A model with the derivatives of one close to it: one simulation, exact."""
+    residual = problem.residual(problem.windows.by_segment(problem.path(model).position))
     cost, penalty = float(problem.cost(residual).sum()), prior_penalty(model, near.unknowns)
-    return replace(near, model=model, cost=cost, prior_penalty=penalty, residual=residual), prediction
+    return replace(near, model=model, cost=cost, prior_penalty=penalty, residual=residual)
 
 
 def noise_inflation(problem: Problem, cost: float) -> float:

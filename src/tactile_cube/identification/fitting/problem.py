@@ -12,6 +12,7 @@ from tactile_cube.identification.fitting.initial_states import with_initial_stat
 from tactile_cube.identification.fitting.shooting import Shooting
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.measurement.replay.model import Model
+from tactile_cube.measurement.replay.simulator import Path
 from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
@@ -39,6 +40,13 @@ class Problem:
         self.segment_initialisation = np.repeat(windows.initialisation, windows.segments)
         self._starts: Array = np.zeros((*self.weight.shape, 0))
         self._inverse: Array = np.zeros((len(self.weight), 0, 0))
+        self._path: tuple[Model, Windows, Path] | None = None
+
+    def path(self, model: Model) -> Path:
+        """The model's way through the windows, the last one asked for kept."""
+        if self._path is None or self._path[0] is not model or self._path[1] is not self.windows:
+            self._path = model, self.windows, self.shooting.path(model, self.windows)
+        return self._path[2]
 
     def linearise_starts(self, model: Model) -> None:
         """Take the initial states of trials and the sensitivity to segment starts from this model from now on."""
@@ -69,7 +77,7 @@ class Problem:
         return more
 
     def _linearise_segments(self, model: Model) -> None:
-        raw = self.shooting.start_sensitivity(model, self.windows)
+        raw = self.shooting.start_sensitivity(model, self.windows, self.path(model))
         columns = np.stack([self.windows.by_segment(column) for column in raw], axis=-1)
         acceleration = np.abs(self.windows.acceleration).reshape(len(self.weight), -1)
         known, sure = self.shooting.start_speed, START_POSITION * self.shooting.per_joint("rad")
@@ -94,9 +102,9 @@ class Problem:
         freed: Array = wide - self._starts @ (self._inverse @ inner)
         return freed if x.ndim == 3 else freed[..., 0]
 
-    def predictions(self, models: Sequence[Model]) -> Array:
-        """(models, G, R) [rad]."""
-        simulated = self.shooting.positions(models, self.windows)
+    def predictions(self, models: Sequence[Model], near: Model | None = None) -> Array:
+        """(models, G, R) [rad]; of models that are close to one that is given, at a third of the cost."""
+        simulated = self.shooting.positions(models, self.windows, self.path(near) if near else None)
         return np.stack([self.windows.by_segment(one) for one in simulated])
 
     def residual(self, prediction: Array) -> Array:
@@ -112,15 +120,11 @@ class Problem:
         """Marginal squared error of each segment (G,), in units of the sensor's variance."""
         return np.asarray(np.sum(residual * self.free(residual), axis=1))
 
-    def columns(self, model: Model, unknowns: Sequence[Unknown], base: Array | None = None) -> tuple[Array, Array]:
-        """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale.
-
-        `base` is the prediction where it is known already, which spares a simulation.
-        """
+    def columns(self, model: Model, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
+        """Prediction (G, R) of a model and its derivatives (G, R, P), weighted, per unit of each unknown's scale."""
         moved = [moved_model(model, unknown) for unknown in _simulated(unknowns)]
-        models = [model] if base is None else []
-        predictions = list(self.predictions([*models, *(one for one, _ in moved)]))
-        base = predictions.pop(0) if base is None else base
+        base = self.windows.by_segment(self.path(model).position)
+        predictions = self.predictions([one for one, _ in moved], model)
         found = {
             _key(unknown): (np.clip(p - base, -self.run_away, self.run_away) / step * self.weight)
             for unknown, p, (_, step) in zip(_simulated(unknowns), predictions, moved, strict=True)

@@ -13,7 +13,7 @@ from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.model import Model
-from tactile_cube.measurement.replay.simulator import Simulator
+from tactile_cube.measurement.replay.simulator import Path, Simulator
 from tactile_cube.measurement.replay.windows import LONGEST_STEP, START_SPEED, Windows, cut
 
 Array = NDArray[np.float64]
@@ -54,22 +54,26 @@ class Shooting(Simulator):
         """How many times larger numbers of a unit are than at a finger, (n,)."""
         return np.array([scales.of(unit) for scales in self.scales])
 
-    def positions(self, models: Sequence[Model], windows: Windows) -> Array:
-        """Measured positions that each model predicts, (models, S, K segment, sensors) [rad]."""
-        return self.simulate(models, [windows] * len(models))[:, 0]
+    def positions(self, models: Sequence[Model], windows: Windows, near: Path | None = None) -> Array:
+        """Measured positions that each model predicts, (models, S, K segment, sensors) [rad]; `near` a path or not."""
+        return self.simulate(models, [windows] * len(models), near=near)[:, 0]
 
     def positions_from(self, model: Model, initial_states: Sequence[Array], windows: Windows) -> Array:
         """The same for one model from several `initial_state`s, (initial states, S, K segment, sensors) [rad]."""
         begun = [replace(windows, initial_state=one) for one in initial_states]
         return self.simulate([model] * len(begun), begun)[:, 0]
 
-    def start_sensitivity(self, model: Model, windows: Windows) -> Array:
-        """D position / d start of each segment, (2 n, S, K segment, sensors): by n positions, then n speeds."""
+    def start_sensitivity(self, model: Model, windows: Windows, path: Path | None = None) -> Array:
+        """D position / d start of each segment, (2 n, S, K segment, sensors): by n positions, then n speeds.
+
+        `path` is the model's own through these windows, if it is known.
+        """
+        path = path or self.path(model, windows)
         joints = len(self.recording.joints)
         correction = np.diag([*(POSITION_STEP * self.per_joint("rad")), *(SPEED_STEP * self.per_joint("rad/s"))])
-        count = 2 * joints + 1
-        moved = self.simulate([model] * count, [windows] * count, np.vstack([correction, np.zeros(2 * joints)]))[:, 0]
+        count = 2 * joints
+        moved = self.simulate([model] * count, [windows] * count, correction, near=path)[:, 0]
         # a simulation that ran away has no slope; it would swamp those of all others
         most = self.per_joint("rad")[windows.joint_of]
-        change = np.clip(np.nan_to_num(moved[:-1] - moved[-1], nan=0.0), -most, most)
+        change = np.clip(np.nan_to_num(moved - path.position, nan=0.0), -most, most)
         return np.asarray(change / correction.max(axis=1)[:, None, None, None])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.identification.fitting.gauss_newton import Fit, full_step
+from tactile_cube.identification.fitting.gauss_newton import Fit, precision
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.measurement.replay.windows import Windows
 
@@ -19,14 +19,19 @@ ENOUGH = 12  # windows that tell it, spread over the recording: up to 53 s of a 
 def step_shift(problem: Problem, fitted: Fit) -> Array:
     """How far the unknowns (P,) would move were the simulation's steps `FINER` times as short.
 
-    A Gauss-Newton step in the finer simulation, less the one in the model's own: what noise moves moves alike in both.
+    To first order: the least-squares answer of the unknowns to what finer steps change in the prediction.
     """
     part = spread(problem.windows)
-    problems = [Problem(problem.shooting, part), Problem(problem.shooting.finer(FINER), finer(part, FINER))]
-    for one in problems:
+    own, fine = Problem(problem.shooting, part), Problem(problem.shooting.finer(FINER), finer(part, FINER))
+    for one in (own, fine):
         one.linearise_starts(fitted.model)
-    own, fine = (full_step(one, fitted.model, fitted.unknowns) for one in problems)
-    return np.asarray(fine - own)
+    prediction, columns = own.columns(fitted.model, fitted.unknowns)
+    moved = own.limited(fine.predictions([fitted.model])[0] - prediction) * own.weight
+    freed = own.free(columns)
+    information = np.einsum("grp,grq->pq", columns, freed, optimize=True) + np.diag(precision(fitted.unknowns))
+    pull = np.einsum("grp,gr->p", freed, moved, optimize=True)
+    scales = np.array([unknown.scale for unknown in fitted.unknowns])
+    return np.asarray(-scales * np.linalg.solve(information, pull))
 
 
 def spread(windows: Windows) -> Windows:

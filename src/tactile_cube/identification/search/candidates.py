@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 from tactile_cube.drivetrain.effects.effect import Effect, Parameter
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales
@@ -139,57 +138,6 @@ def with_details(candidate: Candidate, model: Model) -> tuple[Candidate, Model, 
     return detailed, replace(model, terms=(*model.terms[:first], *terms)), tuple(unknowns)
 
 
-def special_cases(
-    model: Model, effects: Sequence[Candidate], place: int, known: Sequence[Candidate]
-) -> Iterator[tuple[tuple[Candidate, ...], Model]]:
-    """Sets, and their models, with a special case of an effect's law in its place, at its start.
-
-    Args:
-        model: fitted; its last terms are those of `effects`.
-        effects: in the order in which they were added.
-        place: of the effect.
-        known: candidates to try.
-    """
-    one, first = effects[place], first_term(model, effects, place)
-    for special in known:
-        contained = special.effect.name in one.effect.contains
-        contained |= special.effect == one.effect and special.form.keys() < one.form.keys()
-        if contained and special.joints == one.joints and special.size < one.size:
-            added, _ = special.added_to(replace(model, terms=model.terms[:first]))
-            rest = model.terms[first + len(one.joints) :]
-            yield (*effects[:place], special, *effects[place + 1 :]), replace(model, terms=(*added.terms, *rest))
-
-
-FACTORS = {1: (0.35, 0.5, 0.7, 1.4, 2.0, 3.0), 2: (0.5, 0.7, 1.0, 1.4, 2.0), 3: (0.6, 1.0, 1.6)}
-"""Of each number, by how many numbers there are."""
-
-
-def other_starts(candidate: Candidate, model: Model) -> list[Model]:
-    """Models whose last effect has its numbers multiplied, each by several factors, in all combinations.
-
-    Empty for effects of more than three numbers, and for a ripple, whose harmonic is a whole number.
-
-    Args:
-        candidate: the last effect of the model, at all its joints.
-        model: fitted.
-    """
-    names = tuple(candidate.form)
-    if len(names) not in FACTORS or "harmonic" in names:
-        return []
-    first = len(model.terms) - len(candidate.joints)
-    models = []
-    for factors in product(FACTORS[len(names)], repeat=len(names)):
-        if set(factors) == {1.0}:
-            continue
-        terms = list(model.terms)
-        for place in range(first, len(terms)):
-            old, known = terms[place].values, candidate.parameters(terms[place].joint)
-            new = {n: min(max(f * old[n], known[n].low), known[n].high) for n, f in zip(names, factors, strict=True)}
-            terms[place] = replace(terms[place], values={**old, **new})
-        models.append(replace(model, terms=tuple(terms)))
-    return models
-
-
 def first_term(model: Model, effects: Sequence[Candidate], place: int) -> int:
     """Which of a model's terms, the last of which are those of `effects`, is the first one of an effect."""
     known = len(model.terms) - sum(len(candidate.joints) for candidate in effects)
@@ -200,27 +148,3 @@ def without_effect(model: Model, effects: Sequence[Candidate], place: int) -> Mo
     """A fitted model, whose last terms are those of `effects`, without one of them."""
     first = first_term(model, effects, place)
     return replace(model, terms=(*model.terms[:first], *model.terms[first + len(effects[place].joints) :]))
-
-
-def apart(effects: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The same effects, each at a single joint; a model's terms stay as they are."""
-    return tuple(replace(one, joints=(joint,), form=one.start(joint)) for one in effects for joint in one.joints)
-
-
-def joined(effects: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The same effects, neighbours of one law and form as one at all their joints."""
-    groups: list[Candidate] = []
-    for one in effects:
-        last = groups[-1] if groups else None
-        if last and last.effect == one.effect and last.form.keys() == one.form.keys():
-            groups[-1] = replace(last, joints=(*last.joints, *one.joints))
-        else:
-            groups.append(one)
-    return tuple(groups)
-
-
-def with_effects(model: Model, candidates: Sequence[Candidate]) -> Model:
-    """The model with all of them at their starts."""
-    for candidate in candidates:
-        model, _ = candidate.added_to(model)
-    return model

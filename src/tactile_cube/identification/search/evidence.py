@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import wilcoxon
+from scipy.stats import t as student_t
 
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.base import offset_unknowns
@@ -19,8 +18,8 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
-TRIALS = 1_000_000  # more than any part has: tells those of several parts apart
-FEWEST_BLOCKS = 5  # that a signed-rank test needs to come below 5 %
+TINY = np.finfo(float).tiny
+FEWEST_BLOCKS = 5  # that a scatter is told from
 SLIGHT = 1.0  # [sensor variance] what a number that follows noise alone gains in a segment, in the mean
 FEWEST_PAIRS = 10  # of segments so far apart, that an autocorrelation needs
 
@@ -77,18 +76,6 @@ def charged(costs: Array, samples: NDArray[np.int64], numbers: NDArray[np.int64]
     return np.asarray(costs + excess * ((independent / (independent - numbers)) ** 2 - 1.0))
 
 
-def all_of(judgements: Sequence[Judgement]) -> Judgement:
-    """What several held-out parts say together; model and residual are those of the first."""
-    first = judgements[0]
-    samples = np.array([one.samples.sum() for one in judgements])
-    trial = np.concatenate([one.trial + place * TRIALS for place, one in enumerate(judgements)])
-    squares = np.average([one.joint_errors**2 for one in judgements], axis=0, weights=samples)
-    costs, counts, parts = (
-        np.concatenate([getattr(one, key) for one in judgements]) for key in ("costs", "samples", "joint_costs")
-    )
-    return Judgement(first.model, costs, counts, first.residual, np.sqrt(squares), trial, parts)
-
-
 def _joint_errors(problem: Problem, residual: Array) -> Array:
     """RMS (n,) of the residual of each joint's sensors with the starts of segments taken out."""
     squares, present = _joint_squares(problem, residual)
@@ -119,39 +106,45 @@ def gain(before: Judgement, after: Judgement) -> float:
     return float(1.0 - after.costs.sum() / before.costs.sum())
 
 
-def at_joints(judged: Judgement, places: Sequence[int]) -> Judgement:
-    """The same of some joints alone, as far as that is known."""
-    if not len(places) or not judged.joint_costs.size:
-        return judged
-    part = len(places) / judged.joint_costs.shape[1]
-    costs = judged.joint_costs[:, places].sum(axis=1)
-    return replace(judged, costs=costs, samples=np.round(part * judged.samples).astype(np.int64))
-
-
 def worse(other: Judgement, best: Judgement, criteria: Criteria = STANDARD) -> bool:
     """Whether the held-out trials speak against `other`.
 
-    The difference has to stand out of its scatter from segment to segment, and to be more than a part of what the
-    better model leaves unexplained itself: that much a law may differ in detail from the real thing.
+    The difference has to stand out of its scatter from block to block, and to be more than a law gains by chance beside
+    slightly wrong constants, and more than a part of what the better model leaves unexplained itself: that much a law
+    may differ in detail from the real thing.
     """
     difference = other.costs - best.costs
     unexplained = max(float(best.costs.sum() - best.samples.sum()), 0.0)
-    if difference.sum() <= criteria.clear + criteria.large_gain * unexplained:
-        return False
-    blocks = in_blocks(difference, best)
-    scatter = float(blocks.std(ddof=1)) * np.sqrt(len(blocks)) if len(blocks) > 1 else np.inf
-    return bool(blocks.sum() > criteria.stands_out * scatter or p_value(other, best) < criteria.significant_if_most)
+    allowed = criteria.least_gain * float(best.samples.sum()) + criteria.detail * unexplained
+    return bool(difference.sum() > allowed and standing_out(likelihood(other, best), best) > criteria.band)
+
+
+def likelihood(before: Judgement, after: Judgement) -> Array:
+    """Twice the log likelihood (G,) that each segment gains by the second model, the size of its errors unknown.
+
+    At the noise that is the difference of squared errors; far from it, ratios count, so that no single segment decides.
+    """
+    ratio = np.maximum(before.costs, TINY) / np.maximum(after.costs, TINY)
+    return np.asarray(before.samples * np.log(ratio))
+
+
+def standing_out(difference: Array, judged: Judgement) -> float:
+    """Sum of differences (G,) in units of its own scatter, from block to block."""
+    blocks = in_blocks(difference, judged)
+    if len(blocks) < FEWEST_BLOCKS:
+        return 0.0
+    scatter = float(blocks.std(ddof=1)) * np.sqrt(len(blocks))
+    return float(blocks.sum()) / scatter if scatter > 0.0 else 0.0
 
 
 def p_value(before: Judgement, after: Judgement) -> float:
-    """Probability of such paired differences if the second model were no better (Wilcoxon, one-sided).
+    """Probability of such paired differences if the second model were no better (Student's t over blocks, one-sided).
 
     What is paired are blocks of segments as long as the differences remember themselves.
     """
-    difference = in_blocks(before.costs - after.costs, after)
-    if len(difference) < FEWEST_BLOCKS or not np.any(difference):
-        return 1.0
-    return float(wilcoxon(difference, alternative="greater").pvalue)
+    difference = likelihood(before, after)
+    count = len(in_blocks(difference, after))
+    return float(student_t.sf(standing_out(difference, after), max(count - 1, 1)))
 
 
 def in_blocks(difference: Array, judged: Judgement) -> Array:

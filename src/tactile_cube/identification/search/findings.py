@@ -1,17 +1,36 @@
-"""Everything that a search finds: one effect after another, sets of effects at once, and what would do as well."""
+"""The search: every law by itself, sets that grow while a joint is off, few sets judged once on held-out trials."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tactile_cube.identification.search.candidates import without_effect
 from tactile_cube.identification.search.evidence import Judgement, worse
-from tactile_cube.identification.search.explanation import Explanation, named, named_by, simplest
-from tactile_cube.identification.search.screening import Score, screen, with_groups
+from tactile_cube.identification.search.explanation import (
+    Explanation,
+    Proposal,
+    named_by,
+    proven,
+    simplest,
+    unproven,
+)
+from tactile_cube.identification.search.proposals import (
+    CLOSE,
+    Looks,
+    detailed,
+    grown,
+    look,
+    near,
+    off,
+    refitted,
+    without,
+)
+from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.search import Search
 from tactile_cube.identification.search.shared_offset import shared_offset
-from tactile_cube.identification.search.together import Together, standard_explanations
+
+MOST = 4  # effects in a set
+JUDGED = 6  # sets that the held-out trials judge, and as many more of what may stand for one of the chosen effects
 
 
 @dataclass(frozen=True)
@@ -21,11 +40,11 @@ class Findings:
     Attributes:
         base: the refitted base model.
         nominal: the model before any fit, judged on the held-out trials.
-        levels: explanations with 1, 2, ... effects, best first; or the sets that were found together alone.
-        scores: screening of the first level, best first.
-        unproven: where the search ended, what would explain much and may be chance, best first.
-        surpassed: what was found one by one and is clearly worse than the sets that were found together.
-        unclear: sets that were found together and are not clearly better: to predict with where none is claimed.
+        levels: explanations that earn their place by number of effects, best first.
+        scores: the first look at every law, best first.
+        unproven: what would explain much and may be chance, best first.
+        surpassed: what was judged and is clearly worse than the best.
+        unclear: what was judged and does not earn its place: to predict with where nothing is claimed.
     """
 
     base: Explanation
@@ -39,86 +58,100 @@ class Findings:
 
 def find(search: Search) -> Findings:
     """Search a recording for what its model lacks."""
-    base, criteria = search.base, search.criteria
+    base, nominal = search.base, search.judged(search.start)
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
-    nominal = search.judged(search.start)
-    standard = standard_explanations(search, base) if base.error > criteria.far else ()
-    levels, scores, doubtful = search.one_by_one(base, standard)
-    found = [e for level in levels for e in level]
-    best = min(found, key=lambda e: e.error, default=base)
-    surpassed: list[Explanation] = []
-    unclear: tuple[Explanation, ...] = ()
-    whole = standard and standard[0].explained(base) > criteria.most
-    if search.sets and not whole and best.error > criteria.far and not search.hidden_by_steps(best):
-        sets, unclear = Together(search, base, search.fold_divisions()).run(search.leaders, best)
-        levels, surpassed, doubtful = ([sets], found, []) if sets else (levels, surpassed, doubtful)
-    while found := [e for level in levels for e in level]:
-        chosen = simplest(found, criteria)
-        if chosen.explained(base) <= criteria.most or not (others := twins(search, chosen, base, found)):
-            break
-        levels[-1] = (*levels[-1], *others)
-        if len(named(simplest([*found, *others], criteria))) >= len(named(chosen)):
-            break  # else fewer do as well, which may have others in their place too
-    if not levels and base.largest_error <= criteria.floor:
+    if base.largest_error <= search.criteria.floor:
         shared = shared_offset(base, search.fitted, search.effects, search.shooting.sizes)
-        levels = [(shared,)] if shared else []
-    unproven = tuple(sorted(doubtful, key=lambda e: e.error))
-    return Findings(base, nominal, tuple(levels), scores, unproven, tuple(surpassed), unclear)
+        return Findings(base, nominal, ((shared,),) if shared else (), ())
+    way, first = proposed(search)
+    looked = max(len(first.scores), 1) if first else 1
+    judged = [search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]]
+    good = [one for one in judged if proven(one, search.criteria)]
+    if good and first:
+        chosen = simplest(good, search.criteria)
+        others = [search.explained(one, looked) for one in twins(search, chosen, first, judged)]
+        judged = [*judged, *others]
+        good = [one for one in judged if proven(one, search.criteria)]
+    return arranged(base, nominal, judged, good, first.scores if first else [], search)
 
 
-def among(search: Search, known: Sequence[Explanation]) -> Findings:
-    """Judge explanations that are known, and look for no others."""
-    base = search.base
-    search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
-    refitted = [search.explanation(base, one.effects, one.fit.model, len(known)) for one in known]
-    return Findings(base, search.judged(search.start), (tuple(search.pruned(one) for one in refitted),), ())
+def arranged(
+    base: Explanation,
+    nominal: Judgement,
+    judged: Sequence[Explanation],
+    good: Sequence[Explanation],
+    scores: Sequence[Score],
+    search: Search,
+) -> Findings:
+    """What was judged, by what came of it."""
+    ordered = sorted(good, key=lambda one: one.judgement.costs.sum())
+    kept = [one for one in ordered if not worse(one.judgement, ordered[0].judgement, search.criteria)]
+    sizes = sorted({len(one.effects) for one in kept})
+    levels = tuple(tuple(one for one in kept if len(one.effects) == size) for size in sizes)
+    unclear = tuple(one for one in judged if one not in good)
+    doubtful = tuple(sorted((e for e in unclear if unproven(e, search.criteria)), key=lambda e: e.error))
+    surpassed = tuple(one for one in ordered if one not in kept)
+    return Findings(base, nominal, levels, tuple(scores), doubtful if not kept else (), surpassed, unclear)
 
 
-REFITTED = 10  # laws in the place of one effect, most promising first
-AS_CLOSE = 2.5  # squared error over the chosen one's at which another law is worth a fit of everything
-LEFT = 0.05  # share of what the effect explains that a brief refit of another law may leave
+def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
+    """Sets by their fit alone, and the first look."""
+    parent = Proposal((), search.base.fit)
+    found: list[Proposal] = []
+    first: Looks | None = None
+    while places := off(search.problem, parent.fit, search.criteria.floor):
+        looks = look(search, parent, [search.fitted.joints[j] for j in places])
+        first = first or looks
+        if not looks.tried:
+            break
+        search.say(f"{len(looks.scores)} starts of {len(looks.tried)} laws beside {parent_label(parent)}")
+        tried = [one for one in grown(search, looks) if len(one.effects) <= MOST]
+        tried += [richer for richer in (detailed(search, one) for one in tried[:1]) if richer]
+        tried.sort(key=lambda one: one.price(search.criteria))
+        found += tried
+        if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
+            break
+        parent = tried[0]
+        search.say(f"best so far: {parent_label(parent)} leaves {search.over_noise(parent.fit):.2f} x sensor noise")
+        if len(parent.effects) >= MOST:
+            break
+    return [*found, *reduced(search, parent)], first
 
 
-def twins(search: Search, chosen: Explanation, base: Explanation, found: Sequence[Explanation]) -> list[Explanation]:
-    """Return explanations as good, with another law in the place of one of the chosen ones, of those not known as good.
+def reduced(search: Search, one: Proposal) -> list[Proposal]:
+    """Sets that are left when one effect after another is taken out, the one that is missed least."""
+    found: list[Proposal] = []
+    while len(one.effects) > 1:
+        less = [without(search, one, place) for place in range(len(one.effects))]
+        found += less
+        one = min(less, key=lambda e: e.fit.cost)
+    return found
 
-    The other effects and all constants are free. Without this, what is named hangs on the order in which effects were
-    added: the second of two laws that do the same finds nothing left to explain. A law that contains the chosen one
-    always does as well, and is none of them.
 
-    Args:
-        search: the recording and its effects.
-        chosen: the answer that is to be given.
-        base: the refitted base model.
-        found: what has been tried.
-    """
-    known = {named_by(one.effects) for one in found if not worse(one.judgement, chosen.judgement, search.criteria)}
-    search.say(f"what else would explain as much as {chosen.label}?")
-    reached = search.frozen(chosen.fit).cost
-    others = []
+def cheapest(found: Sequence[Proposal], search: Search) -> list[Proposal]:
+    """The cheapest of those that name the same effects, cheapest first."""
+    first: dict[frozenset[tuple[str, str]], Proposal] = {}
+    for one in sorted(found, key=lambda one: one.price(search.criteria)):
+        first.setdefault(named_by(one.effects), one)
+    return list(first.values())
+
+
+def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:
+    """Sets with another law in the place of one of the chosen ones that fit as well with everything free."""
+    known = {named_by(one.effects) for one in judged}
+    itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
     for place, effect in enumerate(chosen.effects):
-        parent = without(search, chosen, place) if len(chosen.effects) > 1 else base
-        frozen = search.frozen(parent.fit)
-        wanted = [
-            one
-            for one in search.new(search.candidates)
-            if one.joints[0] in effect.joints
-            and named_by((*parent.effects, one)) not in known
-            and effect.effect.name not in one.effect.contains
-        ]
-        promising = with_groups(screen(search.problem, frozen, wanted), 0.0)[:REFITTED]
-        brief = search.brief(frozen, promising)
-        close = max(AS_CLOSE * reached, reached + LEFT * (frozen.cost - reached))
-        near = [(candidate, fit) for candidate, fit in brief if fit.cost <= close]
-        longer = [(candidate, search.continued(frozen, fit)) for candidate, fit in near]
-        as_close = [pair for pair in longer if pair[1].cost <= AS_CLOSE * chosen.fit.cost]
-        finished = [search.finish(parent, *one, len(as_close)) for one in as_close]
-        others += [one for one in finished if not worse(one.judgement, chosen.judgement, search.criteria)]
-    return [search.pruned(one) for one in others]
+        looks = first
+        if len(chosen.effects) > 1:
+            looks = look(search, without(search, itself, place), list(effect.joints))
+        for candidate, fitted in looks.tried:
+            names = named_by((*looks.parent.effects, candidate))
+            if len(found) < JUDGED and names not in known and near(search, looks, fitted, [itself]):
+                known.add(names)
+                found.append(refitted(search, looks, [(candidate, fitted)]))
+    return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
 
 
-def without(search: Search, chosen: Explanation, place: int) -> Explanation:
-    """Return an explanation without one of its effects, refitted."""
-    fitted, judgement = search.settled(without_effect(chosen.fit.model, chosen.effects, place))
-    left = (*chosen.effects[:place], *chosen.effects[place + 1 :])
-    return Explanation(left, fitted, judgement, 1.0, 0.0)
+def parent_label(one: Proposal) -> str:
+    """In words."""
+    return " & ".join(c.label for c in one.effects) or "the refitted model"

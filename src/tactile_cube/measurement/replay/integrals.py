@@ -48,6 +48,7 @@ def wind_up(plant: Plant, model: Model, windows: Windows, memory: Array) -> None
         unmoved,
         unmoved,
         begun,
+        np.zeros((count, 1)),
         np.array([TORQUE]),
         0,
         count,

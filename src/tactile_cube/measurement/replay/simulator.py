@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Literal, Self, get_args
 
 import numpy as np
@@ -34,6 +35,18 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Engine = Literal["fast", "pybullet"]
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
+MECHANICS = (
+    "ratio",
+    "offset",
+    "mass",
+    "placement_translation",
+    "axis",
+    "com",
+    "placement_rotation",
+    "inertia",
+    "gravity",
+)
+"""What the equations of motion of a path depend on, but for rotors."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +55,21 @@ class Simulated:
 
     position: Array
     torque: Array
+
+
+@dataclass(frozen=True)
+class Path:
+    """A model's way through windows, with the equations of motion along it, for its neighbours to follow.
+
+    Attributes:
+        position: what a log would show of the model, (S, K segment, sensors) [rad].
+        mechanics: what the equations of motion depend on.
+        steps: (S, T width) of every window, see `steps.free_step`.
+    """
+
+    position: Array
+    mechanics: Array
+    steps: Array
 
 
 def free_run(recording: Recording, model: Model, engine: Engine = "fast", step: float = 0.002) -> list[Simulated]:
@@ -93,10 +121,12 @@ class Simulator:
         known = tuple(dict.fromkeys([*catalogue().values(), *effects]))
         self.plant = Plant([self.tree], recording.step / self.substeps, known, recording.joints)
         self.workers = min(4, len(os.sched_getaffinity(0)))
+        self._pool = ThreadPoolExecutor(self.workers)
         self._world = _pybullet(self.plant) if engine == "pybullet" else None
 
     def close(self) -> None:
-        """End the physics server, if there is one."""
+        """End the threads, and the physics server if there is one."""
+        self._pool.shutdown()
         if self._world is not None:
             self._world.close()
 
@@ -123,6 +153,7 @@ class Simulator:
         windows: Sequence[Windows],
         corrections: Array | None = None,
         torques: bool = False,
+        near: Path | None = None,
     ) -> Array:
         """Each model through its windows, the start of each segment moved by the model's correction.
 
@@ -131,6 +162,8 @@ class Simulator:
             windows: one each, of one shape (S windows of K segments).
             corrections: (M, 2 n) added to positions [rad] and speeds [rad/s] at every start.
             torques: whether to give torques as well.
+            near: path of a model that they are close to: they follow it, at a third of the cost. Those of another
+                mechanism go their own way.
 
         Returns:
             What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and torques [N m].
@@ -141,11 +174,22 @@ class Simulator:
         whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
         if self._world is not None:
             whole = 0
-        with ThreadPoolExecutor(self.workers) as pool:
-            list(pool.map(self._one, models[:whole], windows[:whole], corrections, out))
-            for k in range(whole, len(models)):
-                self._one(models[k], windows[k], corrections[k], out[k], pool)
+        pool = self._pool
+        list(pool.map(partial(self._one, near=near), models[:whole], windows[:whole], corrections, out))
+        for k in range(whole, len(models)):
+            self._one(models[k], windows[k], corrections[k], out[k], pool, near)
         return out
+
+    def path(self, model: Model, windows: Windows) -> Path:
+        """A model's way through windows, which its neighbours may follow."""
+        out = np.zeros((1, *windows.measured.shape))
+        steps = out.shape[2] * windows.substeps * self.plant.kernel.PATH_WIDTH
+        path = Path(out[0], self._mechanics(self.memory(model)), np.zeros((len(windows), steps)))
+        self._one(model, windows, np.zeros(2 * len(self.recording.joints)), out, self._pool, path, follows=False)
+        return path
+
+    def _mechanics(self, memory: Array) -> Array:
+        return np.concatenate([self.plant.view(memory, key).ravel() for key in MECHANICS])
 
     def gaps(self, model: Model) -> Array:
         """Width of the gap in each joint's transmission (n,) [rad]."""
@@ -173,9 +217,20 @@ class Simulator:
         return memory
 
     def _one(
-        self, model: Model, windows: Windows, correction: Array, out: Array, pool: ThreadPoolExecutor | None = None
+        self,
+        model: Model,
+        windows: Windows,
+        correction: Array,
+        out: Array,
+        pool: ThreadPoolExecutor | None = None,
+        near: Path | None = None,
+        follows: bool = True,
     ) -> None:
         memory = self._memories(model, windows)
+        paths = np.zeros((len(windows), 1))
+        if near is not None and (not follows or np.array_equal(near.mechanics, self._mechanics(memory[0]))):
+            paths = near.steps
+            self.plant.view(memory, "follows" if follows else "weighed")[:] = 1.0
         gap = gaps(self.plant, memory[0])
         ratios = self._jump_ratios(memory, windows)
         limit = self.plant.view(memory, "torque_limit")[:, None].copy()
@@ -185,7 +240,7 @@ class Simulator:
         if self._world is not None:
             self._in_world(self._world, windows, memory, rows, signals)
         else:
-            self._in_closed_form(windows, self._past(model, windows), correction, memory, rows, signals, pool)
+            self._in_closed_form(windows, self._past(model, windows), correction, memory, paths, rows, signals, pool)
         jump = simulated_jumps(signals[:, :, 2], windows)
         shown = signals[:, :: windows.substeps]
         free = free_way(self.plant, memory[:, None], jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
@@ -216,6 +271,7 @@ class Simulator:
         past: int,
         correction: Array,
         memory: Array,
+        paths: Array,
         rows: NDArray[np.int64],
         signals: Array,
         pool: ThreadPoolExecutor | None,
@@ -236,6 +292,7 @@ class Simulator:
                 windows.initial_state,
                 np.tile(correction, (count, 1)),
                 memory,
+                paths,
                 rows,
                 first,
                 last,

@@ -1,0 +1,224 @@
+"""Which sets of effects may be what is missing, by their fit alone: every law by itself, pairs, and all of a kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tactile_cube.drivetrain.effects.effect import Stage
+from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
+from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.search.candidates import Candidate, with_details, without_effect
+from tactile_cube.identification.search.division import some
+from tactile_cube.identification.search.evidence import segment_errors
+from tactile_cube.identification.search.explanation import Proposal, named_by
+from tactile_cube.identification.search.residual_starts import PROFILE, residual_candidates, special_candidates
+from tactile_cube.identification.search.screening import Score, resized, screen, start
+from tactile_cube.identification.search.search import Search
+
+Array = NDArray[np.float64]
+LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
+STEPS = 2  # of Gauss-Newton that every law gets
+SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
+CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
+SPECIAL = 3  # best laws of which a profile is looked at for simpler ones
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Every law beside a fitted set, after two steps of its own.
+
+    Attributes:
+        parent: the set.
+        problem: few windows.
+        frozen: its fit there.
+        tried: laws with their fits there, best first.
+        scores: the first look, best first.
+    """
+
+    parent: Proposal
+    problem: Problem = field(repr=False)
+    frozen: Fit = field(repr=False)
+    tried: list[tuple[Candidate, Fit]] = field(repr=False)
+    scores: list[Score] = field(repr=False)
+
+
+def off(problem: Problem, one: Fit, most: float) -> list[int]:
+    """Joints whose error on the fitted trials is above so many times the sensor noise, the whole machine's included."""
+    errors = np.sqrt(np.nanmean(segment_errors(problem, one.residual) ** 2, axis=0))
+    return [j for j, error in enumerate(errors) if error > most]
+
+
+def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
+    """Every law at these joints gets its own steps beside a set that is fitted.
+
+    Args:
+        search: the recording.
+        parent: the set.
+        at: joints.
+    """
+    problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
+    problem.linearise_starts(parent.fit.model)
+    frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
+    there = named_by(parent.effects)
+    possible = [
+        one
+        for one in wanted(search, problem, frozen)
+        if there.isdisjoint(named_by([one])) and (one.joints[0] in at or one.effect.stage is Stage.MECHANISM)
+    ]
+    scores = screen(problem, frozen, possible)
+    tried = sorted((stepped(problem, frozen, one) for one in best_starts(scores)), key=lambda pair: pair[1].cost)
+    simpler = [
+        special
+        for candidate, fitted in tried[:SPECIAL]
+        if PROFILE in candidate.form
+        for special in search.new(special_candidates(candidate, fitted.model.terms[-1], search.effects))
+    ]
+    tried = sorted([*tried, *(stepped(problem, frozen, one) for one in simpler)], key=lambda pair: pair[1].cost)
+    return Looks(parent, problem, frozen, tried, scores)
+
+
+def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
+    """What may be added to a fit: at starts of its own, or read from what the fit leaves."""
+    return search.new([*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)])
+
+
+def stepped(problem: Problem, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
+    """A law after its own steps beside a fit, whose columns stay."""
+    model, unknowns = candidate.added_to(frozen.model)
+    return candidate, fit(problem, model, unknowns, STEPS, frozen)
+
+
+def best_starts(scores: Sequence[Score]) -> list[Candidate]:
+    """Of every law in every form at every joint the start that promises most, as large as it promises."""
+    starts: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[Score]] = {}
+    for score in scores:
+        key = (score.candidate.effect.name, tuple(score.candidate.form), score.candidate.joints)
+        starts.setdefault(key, []).append(score)
+    return [resized(start(same) if same[0].gain > 0.0 else same[0]) for same in starts.values()]
+
+
+def grown(search: Search, looks: Looks) -> list[Proposal]:
+    """The most promising sets that contain the parent, everything refitted, cheapest first.
+
+    Once one leaves nothing, only those are refitted too that their own steps have brought near it.
+    """
+    by_name: dict[tuple[str, tuple[str, ...]], tuple[Candidate, Fit]] = {}
+    for candidate, fitted in looks.tried:
+        by_name.setdefault((candidate.effect.name, candidate.joints), (candidate, fitted))
+    found: list[Proposal] = []
+    for one in list(by_name.values())[:SINGLES]:
+        if not whole(search, found) or near(search, looks, one[1], found):
+            found.append(refitted(search, looks, [one]))
+    if not whole(search, found):
+        found += [refitted(search, looks, laws) for laws in sets(looks)[:SETS]]
+    return sorted(found, key=lambda one: one.price(search.criteria))
+
+
+def whole(search: Search, found: Sequence[Proposal]) -> bool:
+    """Whether one of the sets leaves no joint off."""
+    return any(not off(search.problem, one.fit, search.criteria.floor) for one in found)
+
+
+def near(search: Search, looks: Looks, fitted: Fit, found: Sequence[Proposal]) -> bool:
+    """Whether a law has come near the best set by its own steps, on few windows."""
+    return over_noise(looks.problem, fitted) ** 2 <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2
+
+
+def over_noise(problem: Problem, fitted: Fit) -> float:
+    """RMS error of a fit in units of the sensor noise."""
+    return float(np.sqrt(fitted.cost / np.count_nonzero(problem.weight)))
+
+
+def refitted(search: Search, looks: Looks, laws: Sequence[tuple[Candidate, Fit]]) -> Proposal:
+    """A set with some laws more, each at its own fit to begin with, everything free."""
+    known = len(looks.frozen.model.terms)
+    terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
+    model = replace(looks.frozen.model, terms=(*looks.frozen.model.terms, *terms))
+    one = Proposal((*looks.parent.effects, *(candidate for candidate, _ in laws)), search.refitted(model))
+    search.say(f"  {search.over_noise(one.fit):8.3f}  {' & '.join(c.label for c in one.effects)}")
+    return one
+
+
+def detailed(search: Search, one: Proposal) -> Proposal | None:
+    """A set with the details of its last law free too, if it has any."""
+    if not one.effects or not (richer := with_details(one.effects[-1], one.fit.model)):
+        return None
+    candidate, model, _ = richer
+    return Proposal((*one.effects[:-1], candidate), search.refitted(model))
+
+
+def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
+    """Pairs of laws, and one law at several joints, by what trials that they were not sized by would gain, best first.
+
+    What each law changes is known from its own fit; together they are sized by least squares, on all trials but one in
+    turn, from products that were summed trial by trial. Source: Allen, The relationship between variable selection and
+    data augmentation and a method for prediction, Technometrics 16, 1974 (the PRESS statistic).
+    """
+    problem, laws = looks.problem, looks.tried
+    if len(laws) < 2:
+        return []
+    gradient, gram = products(problem, looks.frozen, [fitted for _, fitted in laws])
+    expected = noise_inflation(problem, looks.frozen.cost)
+    alone = np.array([press(gradient[:, [k]], gram[:, [k]][:, :, [k]], expected) for k in range(len(laws))])
+    found = []
+    for rows in wanted_sets([candidate for candidate, _ in laws]):
+        part = np.ix_(range(len(gram)), rows, rows)
+        gained = press(gradient[:, rows], gram[part], expected)
+        if gained > alone[rows].max():
+            found.append((gained, tuple(laws[k] for k in rows)))
+    found.sort(key=lambda one: -one[0])
+    return distinct([one for _, one in found])
+
+
+def distinct(found: Sequence[tuple[tuple[Candidate, Fit], ...]]) -> list[tuple[tuple[Candidate, Fit], ...]]:
+    """The first of those that name the same effects."""
+    first: dict[frozenset[tuple[str, str]], tuple[tuple[Candidate, Fit], ...]] = {}
+    for laws in found:
+        first.setdefault(named_by([candidate for candidate, _ in laws]), laws)
+    return list(first.values())
+
+
+def wanted_sets(laws: Sequence[Candidate]) -> Iterator[list[int]]:
+    """Places of laws that may act together: any two, and one law in one form at three joints and more."""
+    for pair in combinations(range(len(laws)), 2):
+        if named_by([laws[pair[0]]]) != named_by([laws[pair[1]]]):
+            yield list(pair)
+    kinds: dict[tuple[str, tuple[str, ...]], dict[tuple[str, ...], int]] = {}
+    for place, law in enumerate(laws):
+        kinds.setdefault((law.effect.name, tuple(law.form)), {}).setdefault(law.joints, place)
+    yield from (list(places.values()) for places in kinds.values() if len(places) > 2)
+
+
+def products(problem: Problem, frozen: Fit, fits: Sequence[Fit]) -> tuple[Array, Array]:
+    """Gradients (T, C) and products (T, C, C) of what C laws change, trial by trial, constants and starts taken out."""
+    residual = frozen.residual
+    changes = np.stack([residual - one.residual for one in fits], axis=-1)
+    weight = noise_inflation(problem, frozen.cost) * precision(frozen.unknowns)
+    information = frozen.information + np.diag(weight)
+    joined = np.concatenate([residual[..., None], changes], axis=-1)
+    cross = np.einsum("grp,grc->pc", problem.free(frozen.columns), joined, optimize=True)
+    joined = joined - frozen.columns @ np.linalg.solve(information, cross)
+    freed = problem.free(joined)
+    each = np.einsum("grc,grd->gcd", joined, freed, optimize=True)
+    by_trial = np.stack([each[problem.segment_trial == k].sum(axis=0) for k in np.unique(problem.segment_trial)])
+    return by_trial[:, 0, 1:], by_trial[:, 1:, 1:]
+
+
+def press(gradient: Array, gram: Array, expected: float) -> float:
+    """What trials gain by columns that the others have sized: gradients (T, C), products (T, C, C)."""
+    total, whole = gradient.sum(axis=0), gram.sum(axis=0) + expected * np.eye(gram.shape[1])
+    if len(gradient) < 2:
+        return float(total @ np.linalg.solve(whole, total))
+    factors = np.linalg.solve(whole - gram, (total - gradient)[..., None])[..., 0]
+    return float(np.sum(2.0 * factors * gradient) - np.einsum("tc,tcd,td->", factors, gram, factors))
+
+
+def without(search: Search, one: Proposal, place: int) -> Proposal:
+    """The set without one of its effects, refitted."""
+    model = without_effect(one.fit.model, one.effects, place)
+    return Proposal((*one.effects[:place], *one.effects[place + 1 :]), search.refitted(model))
