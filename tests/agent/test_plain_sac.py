@@ -138,6 +138,11 @@ def test_automatic_precision_is_what_the_processor_multiplies(
     assert bool(agent.approximations()) == supported
 
 
+def test_a_processor_without_bfloat16_is_told_what_is_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tactile_cube.agent.agent.multiplies_bfloat16", lambda: False)
+    assert "faster with agent.precision=fp32" in made(PlainSac, precision="bf16").approximations()[0]
+
+
 @pytest.mark.parametrize("kind", [Sac, PlainSac])
 def test_state_dict_restores_the_agent_bit_for_bit(kind: type[Agent]) -> None:
     first = made(kind)

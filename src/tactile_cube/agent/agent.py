@@ -10,7 +10,7 @@ from tensordict import TensorDictBase
 from torch import Tensor, nn
 
 from tactile_cube.agent.networks import Actor, Critic, Sizes, build_networks
-from tactile_cube.agent.settings import AgentSettings
+from tactile_cube.agent.settings import AgentSettings, multiplies_bfloat16
 
 
 class Agent(ABC):
@@ -101,4 +101,6 @@ class Agent(ABC):
         if self.settings.product_dtype != torch.bfloat16:
             return []
         asked = f"agent.precision={self.settings.precision}"
-        return [f"{asked}: matrix products in bfloat16, parameters and optimiser in float32"]
+        fits = self.device.type != "cpu" or multiplies_bfloat16()
+        slow = "" if fits else "; this processor is faster with agent.precision=fp32, which gives other bits"
+        return [f"{asked}: matrix products in bfloat16, parameters and optimiser in float32{slow}"]
