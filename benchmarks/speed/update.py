@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any
 
 import torch
+from tensordict import TensorDict
 
 from benchmarks.speed.peers import find_peer
 from benchmarks.speed.products import multiplying, update_products
@@ -81,10 +82,9 @@ def _updating(agent: Agent, batch: int = 256) -> Callable[[], object]:
 def filled_replay(capacity: int) -> Replay:
     """A full replay of made-up transitions."""
     replay = Replay(capacity, SIZES, REWARD_TERMS, seed=0)
-    rows = torch.rand(capacity, sum(replay.widths.values())) * 2.0 - 1.0
-    terminated, steps = -3, -2
-    rows[:, terminated], rows[:, steps] = 0.0, 1.0
-    replay.buffer.extend(rows)
+    parts = {key: torch.rand(capacity, width) * 2.0 - 1.0 for key, width in replay.widths.items()}
+    parts |= {("next", "terminated"): torch.zeros(capacity, 1), "steps_to_next_obs": torch.ones(capacity, 1)}
+    replay.extend(TensorDict(parts, [capacity]))
     return replay
 
 

@@ -231,7 +231,7 @@ def test_a_slow_hold_takes_the_time_it_needs() -> None:
 @pytest.mark.timeout(300)
 def test_ctrl_z_lets_go_then_suspends_and_ends_when_it_goes_on(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "tactile_cube.deploy", "seconds=600", "motion=holds", f"hydra.run.dir={tmp_path}"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, start_new_session=False) as command:
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, process_group=0) as command:
         assert command.stdout is not None
         assert any(line.startswith("running: ") for line in command.stdout)
         command.send_signal(signal.SIGTSTP)

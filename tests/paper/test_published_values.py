@@ -116,7 +116,6 @@ PUBLISHED: dict[str, list[Row]] = {
     "evaluate protocol=paper": [
         ("protocol.episodes", 10, "P"),
         ("protocol.seconds", 40, "P"),
-        ("protocol.success_share", 0.8, "P: of the best run's angle"),
     ],
     "evaluate protocol=endurance": [("protocol.seconds", 960, "P: nearly 16 min")],
 }

@@ -191,7 +191,7 @@ def trained_through(phase: str, folder: Path) -> None:
         return run
 
     tiny = tiny_environment()
-    environment = type(tiny)(killed_at_its_start, tiny.sizes, tiny.reward_terms, tiny.reward_weights)
+    environment = type(tiny)(killed_at_its_start, tiny.sizes, tiny.terms, tiny.reward_weights)
     assert train_on(build)[1] == "all 160 steps done"
     assert once.exists() == (phase == "start")
 

@@ -12,7 +12,7 @@ from tests.workbench.small_bench import STRIBECK, stribeck_recording
 
 def test_a_diagnosis_tells_its_progress_and_its_answer(tmp_path: Path) -> None:
     running = Diagnosing(stribeck_recording(tmp_path), None, (), 0, tmp_path / "found")
-    assert any("screened" in line for line in list(running.lines()))
+    assert any("best so far" in line for line in list(running.lines()))
     assert running.found is not None
     assert running.found.effects == [STRIBECK]
     assert (tmp_path / "found" / "report.html").is_file()

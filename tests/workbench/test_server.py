@@ -123,13 +123,25 @@ def port_of(address: str) -> int:
     return int(re.findall(r":(\d+)/", address)[0])
 
 
+@contextlib.contextmanager
+def ended(run: subprocess.Popen[str]) -> Iterator[None]:
+    """A program that does not outlive its test, whatever the test raises."""
+    try:
+        yield
+    finally:
+        run.kill()
+
+
 def test_no_log_file_or_command_line_has_the_token_and_others_read_nothing(tmp_path: Path) -> None:
     seen = tmp_path / "browser"
     seen.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/line\ncp "${{1#file://}}" {tmp_path}/copy\n')
     seen.chmod(0o755)
     words = [sys.executable, "-m", "tactile_cube.workbench", f"hydra.run.dir={tmp_path}/run"]
     environment = os.environ | {"BROWSER": str(seen)}
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment) as run:
+    # as at a terminal: a shell that runs it in the background would have it ignore SIGINT
+    interruptible = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    output = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(words, **output, **interruptible, env=environment) as run, ended(run):
         assert run.stdout is not None
         address = next(found.group() for line in run.stdout if (found := re.search(r"http://\S+", line)))
         token = address.partition("token=")[2]
@@ -146,6 +158,7 @@ def test_no_log_file_or_command_line_has_the_token_and_others_read_nothing(tmp_p
         assert modes == {"workbench.log": 0, "open.html": 0}
         run.send_signal(signal.SIGINT)
         said = run.stdout.read()
+        assert run.wait() in (0, 130)
     assert token not in said
     assert not (tmp_path / "run" / "open.html").exists()
     kept = [path for path in (tmp_path / "run").rglob("*") if path.is_file()]

@@ -38,9 +38,7 @@ Array = NDArray[np.float64]
 WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short ones from far off, long ones for what is slow
 FEWEST_ROWS = 8
 LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data for a first answer
-MISSED = (
-    0.25  # of the squared error: `criteria.large_gain`, from which an effect is needed though its interval reaches 0
-)
+MISSED = 0.25  # of the squared error, from which on an effect is needed though its interval reaches 0
 ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
 OUTLYING = 2.0  # robust standard deviations from which on an error counts in proportion, not squared
 NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal number
@@ -53,6 +51,8 @@ PLAIN: Laws = {
     "viscous_friction": ("damping",),
     "coulomb_friction": ("friction",),
 }
+IN_PROPORTION = ("payload", "reflected_inertia")
+"""Effects that change nothing in proportion with a torque constant: as stated unless held-out trials need them."""
 BY_DIRECTION: Laws = {
     "viscous_friction": ("damping", "difference"),
     "asymmetric_friction": ("difference",),
@@ -166,7 +166,7 @@ class _Fitting:
         """The best fit with these laws too, in windows that grow or those that did best; else what it was before."""
         best, model = before, self.with_laws(before.model, laws)
         longest = max(len(trial.time) for trial in self.recording.trials)
-        growing = [round(seconds * self.shooting.time / self.recording.step) for seconds in WINDOWS]
+        growing = [self.rows_of(seconds) for seconds in WINDOWS]
         lengths = [before.rows] if before.rows else growing
         for rows in dict.fromkeys(min(max(length, FEWEST_ROWS), longest) for length in lengths):
             tried = self.robust(model, rows)
@@ -174,6 +174,10 @@ class _Fitting:
                 best = tried
             model = tried.model
         return best
+
+    def rows_of(self, seconds: float) -> int:
+        """How many rows a window of so long has, of a finger or of what is as slow in proportion."""
+        return round(seconds * self.shooting.time / self.recording.step)
 
     def robust(self, model: Model, rows: int) -> _Tried:
         """A fit in windows of so many rows with a soft-L1 loss, by weights that are taken anew."""
@@ -209,9 +213,12 @@ class _Fitting:
         least = {min(labels, key=doubt.__getitem__) for labels in by_joint.values() if labels}
         needless = {label for label in least if doubt[label] < 1.0}
         if not needless:
+            needless = {t.label for t in new if t.effect.name in IN_PROPORTION}
+        if not needless:
             return best
         terms = tuple(t for t in best.model.terms if t not in new or t.label not in needless)
-        fewer = self.robust(replace(best.model, terms=terms), best.rows)
+        near = self.robust(replace(best.model, terms=terms), min(self.rows_of(WINDOWS[1]), best.rows))
+        fewer = min(near, self.robust(near.model, best.rows), key=lambda one: one.error)
         return self.needed(fewer) if fewer.error**2 <= (1.0 + MISSED) * best.error**2 else best
 
     def added(self, model: Model) -> tuple[Candidate, ...]:

@@ -27,7 +27,7 @@ def test_the_campaign_sees_other_bits_and_damage(tmp_path: Path) -> None:
     run = tmp_path / "run"
     reference, _ = undisturbed(run, SHORT)
     assert same(results(run), reference)
-    reference["agent"]["parameters"][0] += 1e-6
+    reference["agent"]["loss"]["log_alpha"] += 1e-6
     assert not same(results(run), reference)
     assert damaged_checkpoints(run) == 0
     (run / "checkpoint_before.pt").write_bytes(b"half")
