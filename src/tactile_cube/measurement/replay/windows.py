@@ -192,6 +192,8 @@ def whole_trials(
     longest = max(len(trial.time) for trial in trials)
     history = round(WAKING / recording.step)
     noise = np.broadcast_to(noise, len(recording.joints))
+    if not _tells(recording.step, _usual(recording.step, time), noise, speed):
+        speed = np.inf  # more samples than usual would misread a start that moves
     pieces = [
         piece
         for k, trial in enumerate(trials)
@@ -382,12 +384,17 @@ def _half_width(step: float, noise: Array, speed: Array | float, time: float) ->
     Fewer than usual where so few tell it well beyond need, for where a speed changes fast a polynomial misreads it.
     More, and up to half a segment, where the usual ones leave it too noisy: dry friction asks for its sign.
     """
-    usual, most = max(2, round(SMOOTHING * time / step)), round(0.5 * SEGMENT * time / step)
+    usual, most = _usual(step, time), round(0.5 * SEGMENT * time / step)
     if not np.all(np.isfinite(speed)):
         return usual
     fewer = (half for half in range(min(FEWEST_AROUND, usual), usual) if _tells(step, half, noise, WELL * speed))
     more = (half for half in range(usual, most) if _tells(step, half, noise, speed))
     return next(fewer, next(more, max(usual, most)))
+
+
+def _usual(step: float, time: float) -> int:
+    """Rows on either side of a start that its speed is read from where nothing else is known."""
+    return max(2, round(SMOOTHING * time / step))
 
 
 def _tells(step: float, half: int, noise: Array, speed: Array | float) -> bool:
