@@ -5,14 +5,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.env import RotationEnv
-from tactile_cube.evaluation.evaluation import NearlyEqualStart
+from tactile_cube.evaluation.evaluation import DisplacedStart
 
 
 def displacement(env: RotationEnv, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Shift (3,) [m] and rotation vector (3,) [rad] of the cube by the nearly equal start of a seed."""
+    """Shift (3,) [m] and rotation vector (3,) [rad] of the cube by the displaced start of a seed."""
     env.reset()
     before = env.world.start
-    NearlyEqualStart(seed)(env, 0)
+    DisplacedStart(seed, 5e-4)(env, 0)
     after = env.world.start
     np.testing.assert_array_equal(after.angles, before.angles)
     assert env.world.constants is env.constants
@@ -36,5 +36,5 @@ def test_the_cube_is_displaced_once_and_equally_by_equal_seeds(
     env = rotation_task(scripted_world())
     np.testing.assert_array_equal(displacement(env, 3), displacement(env, 3))
     later = env.world.start
-    NearlyEqualStart(3)(env, 1)
+    DisplacedStart(3, 5e-4)(env, 1)
     assert env.world.start is later

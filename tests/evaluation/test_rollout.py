@@ -10,7 +10,7 @@ from torchrl.envs import TransformedEnv
 
 from tactile_cube.env import Task
 from tactile_cube.env.reward import TOUCH_FORCE
-from tactile_cube.evaluation.evaluation import Evaluation, NearlyEqualStart
+from tactile_cube.evaluation.evaluation import DisplacedStart, Evaluation
 from tactile_cube.evaluation.policies import HoldPolicy, RandomPolicy, ReplayPolicy, ScriptedPolicy
 from tactile_cube.evaluation.protocol import Protocol
 from tactile_cube.evaluation.rollout import run_episode
@@ -108,7 +108,7 @@ def test_replaying_an_undisturbed_episode_repeats_it() -> None:
     quiet = make_env(dataclasses.replace(CONFIG, randomization=undisturbed), 1, 0, evaluation=True)
     original = run_episode(quiet, RandomPolicy(), 5)
     replayed = run_episode(quiet, ReplayPolicy(original.target), 5)
-    displaced = run_episode(quiet, ReplayPolicy(original.target), 5, NearlyEqualStart(1))
+    displaced = run_episode(quiet, ReplayPolicy(original.target), 5, DisplacedStart(1, 0.0005))
     quiet.close()
     np.testing.assert_allclose(replayed.cube_position, original.cube_position, atol=1e-4)
     assert 1e-5 < np.abs(displaced.cube_position - original.cube_position).max() < 0.02
@@ -131,12 +131,13 @@ def test_scripted_gait_is_deterministic_and_bounded(env: TransformedEnv) -> None
 
 
 def test_an_evaluation_judges_and_repeats_its_episodes() -> None:
-    evaluation = Evaluation(CONFIG, HoldPolicy(), Protocol("x", episodes=2, seconds=1.0, replay=True), seed=1)
+    evaluation = Evaluation(CONFIG, HoldPolicy(), Protocol("x", episodes=2, seconds=1.0, replay=(0.0005,)), seed=1)
     seen: list[str] = []
-    nominal, replay = evaluation.run(lambda name, result: seen.append(name))
+    nominal, replay, policy = evaluation.run(lambda name, result: seen.append(name))
     assert [result.verdict for result in nominal.results] == [EpisodeVerdict.HOLDING] * 2
     assert [result.seed for result in nominal.results] == [10_000, 10_001]
-    assert len(seen) == len(nominal.results) + len(replay.results) == 4
+    assert len(seen) == len(nominal.results) + len(replay.results) + len(policy.results) == 6
+    assert {result.seed for result in (*replay.results, *policy.results)} <= {10_000, 10_001}, "in the best one's world"
     first, second = (result.final_angle for result in replay.results)
     assert first != second, "replays start displaced, each in its own way"
     record = evaluation.record(nominal.variant, nominal.results[1])

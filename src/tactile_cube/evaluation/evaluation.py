@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -98,7 +98,7 @@ class Evaluation:
         """Run all episodes."""
         results = [self._run_variant(variant, report) for variant in self.protocol.conditions]
         if self.protocol.replay:
-            results.append(self._run_replay(results[0].results, report))
+            results += self._run_displaced(results[0].results, report)
         return results
 
     def record(self, variant: Variant, result: EpisodeResult) -> EpisodeRecord:
@@ -121,18 +121,23 @@ class Evaluation:
         episodes = ((seed, run_episode(env, policy, seed, variant.pull)) for seed in seeds)
         return self._judged(variant, env, episodes, report)
 
-    def _run_replay(self, results: list[EpisodeResult], report: Report) -> VariantResult:
-        """Replay the best episode's targets open loop, from starts that differ a little."""
+    def _run_displaced(self, results: list[EpisodeResult], report: Report) -> Iterator[VariantResult]:
+        """From displaced starts of the best episode's world: its targets open loop, and the policy."""
         best = max(results, key=lambda result: result.final_angle)
         replay = ReplayPolicy(self.record(self.protocol.variants[0], best).target)
         # The recorded targets hold the repeated actions already.
         undisturbed = dataclasses.replace(self._config.randomization, sticky_probability=0.0)
-        config = self.protocol.variants[0].apply(dataclasses.replace(self._config, randomization=undisturbed))
-        env = make_env(config, 1, self._seed, evaluation=True)
-        variant = Variant(name="replay of the best episode, start displaced a little")
-        starts = [NearlyEqualStart(episode_seed(self._seed, k)) for k in range(self.protocol.episodes)]
-        episodes = ((best.seed, run_episode(env, replay, best.seed, start)) for start in starts)
-        return self._judged(variant, env, episodes, report)
+        for spread in self.protocol.replay:
+            starts = [DisplacedStart(episode_seed(self._seed, k), spread) for k in range(self.protocol.episodes)]
+            aside = f"start {1e3 * spread:g} mm aside"
+            for name, policy, randomization in (
+                (f"replay of the best episode, {aside}", replay, undisturbed),
+                (f"the policy in that world, {aside}", self._policy, self._config.randomization),
+            ):
+                config = self.protocol.variants[0].apply(dataclasses.replace(self._config, randomization=randomization))
+                env = make_env(config, 1, self._seed, evaluation=True)
+                episodes = ((best.seed, run_episode(env, policy, best.seed, start)) for start in starts)
+                yield self._judged(Variant(name=name), env, episodes, report)
 
     def _judged(
         self, variant: Variant, env: TransformedEnv, episodes: Iterable[tuple[int, EpisodeRecord]], report: Report
@@ -153,19 +158,23 @@ def episode_seed(seed: int, episode: int) -> int:
     return 10_000 * seed + episode
 
 
-POSITION_SPREAD = 0.0005
-"""Standard deviation of the cube's displacement in x and y [m]: half of what the start is randomised by."""
-YAW_SPREAD = 0.01
-"""Standard deviation of its turn about the vertical [rad]."""
+YAW_PER_SHIFT = 20.0
+"""Turn of a displaced cube for its shift [rad/m]: its corners, some 50 mm from the middle, move as far by either."""
 
 
-class NearlyEqualStart:
-    """Displaces the cube a little before the first policy step; everything else of the episode stays."""
+class DisplacedStart:
+    """Displaces the cube before the first policy step, as a hand-over does; everything else of the episode stays.
 
-    def __init__(self, seed: int) -> None:
+    Args:
+        seed: of the draw.
+        spread: standard deviation of the displacement in x and in y [m]; `YAW_PER_SHIFT` times it is that of the turn
+            about the vertical [rad].
+    """
+
+    def __init__(self, seed: int, spread: float) -> None:
         rng = np.random.default_rng(seed)
-        self._shift = np.append(rng.normal(0.0, POSITION_SPREAD, 2), 0.0)
-        self._turn = Rotation.from_euler("z", rng.normal(0.0, YAW_SPREAD))
+        self._shift = np.append(rng.normal(0.0, spread, 2), 0.0)
+        self._turn = Rotation.from_euler("z", rng.normal(0.0, YAW_PER_SHIFT * spread))
 
     def __call__(self, env: RotationEnv, step: int) -> None:
         """Start the world anew with the displaced cube when `step` is 0."""

@@ -22,7 +22,8 @@ class Protocol:
         variants: conditions, each tried with the same seeds.
         nominal_values: where the nominal condition lies on the axes of the variants.
         catalogue: add a variant for each effect of the drivetrain's catalogue at its typical size.
-        replay: replay the targets of the best episode of the policy from these episodes' starts.
+        replay: standard deviations of the start's displacement [m]; at each, the targets of the policy's best
+            episode are replayed in its world, and the policy is tried there.
         film: number of episodes, the best first, that are filmed and recorded for Rerun.
         trace: keep the signals of every physics step in the recorded episodes.
     """
@@ -34,7 +35,7 @@ class Protocol:
     variants: Sequence[Variant] = field(default_factory=lambda: (Variant(),))
     nominal_values: Mapping[str, float] = field(default_factory=dict)
     catalogue: bool = False
-    replay: bool = False
+    replay: Sequence[float] = ()
     film: int = 1
     trace: bool = True
 
@@ -48,6 +49,8 @@ class Protocol:
             raise InputError(f"protocol.worlds is {self.worlds!r}; choose training or paper")
         if not self.variants:
             raise InputError("protocol.variants is empty; give at least one, {name: worlds as drawn}")
+        if not all(0.0 <= spread < 0.05 for spread in self.replay):
+            raise InputError(f"protocol.replay is {list(self.replay)}; give displacements from 0 to below 0.05 m")
         if self.film < 0:
             raise InputError(f"protocol.film is {self.film}; give 0 or more")
 
