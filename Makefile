@@ -10,7 +10,7 @@ ARGS ?=
 
 help: ## print these targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  make \1\t/' | expand -t 20
-	@echo "  needs Python 3.11 to 3.13 with venv (Debian: python3-venv), make and a C compiler (cc); see docs/install.md"
+	@echo "  needs Python 3.11 to 3.13 with venv (Debian: python3-venv) and make; see docs/install.md"
 	@echo "  ARGS=... adds words to the command, as in: make train ARGS='+experiment=table seed=1'"
 
 # The environment, made again only when what it holds has changed.

@@ -197,7 +197,7 @@ def walk(folder: Path, policy: str, steps: int, seed: int) -> dict[str, Any]:
         trials, unseen = perform(seed, world, BENCH)
         save(bench / "validation", world, BENCH, unseen)
         save(bench, world, BENCH, trials)
-    words = (f"recording={bench}", "engine=fast")
+    words = f"recording={bench}"
     diagnosis = json.loads(run("diagnose", place / "diagnose", "diagnosis.json", *words).read_text())
     found = [*diagnosis["effects"], *diagnosis["partial_effects"]]
     every = [f"{one['name']}@{joint}" for one in found for joint in one["joints"]]

@@ -71,7 +71,7 @@ def drawn(draw: int, seed: int, step: float, told: bool, beside: list[str], fold
     write_recording(folder / str(draw), source.recordings(int(rng.integers(2**31)))[""])
     if told:
         _tell(folder / str(draw) / "recording.yaml", 1 / step)
-    fitted = tactile_cube.identify(folder / str(draw), [f"{effect.name}@j"], "engine=fast", say=lambda line: None).model
+    fitted = tactile_cube.identify(folder / str(draw), [f"{effect.name}@j"], say=lambda line: None).model
     known = CONTROLLER | NOMINAL
     constants = [(key, known[key], one["j"]) for key, one in fitted.values.items() if key in known and "j" in one]
     parameters = [

@@ -65,7 +65,7 @@ def judge(
     place = folder / f"draw_{seed}"
     truth = write(seed, place, seconds, engine=engine, worlds=worlds, pushes=pushes)
     started = time.perf_counter()
-    diagnosis = run_command("diagnose", place / "diagnose", f"recording={place / 'recording'}", "engine=fast")
+    diagnosis = run_command("diagnose", place / "diagnose", f"recording={place / 'recording'}")
     wall = time.perf_counter() - started
     line: dict[str, Any] = {"seed": seed, "truth": truth, "diagnosis": diagnosis, "wall_seconds": round(wall, 1)}
     line["commit"] = commit()
@@ -87,7 +87,7 @@ def settled(place: Path, experiment: Path, seconds: float | None, engine: str, w
     """What is answered once the recommended experiment has been played on the rig, and its error on unseen trials."""
     play(place, experiment, seconds, engine, worlds)
     out = place / "diagnose_again"
-    diagnosis = run_command("diagnose", out, f"recording={place / 'recording'}", "engine=fast")
+    diagnosis = run_command("diagnose", out, f"recording={place / 'recording'}")
     error = validation_error(place / "recording", out / "model.yaml", place / "validation_again")
     return {"diagnosis": diagnosis, "validation_error": error}
 

@@ -51,7 +51,7 @@ def drawn(draw: int, seed: int, significance: float, folder: Path) -> dict[str, 
         write_recording(folder / f"{draw}-{name}", source.recordings(int(rng.integers(2**31)))[""])
         return folder / f"{draw}-{name}"
 
-    model = tactile_cube.identify(recorded("reference"), [f"{KNOWN}@j"], "engine=fast", say=quiet).model
+    model = tactile_cube.identify(recorded("reference"), [f"{KNOWN}@j"], say=quiet).model
     altered = recorded("other", friction=1.5 * damping) if change == MORE_FRICTION else recorded("other", change)
     setting = f"significance={significance}"
     same, other = (tactile_cube.monitor(one, model, setting, say=quiet) for one in (recorded("same"), altered))

@@ -94,7 +94,7 @@ def diagnose_often(number: int, out: Path) -> list[dict[str, float]]:
         table.writeheader()
         measured = tactile_cube.record(Path(place) / "bench", *BENCH)[""]
         for done in range(1, number + 1):
-            tactile_cube.diagnose(measured, "engine=fast").write(Path(place) / "answer")
+            tactile_cube.diagnose(measured).write(Path(place) / "answer")
             row = reading(psutil.Process(), Path(place), time.monotonic() - began)
             if row is not None:
                 rows.append(row | {"steps": done})

@@ -69,7 +69,7 @@ def loop(name: str, data: Path, out: Path) -> dict[str, Any]:
             write_recording(recording / part, tables)
     started = time.perf_counter()
     fresh = not (diagnosed / "diagnosis.json").is_file()
-    command("diagnose", diagnosed, f"recording={recording}", "engine=fast")
+    command("diagnose", diagnosed, f"recording={recording}")
     diagnosis = json.loads((diagnosed / "diagnosis.json").read_text())
     errors = {}
     for label, model in (("stated", "null"), ("found", str(diagnosed / "model.yaml"))):
@@ -77,7 +77,6 @@ def loop(name: str, data: Path, out: Path) -> dict[str, Any]:
         words = (
             f"recording={recording / 'validation'}",
             f"model={model}",
-            "engine=fast",
             "band.simulations=0",
             "rerun=false",
         )

@@ -38,7 +38,7 @@ def test_recordings_are_diagnosed_into_folders_of_their_names_and_one_that_canno
     sound = tmp_path / "sound"
     tactile_cube.record(sound, *RIG, f"source.urdf={tmp_path}/two.urdf", hidden, "source.validation=false")
     monkeypatch.setattr(batch, "each", one_after_the_other)
-    found = dict(tactile_cube.diagnose_each([sound, tmp_path / "gone"], "engine=fast", out=tmp_path / "out"))
+    found = dict(tactile_cube.diagnose_each([sound, tmp_path / "gone"], out=tmp_path / "out"))
     assert isinstance(found[tmp_path / "gone"], InputError)
     answer = found[sound]
     assert answer.data["verdict"] == "missing_effect"

@@ -113,9 +113,9 @@ def test_record_compare_diagnose_identify_and_know_it_afterwards(tmp_path: Path)
     hidden = 'source.hidden=["torque_bias@b: bias=0.05"]'
     measured = tactile_cube.record(tmp_path / "made", *RIG, f"source.urdf={tmp_path}/two.urdf", hidden)
     assert list(measured) == ["", "validation"]
-    found = tactile_cube.diagnose(measured[""], "engine=fast", say=quiet)
+    found = tactile_cube.diagnose(measured[""], say=quiet)
     assert (found.verdict, found.effects) == ("missing_effect", ["torque_bias@b"])
-    fitted = tactile_cube.identify(measured[""], found.effects, "engine=fast", say=quiet)
+    fitted = tactile_cube.identify(measured[""], found.effects, say=quiet)
     bias = fitted.model.effects[0].parameters["bias"]
     assert bias.low <= 0.05 <= bias.high
     assert (

@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def reference(folder: Path) -> ModelFile:
     recording = recorded(folder, "reference", 0, "viscous_friction@j: damping=0.04")
-    return tactile_cube.identify(recording, ["viscous_friction@j"], "engine=fast", say=lambda line: None).model
+    return tactile_cube.identify(recording, ["viscous_friction@j"], say=lambda line: None).model
 
 
 def test_an_unchanged_machine_raises_no_alarm(folder: Path, reference: ModelFile) -> None:

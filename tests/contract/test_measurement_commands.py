@@ -64,7 +64,7 @@ def test_what_is_known_already_is_no_news_to_diagnose(tmp_path: Path) -> None:
     settings = ["source.duration=4", "source.kinds=[ramps,multisine]", 'source.hidden=["torque_bias@b: bias=0.05"]']
     made = run("record", *made_rig(tmp_path, *settings), folder=tmp_path)
     assert made.returncode == 0, made.stderr
-    words = ["recording=made", "engine=fast"]
+    words = ["recording=made"]
     fitted = run("identify", *words, "effects=[torque_bias@b]", "hydra.run.dir=known", folder=tmp_path)
     assert fitted.returncode == 0, fitted.stderr
     words += ["hydra.run.dir=run"]

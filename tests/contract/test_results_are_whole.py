@@ -157,9 +157,9 @@ def results(folder: Path) -> dict[str, tuple[Callable[[Path], object], str]]:
     """A command -> what writes its result, and the file that appears last."""
     quiet: Any = {"say": lambda line: None}
     measured = recorded(folder, "measured", 0, "viscous_friction@j: damping=0.04")
-    fitted = tactile_cube.identify(measured, ["viscous_friction@j"], "engine=fast", **quiet)
+    fitted = tactile_cube.identify(measured, ["viscous_friction@j"], **quiet)
     compared = tactile_cube.compare(measured, "band.simulations=3", model=fitted.model, **quiet)
-    found = tactile_cube.diagnose(measured, "engine=fast", **quiet)
+    found = tactile_cube.diagnose(measured, **quiet)
     seen = tactile_cube.monitor(measured, fitted.model, **quiet)
     return {
         "compare": (compared.write, "comparison.json"),

@@ -1,11 +1,9 @@
 """Generated machine code: kept on disk, safe for several processes, renewed when a law changes."""
 
-import ctypes
 import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -80,29 +78,12 @@ def test_an_effect_that_cannot_be_imported_is_refused() -> None:
         _ = Plant([wheel()], dt=0.002, effects=[Local]).kernel
 
 
-def c_function(plant: Plant) -> Callable[..., None]:
-    return ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 4)(plant.kernel.control_callback()[1])
-
-
-def test_the_c_function_gives_the_same_torques_to_the_bit() -> None:
-    plant = Plant([finger()], dt=0.002)
-    memory = plant.memory(DrivetrainConstants())
-    plant.view(memory, "goal")[:] = 0.3
-    q, v = np.array([0.1, 0.2, 0.3, 0.31]), np.array([0.5, -0.2, 0.1, 0.1])
-    torque, other, copy = np.zeros(4), np.zeros(4), memory.copy()
-    plant.kernel.control_step(0, q, v, torque, memory)
-    c_function(plant)(0, *(array.ctypes.data for array in (q, v, other, copy)))
-    assert np.array_equal(torque, other)
-    assert np.array_equal(memory, copy)
-    assert np.any(torque != 0.0)
-
-
 def numbers() -> str:
     """What a finger's control step and a wheel's steps with a gap leave in memory, as text."""
     driven = Plant([finger()], dt=0.002)
     torques = driven.memory(DrivetrainConstants())
-    state = np.linspace(0.1, 0.4, 12)  # q, v, torque
-    c_function(driven)(0, *(state[k : k + 4].ctypes.data for k in (0, 4, 8)), torques.ctypes.data)
+    state = np.linspace(0.1, 0.4, 12)
+    driven.kernel.control_step(0, state[:4], state[4:8], state[8:], torques)
     free = Plant([wheel()], dt=0.002, effects=(Backlash,))
     moved = free.memory(DrivetrainConstants(), effects=[Backlash("q")])
     for command in np.sin(np.linspace(0.0, 9.0, 100)):

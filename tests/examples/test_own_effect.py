@@ -44,9 +44,7 @@ def test_the_guide_shows_the_file_and_it_is_short() -> None:
 
 def test_the_guides_class_is_fitted(tmp_path: Path) -> None:
     write_recording(tmp_path / "bench", SimulatedRig(**BENCH).recordings(seed=0)[""])
-    found = identify_effects(
-        read_recording(tmp_path / "bench"), ["my_rig.CableDrag@q2"], "fast", 0.002, 0, lambda line: None
-    )
+    found = identify_effects(read_recording(tmp_path / "bench"), ["my_rig.CableDrag@q2"], 0.002, 0, lambda line: None)
     (term,) = found.fitted.model.terms
     assert term.label == "my_rig.CableDrag@q2"
     assert term.values["tension"] == pytest.approx(0.02, rel=0.2)

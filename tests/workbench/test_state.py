@@ -49,7 +49,7 @@ def test_what_any_law_could_explain_is_little_once_the_effect_is_there(bench: Wo
 
 def test_the_error_by_stage_is_that_of_identify(bench: Workbench, measured: Recording) -> None:
     bench.add(STRIBECK)
-    stages = identify_effects(measured, [STRIBECK], "fast", say=lambda line: None).stages
+    stages = identify_effects(measured, [STRIBECK], say=lambda line: None).stages
     mine = {stage.label: stage.errors.overall for stage in bench.stages}
     assert mine["stated"] == stages["nominal"].overall
     assert mine["refitted"] == pytest.approx(stages["refitted"].overall, rel=1e-6)

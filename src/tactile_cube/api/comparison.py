@@ -46,7 +46,7 @@ class ComparisonResult:
     def data(self) -> dict[str, Any]:
         """The content of comparison.json: plain numbers, errors in rad."""
         config = self.job.config
-        origin = {"model": config.model, "engine": config.engine, "command": self.job.command}
+        origin = {"model": config.model, "command": self.job.command}
         return comparison_json(self.comparison) | origin | {"seconds": self.seconds}
 
     def write(self, folder: PathLike, rerun: bool = True) -> None:
@@ -72,7 +72,7 @@ def compare(
 
     Args:
         recording: what was measured, or its folder.
-        settings: values as on the command line, e.g. "engine=pybullet", "band.simulations=0".
+        settings: values as on the command line, e.g. "step=0.001", "band.simulations=0".
         model: of `identify` or `diagnose`, or its file; None: the values that the recording states.
         say: takes lines of progress; None: stderr.
 
@@ -101,7 +101,7 @@ def run_comparison(
         say(f"{held} trials with an object are left out here; diagnose and identify use them")
     spread = {str(key): float(value) for key, value in config.band.spread.items()}
     band = (config.band.simulations, spread, config.seed)
-    compared = compare_recording(without_touches(recording), model, config.engine, config.step, *band)
+    compared = compare_recording(without_touches(recording), model, config.step, *band)
     return ComparisonResult(compared, job, job.seconds)
 
 

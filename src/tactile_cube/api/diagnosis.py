@@ -85,8 +85,8 @@ class DiagnosisResult:
 
         write_experiment(found, folder)
         config, recording = self.job.config, without_touches(self.recording)
-        before = compare_recording(recording, self.known, "fast", config.step, floor=found.floor)
-        after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
+        before = compare_recording(recording, self.known, config.step, floor=found.floor)
+        after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "diagnosis.rrd")
         shapes = [shape for one in found.unexplained for shape in one.shapes[:SHAPES]]
         return diagnosis_report(self.data, before, after, self.job.command, path, shapes, found.experiment)
@@ -104,7 +104,7 @@ def diagnose(
 
     Args:
         recording: what was measured, or its folder; two or more trials.
-        settings: values as on the command line, e.g. "engine=fast", "seed=1".
+        settings: values as on the command line, e.g. "step=0.001", "seed=1".
         effects: effects of your own beside the catalogue, as dotted paths.
         model: to begin with, or its file: what else is missing? None: what the recording states.
         say: takes lines of progress; None: stderr.
@@ -113,7 +113,7 @@ def diagnose(
         InputError: a recording, a model or an effect that cannot be used.
 
     Example:
-        >>> found = tactile_cube.diagnose("my_recording", "engine=fast")
+        >>> found = tactile_cube.diagnose("my_recording")
         >>> print(found.text, found.verdict, found.effects)
         >>> found.write("outputs/my_diagnosis")
     """
@@ -152,7 +152,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
     effects = tuple(dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in config.effects)]))
     moving = without_touches(recording)
     criteria = Criteria(**config.criteria)
-    found = diagnose_recording(moving, effects, config.engine, config.step, config.seed, say, known, criteria)
+    found = diagnose_recording(moving, effects, config.step, config.seed, say, known, criteria)
     model = model_file(moving, found.fitted, found.errors(), [*found.held_out, *found.tested], job.command, config.seed)
     data = as_json(found, job.seconds) | {"units": recording.units}
     if known is not None:

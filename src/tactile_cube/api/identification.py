@@ -74,7 +74,7 @@ class IdentificationResult:
         from tactile_cube.visualization.diagnosis_report import contact_sections, identification_report
 
         config, recording = self.job.config, without_touches(self.recording)
-        after = compare_recording(recording, self.model, config.engine, config.step, floor=found.floor)
+        after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
         held = contact_sections(self.contact, alone=False) if self.contact else []
         stages, joints = self.data["error"], self.data["joints"]
@@ -91,7 +91,7 @@ def identify(
         recording: what was measured, or its folder; two or more trials.
         effects: NAME@JOINT, NAME (every joint), a dotted path to a class of your own, or an effect of fingertips and
             object where the hand holds something.
-        settings: values as on the command line, e.g. "engine=fast", "seed=1".
+        settings: values as on the command line, e.g. "step=0.001", "seed=1".
         say: takes lines of progress; None: stderr.
 
     Raises:
@@ -132,7 +132,7 @@ def _of_free_motion(
 ) -> IdentificationResult:
     config = job.config
     moving = without_touches(recording)
-    found = identify_effects(moving, drive, config.engine, config.step, config.seed, say)
+    found = identify_effects(moving, drive, config.step, config.seed, say)
     model = model_file(moving, found.fitted, found.errors(), found.held_out, job.command, config.seed)
     model = model.model_copy(update={"offsets": model.offsets | touch_offsets(recording, model)})
     contact = identify_contact(recording, effects, model, config.step, config.seed, say) if effects else None

@@ -143,7 +143,7 @@ def run_monitor(
     if config.last is not None and not (isinstance(config.last, int) and config.last >= 2):
         raise InputError(f"last={config.last}: give at least 2 trials, of which one is held out, or null for all")
     newest = recording if config.last is None else recording.with_trials(recording.trials[-config.last :])
-    settings = [f"engine={config.engine}", f"step={config.step}", f"seed={config.seed}"]
+    settings = [f"step={config.step}", f"seed={config.seed}"]
     refitted = identify(newest, effects, *settings, say=say)
     assert refitted.free is not None  # it was asked for effects of the drive
     now, kept = refitted.free.judgement, judge_known(without_touches(newest), before, config.seed)

@@ -64,7 +64,7 @@ def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, 
     """The layout for a topology and the effects that may act on its joints."""
     C, N, n, joints = topology.chains, len(topology.parent), len(topology.leader), topology.joints
     keys: list[tuple[Shape, str]] = [
-        ((1,), "size dt step seen trace_rows trace_offset reading unsure follows"),
+        ((1,), "dt step seen trace_rows trace_offset reading unsure follows"),
         ((1,), "time_constant tendon_stiffness tendon_damping contact_torque_limit weighed"),
         # of each joint: constants, then its state
         ((joints,), "kp kd compliance static_friction reflected_inertia torque_limit command_torque_limit rate_limit"),

@@ -108,7 +108,7 @@ class Plant:
             effects: effects to switch on; their classes must be among the plant's.
         """
         memory = np.zeros(self.size)
-        header = {"size": self.size, "dt": self.dt, "trace_rows": self.trace_rows, "reading": LAST_SUBSTEP}
+        header = {"dt": self.dt, "trace_rows": self.trace_rows, "reading": LAST_SUBSTEP}
         for key, value in {**header, "trace_offset": self.layout.entries["trace"][0], "unsure": UNSURE}.items():
             self.view(memory, key)[...] = value
         states = [self.layout.entries[f"state:{effect.name}"] for effect in self.effects]

@@ -32,7 +32,7 @@ from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, effect_path
 from tactile_cube.measurement.replay.nominal import nominal_model
-from tactile_cube.measurement.replay.simulator import Engine, free_run
+from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.replay.windows import steps_per_row
 from tactile_cube.measurement.units import common_unit
 
@@ -99,7 +99,6 @@ class Diagnosis:
 def diagnose_recording(
     recording: Recording,
     effects: Sequence[type[Effect]],
-    engine: Engine = "pybullet",
     step: float = 0.002,
     seed: int = 0,
     say: Callable[[str], None] = print,
@@ -111,8 +110,7 @@ def diagnose_recording(
     Args:
         recording: two or more trials.
         effects: the catalogue to search, a user's own effects included.
-        engine: of the free-running errors that are stated.
-        step: its simulation step [s].
+        step: simulation step of the free runs whose errors are stated [s].
         seed: which trials are held out, and which test.
         say: takes progress lines.
         known: the model to begin with, whose effects are no news; None: what the recording's owner states.
@@ -131,7 +129,7 @@ def diagnose_recording(
 
     def tested_with(chosen: Explanation) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
         models = {"refitted": findings.base.fit.model, "with_effects": simulations.final(chosen).model}
-        return test_errors(search, test, models, engine, step)
+        return test_errors(search, test, models, step)
 
     summaries, over_noise = tested_with(verdict.chosen)
     if over_noise["with_effects"] > over_noise["refitted"] and verdict.chosen.effects:
@@ -211,7 +209,7 @@ def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:
 
 
 def test_errors(
-    search: Search, test: Recording, models: Mapping[str, Model], engine: Engine, step: float
+    search: Search, test: Recording, models: Mapping[str, Model], step: float
 ) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
     """Free-running errors of the model as stated and of others [rad], and their errors of segments over the noise.
 
@@ -219,12 +217,11 @@ def test_errors(
         search: cuts trials into segments.
         test: trials to test by.
         models: fitted; the joint offsets of initialisations that they have not seen are fitted here.
-        engine: of the free runs.
         step: its simulation step [s].
     """
     problem = Problem(search.shooting, search.windows(test))
     stated = nominal_model(test, search.known)
-    summaries = {"nominal": free_run_error(test, free_run(test, stated, engine, step))}
+    summaries = {"nominal": free_run_error(test, free_run(test, stated, step))}
     over_noise = {}
     for stage, model in models.items():
         found = model.with_offsets(stated.offsets)
@@ -232,7 +229,7 @@ def test_errors(
         judged = judge(problem, test, found)
         over_noise[stage] = judged.error
         seen = model.with_offsets(judged.model.offsets)
-        summaries[stage] = free_run_error(test, free_run(test, seen, engine, step))
+        summaries[stage] = free_run_error(test, free_run(test, seen, step))
     return summaries, over_noise
 
 

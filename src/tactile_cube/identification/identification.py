@@ -25,7 +25,7 @@ from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_flo
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import nominal_model
-from tactile_cube.measurement.replay.simulator import Engine, free_run
+from tactile_cube.measurement.replay.simulator import free_run
 from tactile_cube.measurement.split import held_out_split
 
 CHI_SQUARED_95 = 3.84  # of one degree of freedom: squared error [sensor variances] that noise takes off by itself
@@ -64,7 +64,6 @@ class Identification:
 def identify_effects(
     recording: Recording,
     effects: Sequence[str],
-    engine: Engine = "pybullet",
     step: float = 0.002,
     seed: int = 0,
     say: Callable[[str], None] = print,
@@ -75,8 +74,7 @@ def identify_effects(
         recording: two or more trials.
         effects: `NAME@JOINT`; `NAME` alone stands for every joint; dotted paths name a user's own effects. In brackets
             the parameters that are to be fitted, as `diagnose` names them: `viscous_friction(damping, difference)@q2`.
-        engine: of the free-running errors that are stated.
-        step: its simulation step [s].
+        step: simulation step of the free runs whose errors are stated [s].
         seed: which trials are held out.
         say: takes progress lines.
 
@@ -107,7 +105,7 @@ def identify_effects(
     last = list(stages)[-1]
     stages[last] = fitted.model.with_offsets(stages[last].offsets)
     say("simulating the held-out trials")
-    summaries = {k: free_run_error(held_out, free_run(held_out, m, engine, step)) for k, m in stages.items()}
+    summaries = {k: free_run_error(held_out, free_run(held_out, m, step)) for k, m in stages.items()}
     return Identification(fitted, summaries, floor, judgement, [trial.name for trial in held_out.trials])
 
 

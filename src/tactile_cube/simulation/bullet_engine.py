@@ -19,7 +19,6 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import ObjectMesh
 from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half, unit_inertia
-from tactile_cube.simulation.bullet_loop import make_loop, object_state
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
@@ -100,7 +99,7 @@ class BulletEngine:
         self._cube_shape = -1
         self._cube_size = self._cube_com = np.zeros(3)
         self._cube_kind: ObjectShape = "box"
-        self._links = range(hand.links_per_finger)
+        self._links = list(range(hand.links_per_finger))
         self._bare = [[link for link in self._links if not finger.shapes[link]] for finger in hand.fingers]
         self.table, self.cube = self._new_table(0.0), self._new_table(0.0)  # hold the places before the fingers'
         bases = [hand.base_in_world(k) for k in range(len(hand.fingers))]
@@ -115,8 +114,6 @@ class BulletEngine:
             for link in (-1, *bare):
                 pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
         self.q, self.v = np.zeros((2, len(hand.fingers), hand.links_per_finger))
-        self._loop = make_loop(self.client, drive.plant)
-        self._loop.bind(self.fingers, self.q.reshape(-1), self.v.reshape(-1), drive.memory)
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
         """See `Engine.place`."""
@@ -147,12 +144,26 @@ class BulletEngine:
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
         """See `Engine.run`."""
         states = np.empty((steps + 1, OBJECT_STATE)) if record else None
-        self._loop.run(steps, self.cube, wrench, states)
-        return None if states is None else np.stack([self._of_centre(state) for state in states])
+        control, memory = self._drive.plant.kernel.control_step, self._drive.memory
+        torque = np.zeros_like(self.q)
+        for i in range(steps):
+            control(i, self.q.reshape(-1), self.v.reshape(-1), torque.reshape(-1), memory)
+            self._apply(torque)
+            if states is not None:
+                states[i] = self.cube_state()
+            if wrench is not None:
+                self._push(wrench)
+            pybullet.stepSimulation(physicsClientId=self.client)
+            self._read_joints()
+        if states is not None:
+            states[steps] = self.cube_state()
+        return states
 
     def cube_state(self) -> Array:
         """See `Engine.cube_state`."""
-        return self._of_centre(object_state(self.client, self.cube))
+        position, quaternion = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
+        linear, angular = pybullet.getBaseVelocity(self.cube, physicsClientId=self.client)
+        return self._of_centre(np.array([*position, *quaternion, *linear, *angular]))
 
     def gaps(self) -> list[float]:
         """See `Engine.gaps`."""
@@ -184,6 +195,23 @@ class BulletEngine:
         """Ends the physics server."""
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
+
+    def _apply(self, torque: Array) -> None:
+        for body, forces in zip(self.fingers, torque.tolist(), strict=True):
+            pybullet.setJointMotorControlArray(
+                body, self._links, pybullet.TORQUE_CONTROL, forces=forces, physicsClientId=self.client
+            )
+
+    def _read_joints(self) -> None:
+        states = [one for body in self.fingers for one in pybullet.getJointStates(body, self._links, self.client)]
+        self.q.reshape(-1)[:] = [state[0] for state in states]
+        self.v.reshape(-1)[:] = [state[1] for state in states]
+
+    def _push(self, wrench: Array) -> None:
+        centre, _ = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
+        frame = pybullet.WORLD_FRAME
+        pybullet.applyExternalForce(self.cube, -1, wrench[:3].tolist(), centre, frame, physicsClientId=self.client)
+        pybullet.applyExternalTorque(self.cube, -1, wrench[3:].tolist(), frame, physicsClientId=self.client)
 
     def _of_centre(self, state: Array) -> Array:
         """Bullet speaks of the centre of mass; the same state (13,) of the cube's centre."""

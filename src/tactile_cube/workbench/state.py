@@ -173,7 +173,7 @@ class Workbench:
     def simulate(self, trial: str, model: Model | None = None) -> Simulated:
         """Return one trial simulated freely from its start, by the model in force or another one."""
         one = self.recording.with_trials([self.trial(trial)])
-        return free_run(one, model or self.stage.model, "fast", USUAL_STEP)[0]
+        return free_run(one, model or self.stage.model, USUAL_STEP)[0]
 
     def comparison(self, trial: str) -> Comparison:
         """Return the model in force beside one trial: errors, regimes, failing intervals."""
@@ -332,7 +332,7 @@ class Workbench:
         from tactile_cube.visualization.report import write_report
 
         model, path = self.model_file(), str(Path(folder) / "model.yaml")
-        after = compare_recording(without_touches(self.opened), model, "fast", USUAL_STEP, floor=self.floor)
+        after = compare_recording(without_touches(self.opened), model, USUAL_STEP, floor=self.floor)
         stages = {one.label: one.errors.overall for one in self.stages} | {"noise_floor": self.floor.overall}
         joints = {one.label: one.errors.joints for one in self.stages}
         page = identification_report(after, stages, joints, model.provenance.command, path)
@@ -382,7 +382,7 @@ class Workbench:
 
     def _errors(self, model: Model) -> tuple[ErrorSummary, ErrorSummary]:
         held_out = self.search.held_out
-        simulated = free_run(held_out, model, "fast", USUAL_STEP)
+        simulated = free_run(held_out, model, USUAL_STEP)
         raw = raw_residuals(held_out.trials, [one.position for one in simulated])
         return free_run_error(held_out, simulated), summarise_errors(raw, held_out.joints)
 

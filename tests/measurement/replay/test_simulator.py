@@ -15,7 +15,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model, Term
 from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
-from tactile_cube.measurement.replay.simulator import Engine, Simulator, free_run
+from tactile_cube.measurement.replay.simulator import Simulator, free_run
 from tactile_cube.measurement.replay.windows import cut
 from tests.measurement.small_rig import write
 
@@ -41,19 +41,6 @@ def test_the_true_constants_follow_an_independent_engine_to_its_noise() -> None:
     recording = read_recording(SHARED / "finger_plain" / "validation")
     simulated = free_run(recording, with_constants(nominal_model(recording), **TRUE), step=2.5e-4)
     assert free_run_error(recording, simulated).overall < 4.5e-4
-
-
-def test_fast_and_pybullet_agree(recording: Recording) -> None:
-    recording = recording.with_trials(recording.trials[:1])
-    engines: tuple[Engine, ...] = ("fast", "pybullet")
-    fast, bullet = (free_run(recording, nominal_model(recording), engine)[0] for engine in engines)
-    assert np.abs(fast.position - bullet.position).max() < 1e-9
-    assert np.abs(fast.torque - bullet.torque).max() < 1e-8
-
-
-def test_an_unknown_engine_is_refused(recording: Recording) -> None:
-    with pytest.raises(InputError, match="engine=mujoco"):
-        Simulator(recording, engine="mujoco")  # type: ignore[arg-type]
 
 
 def test_a_clamped_link_shows_the_drive_stiffness(recording: Recording) -> None:

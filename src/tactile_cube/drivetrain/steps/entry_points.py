@@ -4,25 +4,17 @@ Numba keeps machine code beside the file that a function stands in, and plants d
 into each kernel's folder, the other steps are loaded from where they are.
 """
 
-import functools
-from ctypes import CFUNCTYPE, POINTER, c_double, c_int64, c_void_p, cast
-from typing import Any
-
-import numba
 import numpy as np
 import numpy.typing as npt
-from numba import cfunc, types
 
-from tactile_cube.compiled import borrowed, compiled, compiled_once
+from tactile_cube.compiled import borrowed, compiled_once
 
 from .engine_step import control
 from .free_step import PATH_WIDTH as PATH_WIDTH
-from .free_step import free_step, roll, roll_segments, start_window
-from .plant import C, N
+from .free_step import free_step, roll, roll_segments
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
-Pointer = Any  # to float64
 
 
 @compiled_once
@@ -86,35 +78,3 @@ def segments_batch(
             rows,
             out[b],
         )
-
-
-@compiled_once
-def starts_batch(
-    commands: Array, history: int, position: Array, speed: Array, initial_state: Array, memory: Array
-) -> None:
-    """Each block where `segments_batch` begins its first segment, from `position` and `speed` (S, C n)."""
-    for b in range(len(memory)):
-        start_window(commands[b], history, position[b], speed[b], initial_state[b], borrowed(memory[b]))
-
-
-@compiled
-def from_c(pointer: Pointer, size: int) -> Array:
-    """The numbers (size,) at a C pointer."""
-    return numba.carray(pointer, (size,))  # type: ignore
-
-
-def callback(i: int, q: Pointer, v: Pointer, torque: Pointer, memory: Pointer) -> None:
-    """The control step for C, whose arrays do not know their size: that of memory is its first number."""
-    size = int(from_c(memory, 1)[0])
-    control(i, from_c(q, C * N), from_c(v, C * N), from_c(torque, C * N), from_c(memory, size))
-
-
-@functools.cache
-def control_callback() -> tuple[object, int]:
-    """A C function void(int64 i, double *q, double *v, double *torque, double *memory), kept alive; its address."""
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-        interpreted = CFUNCTYPE(None, c_int64, *[POINTER(c_double)] * 4)(callback)
-        return interpreted, cast(interpreted, c_void_p).value or 0
-    pointer = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-    machine_code: Any = cfunc(types.void(types.int64, *[pointer] * 4), error_model="numpy", cache=True)(callback)
-    return machine_code, machine_code.address

@@ -280,14 +280,3 @@ def roll_segments(
         elif (k - history) % segment >= segment - around:
             note_free(memory, free)
         row_of_steps(k, commands[k], history, substeps, memory, path, rows, out)
-
-
-@compiled
-def start_window(
-    commands: Array, history: int, position: Array, speed: Array, initial_state: Array, memory: Array
-) -> None:
-    """Plays the history (rows of `commands`) and puts the joints to the start of the row after it."""
-    for k in range(history):
-        advance_commands(commands[k], memory)
-    free, trial = np.zeros(C * n), memory.copy()
-    start_first(commands[history], position, speed, initial_state, free, trial, memory, memory[:0])

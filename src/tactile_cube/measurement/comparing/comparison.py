@@ -24,7 +24,7 @@ from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, White
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
-from tactile_cube.measurement.replay.simulator import Engine, Simulated, Simulator, free_run
+from tactile_cube.measurement.replay.simulator import Simulated, Simulator, free_run
 
 Array = NDArray[np.float64]
 COVER = 0.95  # of the simulations lie in the band
@@ -109,7 +109,6 @@ class Comparison:
 def compare_recording(
     recording: Recording,
     model: ModelFile | None = None,
-    engine: Engine = "fast",
     step: float | None = None,
     simulations: int = 0,
     spread: Mapping[str, float] | None = None,
@@ -122,9 +121,8 @@ def compare_recording(
         recording: what was measured.
         model: the model file, simulated with the joint offsets of each initialisation that suit it best; None for the
             values in recording.yaml and no offsets.
-        engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
         step: longest simulation step [s]; None: the usual one, or an eighth of it where the sensors would show its
-            error and the engine is `fast`.
+            error.
         simulations: how many randomised simulations make the band; 0 for none.
         spread: relative half widths of constants without an interval, `offset` in rad.
         seed: of the randomised simulations.
@@ -138,16 +136,16 @@ def compare_recording(
         used = nominal_model(recording, model)
         if model is not None:
             used = with_fitted_offsets(Simulator(recording, [term.effect for term in used.terms], step), used)
-        return bounded(free_run(recording, used, engine, step)), used
+        return bounded(free_run(recording, used, step)), used
 
     simulated, fitted = simulated_at(used)
     band = simulate_band(recording, model, simulations, spread or {}, used, seed) if simulations else None
     if floor is None or step is None:
-        fine = bounded(free_run(recording, fitted, "fast", used / FINER))
+        fine = bounded(free_run(recording, fitted, used / FINER))
         differences = [a.position - b.position for a, b in zip(simulated, fine, strict=True)]
         left = summarise_errors(differences, recording.joints).joints
         noise = dict(zip(recording.joints, sensor_noise(recording), strict=True))
-        if step is None and engine == "fast" and any(left[joint] > HIDDEN * noise[joint] for joint in noise):
+        if step is None and any(left[joint] > HIDDEN * noise[joint] for joint in noise):
             used /= FINER
             finer = 1.0 / (FINER - 1)  # errors of the step are of first order
             left = {joint: finer * error for joint, error in left.items()}

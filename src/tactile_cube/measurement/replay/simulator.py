@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Literal, Self, get_args
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
-from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import LEAST, sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
@@ -29,11 +28,7 @@ from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
-if TYPE_CHECKING:
-    from tactile_cube.simulation.rig import RigWorld
-
 Array = NDArray[np.float64]
-Engine = Literal["fast", "pybullet"]
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
 MECHANICS = (
     "ratio",
@@ -72,16 +67,15 @@ class Path:
     steps: Array
 
 
-def free_run(recording: Recording, model: Model, engine: Engine = "fast", step: float = 0.002) -> list[Simulated]:
+def free_run(recording: Recording, model: Model, step: float = 0.002) -> list[Simulated]:
     """Every trial of a recording simulated freely from its start.
 
     Args:
         recording: rig and trials.
         model: with joint offsets for each of the trials' initialisations.
-        engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
         step: longest integration step [s].
     """
-    simulator = Simulator(recording, [term.effect for term in model.terms], step, engine)
+    simulator = Simulator(recording, [term.effect for term in model.terms], step)
     try:
         return simulator.free_runs([model])[0]
     finally:
@@ -96,7 +90,6 @@ class Simulator:
         recording: Recording,
         effects: Sequence[type[Effect]] = (),
         step: float = 0.002,
-        engine: Engine = "fast",
         time: float = 1.0,
     ) -> None:
         """Build the plant; its kernel is compiled once and kept on disk.
@@ -105,14 +98,8 @@ class Simulator:
             recording: rig, controller and sampling step.
             effects: a user's classes that a model may use, beside those of the catalogue.
             step: longest integration step [s]; a whole number of steps fits between two samples.
-            engine: `fast` (joint dynamics in closed form) or `pybullet` (the world that training uses).
             time: what a second of a finger stands for [s].
-
-        Raises:
-            InputError: an unknown engine.
         """
-        if engine not in get_args(Engine):
-            raise InputError(f"engine={engine}: unknown; choose one of {', '.join(get_args(Engine))}")
         self.recording = recording
         self.time = time
         self.tree = recording.rigid_body()
@@ -122,13 +109,10 @@ class Simulator:
         self.plant = Plant([self.tree], recording.step / self.substeps, known, recording.joints)
         self.workers = min(4, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(self.workers)
-        self._world = _pybullet(self.plant) if engine == "pybullet" else None
 
     def close(self) -> None:
-        """End the threads, and the physics server if there is one."""
+        """End the threads."""
         self._pool.shutdown()
-        if self._world is not None:
-            self._world.close()
 
     def finer(self, times: int) -> Self:
         """The same in steps so many times as short, for windows that are made finer likewise."""
@@ -172,8 +156,6 @@ class Simulator:
         if corrections is None:
             corrections = np.zeros((len(models), 2 * len(self.recording.joints)))
         whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
-        if self._world is not None:
-            whole = 0
         pool = self._pool
         list(pool.map(partial(self._one, near=near), models[:whole], windows[:whole], corrections, out))
         for k in range(whole, len(models)):
@@ -237,10 +219,7 @@ class Simulator:
         rows = np.array([MOTOR_POSITION, TORQUE, COMMAND, POSITION, *([LEAD, LOOP_GAIN] if gap.any() else [])])
         joints = len(self.recording.joints)
         signals = np.zeros((len(windows), out.shape[2] * windows.substeps, len(rows), joints))
-        if self._world is not None:
-            self._in_world(self._world, windows, memory, rows, signals)
-        else:
-            self._in_closed_form(windows, self._past(model, windows), correction, memory, paths, rows, signals, pool)
+        self._play(windows, self._past(model, windows), correction, memory, paths, rows, signals, pool)
         jump = simulated_jumps(signals[:, :, 2], windows)
         shown = signals[:, :: windows.substeps]
         free = free_way(self.plant, memory[:, None], jump, shown[:, :, 4], shown[:, :, 5]) if gap.any() else 0.0
@@ -265,7 +244,7 @@ class Simulator:
         speed = np.gradient(parts, self.recording.step, axis=2).reshape(position.shape)
         return np.asarray(position - delay * speed)
 
-    def _in_closed_form(
+    def _play(
         self,
         windows: Windows,
         past: int,
@@ -310,16 +289,6 @@ class Simulator:
         longest = windows.history * windows.substeps
         effects = [term.effect for term in model.terms if term.effect.stage is Stage.COMMAND]
         return max((min(e.kept(self.plant.dt), longest) if e.bounded_memory else longest for e in effects), default=0)
-
-    def _in_world(
-        self, world: RigWorld, windows: Windows, memory: Array, rows: NDArray[np.int64], signals: Array
-    ) -> None:
-        """Windows of one segment, which an engine cannot start anew, from the start that the closed form finds."""
-        history = windows.history * windows.substeps
-        starts = windows.position[:, 0], windows.speed[:, 0], windows.initial_state
-        self.plant.kernel.starts_batch(windows.commands, history, *starts, memory)
-        for commands, block, out in zip(windows.commands[:, history:], memory, signals, strict=True):
-            world.rollout(commands[: len(out)], block, rows, out)
 
     def _memories(self, model: Model, windows: Windows) -> Array:
         """One block (S, size) for each window, at rest at its start."""
@@ -386,10 +355,3 @@ def _zero_links(shown: Array, windows: Windows, joints: int) -> None:
         for k in range(len(motors)):
             if np.isfinite(part := known[own, :, k]).any():
                 shown[own, :, joints + k] += np.nanmean(part)
-
-
-def _pybullet(plant: Plant) -> RigWorld:
-    """The PyBullet world, imported here because PyBullet greets everybody who imports it."""
-    from tactile_cube.simulation.rig import RigWorld
-
-    return RigWorld(plant)

@@ -15,7 +15,7 @@ from tactile_cube.measurement.recordings.description import Coupling, Descriptio
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig, read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.replay.model import Model, terms_of
-from tactile_cube.measurement.replay.simulator import Engine, Simulator
+from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.session import SimulatedSession, unmeasured
 
 Array = NDArray[np.float64]
@@ -29,7 +29,6 @@ class SimulatedRig(SimulatedSession):
     urdf: str = "finger"
     gravity: Iterable[float] = (0.0, 0.0, -9.81)
     joints: Iterable[str] | None = None
-    engine: Engine = "fast"
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """The recording, and fresh commands on the last initialisation under `validation`."""
@@ -42,7 +41,7 @@ class SimulatedRig(SimulatedSession):
         free = [kind for kind in self.kinds if kind not in BENCH_KINDS]
         commands, fresh = ({kind: self.free_command(kind, rig, joints, rng) for kind in free} for _ in range(2))
         rig_only = unmeasured(description, rig, true.constants)
-        simulator = Simulator(rig_only, [term.effect for term in effects], self.step, self.engine)
+        simulator = Simulator(rig_only, [term.effect for term in effects], self.step)
 
         def played(trials: Iterable[tuple[TrialEntry, Array]]) -> list[TrialTable]:
             return [self.played(e, command, offsets[e.initialisation], simulator, true, rng) for e, command in trials]
