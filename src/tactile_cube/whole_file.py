@@ -7,7 +7,7 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 
 def write_whole(path: Path, *parts: bytes | memoryview) -> None:
@@ -18,14 +18,25 @@ def write_whole(path: Path, *parts: bytes | memoryview) -> None:
         parts: its contents, one after the other.
 
     Raises:
+        OSError: as of `whole_file`.
+    """
+    with whole_file(path) as file:
+        for part in parts:
+            file.write(part)
+
+
+@contextlib.contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """Give a file to write into, which gets its name once all is written: for what is too large for the memory.
+
+    Raises:
         OSError: it cannot be written, with `path` as its file; a file of that name stays as it was.
     """
     partial = path.with_name(f"{path.name}.partial")
     try:
         partial.unlink(missing_ok=True)  # one left behind, or a link to elsewhere
         with partial.open("xb") as file:
-            for part in parts:
-                file.write(part)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)

@@ -2,6 +2,9 @@
 
 import ast
 import errno
+import importlib
+import io
+import itertools
 import os
 import re
 import resource
@@ -9,7 +12,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +21,23 @@ import pytest
 
 import tactile_cube
 from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
+from tactile_cube.agent.policy_file import load_actor
 from tactile_cube.errors import InputError
+from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.measurement.recordings.description import Controller, Description, TrialEntry
+from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
+from tactile_cube.run_folder import USAGE_ERROR
+from tactile_cube.training.checkpoint import FILE
 from tactile_cube.usage_error import usage_error
 from tactile_cube.whole_file import write_whole, written_together
 from tests.api.test_monitoring import recorded
 
 SOURCE = Path(tactile_cube.__file__).parent
 OPERATIONS = ((os, "fsync"), (os, "replace"), (os, "unlink"), (os, "mkdir"), (shutil, "rmtree"))
+
+
+DISK_IS_FULL = "the disk is full; free some of it, or write elsewhere with hydra.run.dir=DIR"
 
 
 class Killed(BaseException):
@@ -67,10 +78,14 @@ class Disk:
         return call
 
 
+GROWING = re.compile(r"\.partial|metrics\.csv$|\.log$|^log/|\.lock$")
+"""Files that are being written, and those that grow line by line (see `ALLOWED`)."""
+
+
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files of a folder but those that are being written."""
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    return {str(one.relative_to(folder)): one.read_bytes() for one in files if ".partial" not in str(one)}
+    """All files of a folder that are results."""
+    files = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
+    return {name: path.read_bytes() for name, path in files.items() if not GROWING.search(name)}
 
 
 def inodes(folder: Path) -> dict[str, int]:
@@ -91,18 +106,19 @@ def crash(folder: Path, write: Callable[[Path], object], fails_at: int, dies: bo
             failed, said = True, usage_error(error)
     if said is not None:
         where, _, what = said.partition(": ")
-        assert what == "the disk is full; free some of it, or write elsewhere with hydra.run.dir=DIR"
+        assert what == DISK_IS_FULL or (FILE in where and "is the disk full? The checkpoint before it is whole" in what)
         assert str(folder) in where
         assert "partial" not in where
     assert (said is not None) == (failed and not dies)
     after = contents(folder)
     for name, content in after.items():
-        assert content == before.get(name) or content in disk.whole, f"{name}: a part, at operation {fails_at}"
+        assert content in {*before.values(), *disk.whole}, f"{name}: a part, at operation {fails_at}"
     renewed = {name for name, place in inodes(folder).items() if place != places.get(name)}
     if failed and not dies:
-        assert set(before) <= set(after) or index, "nothing is lost"
+        assert set(before) - {FILE} <= set(after) or index, "nothing is lost; a checkpoint becomes the one before"
     if index in after and failed and index not in renewed:
-        assert not renewed, f"at operation {fails_at} {index} is the old one, {renewed} are not"
+        beside = {name for name in renewed if (folder / name).is_relative_to((folder / index).parent)}
+        assert not beside, f"at operation {fails_at} {index} is the old one, {beside} are not"
     return failed
 
 
@@ -203,6 +219,75 @@ def test_pictures_policies_films_and_results_of_a_policy_are_old_or_new(tmp_path
     assert {".json", ".gif", ".npz", ".rrd"} <= {path.suffix for path in tmp_path.iterdir()}
 
 
+def typed(command: str, *words: str) -> None:
+    """Give a command line, in this process; what it refuses in one line is raised."""
+    said, module = io.StringIO(), importlib.import_module(f"tactile_cube.{command}")
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()), redirect_stderr(said):
+        patch.setattr(sys, "argv", [command, *words])
+        patch.setenv("HYDRA_FULL_ERROR", "0")
+        try:
+            module.main()
+        except SystemExit as ended:
+            if ended.code != USAGE_ERROR:
+                raise
+            raise InputError(said.getvalue().strip().splitlines()[-1].removeprefix("error: ")) from None
+
+
+SMALLEST = ("+experiment=smoke", "collector=single", "collector.worlds=1", "logger=csv", "agent.hidden=[8,8]",
+            "agent.batch_size=8", "training.learning_starts=10", "training.random_steps=10",
+            "training.policy_every=10", "training.steps_per_iteration=5", "training.barrier_iterations=2",
+            "training.updates_per_iteration=1")  # fmt: skip
+
+
+def test_a_training_is_whole_at_its_end_and_goes_on_from_every_crash(tmp_path: Path) -> None:
+    asked = itertools.count(20, 20)
+
+    def train(folder: Path) -> None:
+        typed("train", *SMALLEST, f"training.steps={next(asked)}", f"hydra.run.dir={folder}")
+
+    assert crash_everywhere(tmp_path, train, 6) == 12
+    steps = read_curve(tmp_path, "").columns["steps"]
+    assert steps == sorted(set(steps)), "each once"
+    assert load_actor(tmp_path / "policy.safetensors")[1].steps == steps[-1] == next(asked) - 20
+
+
+def test_an_averaged_policy_is_old_or_new(tmp_path: Path) -> None:
+    typed("train", *SMALLEST, "training.steps=20", f"hydra.run.dir={tmp_path}/run")
+
+    def average(folder: Path) -> None:
+        words = (f"run={tmp_path}/run", "last=2", f"output={folder}/mean.safetensors", f"hydra.run.dir={folder}")
+        typed("average", *words)
+
+    crash_everywhere(tmp_path / "mean", average, 6)
+    assert load_actor(tmp_path / "mean" / "mean.safetensors")[1].averaged == (10, 20)
+
+
+def test_what_view_shows_is_old_or_new(tmp_path: Path) -> None:
+    words = ("run=hold", "episodes=2", "seconds=1", "viewer=none", f"hydra.run.dir={tmp_path}")
+    crash_everywhere(tmp_path, lambda folder: typed("view", *words), 3)
+    assert (tmp_path / "view.rrd").is_file()
+
+
+def test_the_recording_of_a_deployment_is_old_or_new_and_until_then_the_log_is_there(tmp_path: Path) -> None:
+    """By a dry run."""
+    words = ("motion=holds", "seconds=0.2", "homing.settle=0.05", "homing.speed=3", "robot.cube=false")
+
+    def deploy(folder: Path) -> None:
+        before = contents(folder).get("recording/recording.yaml")
+        try:
+            typed("deploy", *words, f"hydra.run.dir={folder}")
+        except BaseException:
+            if any(folder.glob("log/*.npy")):
+                assert len(np.load(folder / "log/run_0.npy")) > 150
+            else:
+                assert contents(folder)["recording/recording.yaml"] == before, "it did not come so far"
+            raise
+        assert not (folder / "log").exists()
+
+    crash_everywhere(tmp_path, deploy, 8, "recording/recording.yaml")
+    assert len(read_recording(tmp_path / "recording").trials[0].time) > 150
+
+
 LIMIT = 30_000
 """Bytes of a file, where a disk is nearly full: below the size of a report, above that of the configuration."""
 
@@ -220,8 +305,7 @@ def test_a_command_on_a_full_disk_says_so_in_one_line_and_leaves_what_was_there(
 
     again = subprocess.run(words, capture_output=True, text=True, preexec_fn=limited, check=False)
     assert again.returncode == 2
-    assert re.fullmatch(r"error: .*: the disk is full; free some of it, or write elsewhere with hydra.run.dir=DIR",
-                        again.stderr.strip().splitlines()[-1])  # fmt: skip
+    assert re.fullmatch(f"error: .*: {DISK_IS_FULL}", again.stderr.strip().splitlines()[-1])
     after = contents(tmp_path)
     for name in ("comparison.json", "report.html", "comparison.rrd"):
         assert after[name] == before[name]

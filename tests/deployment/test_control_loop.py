@@ -3,21 +3,26 @@
 import os
 import subprocess
 import sys
+import tracemalloc
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.lib import format as npy
 
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog
-from tactile_cube.deployment.loop_log import CHUNK, LoopLog
+from tactile_cube.deployment.loop_log import CHUNK, LoopLog, write_runs
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.deployment.run_loop import LoopRun
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
+from tactile_cube.measurement.recordings import writing
+from tactile_cube.measurement.recordings.reading import read_recording
 from tests.deployment.following_robot import (
     FollowingRobot,
     Spoil,
@@ -322,14 +327,41 @@ def test_a_robot_whose_arrays_have_another_shape_is_not_commanded(field: str, si
 def test_the_log_can_be_read_while_it_grows_and_says_what_the_disk_refuses(tmp_path: Path) -> None:
     with LoopLog(tmp_path / "log.npy", 2) as log:
         for row in range(3 * CHUNK):
-            log.append(Reading(float(row), np.full(2, row)), np.full(2, -row))
+            log.append(Reading(50.0 + row, np.full(2, row)), np.full(2, -row))
         wait_until(lambda: len(np.load(tmp_path / "log.npy")) == 3 * CHUNK)
-        log.append(Reading(-1.0, np.zeros(2), np.ones(2)), np.zeros(2))
+        log.append(Reading(49.0, np.zeros(2), np.ones(2)), np.zeros(2))
     np.testing.assert_array_equal(log.rows["time"], [*range(3 * CHUNK), -1.0])
     np.testing.assert_array_equal(log.rows["command"][:-1, 1], -log.rows["position"][:-1, 0])
     assert np.isnan(log.rows["torque"][:-1]).all()
     with pytest.raises(OSError, match="No space left"), LoopLog(Path("/dev/full"), 2) as log:
         pass
+
+
+def test_the_memory_that_a_recording_of_a_run_takes_does_not_grow_with_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "BLOCK", 1000)
+    signals = [(name, "<f8", (12,)) for name in ("position", "command", "torque")]
+    peaks = []
+    for rows in (2000, 2000, 40_000):  # the first imports what writes
+        log = npy.open_memmap(tmp_path / "log.npy", "w+", np.dtype([("time", "<f8"), *signals]), (rows,))
+        log["time"] = np.arange(rows) / 1000.0
+        log["position"] = HOME + np.random.default_rng(0).normal(0.0, 0.01, (rows, 12))
+        tracemalloc.start()
+        write_runs([log], tmp_path / "recording", LIMITS, 1000.0, 0.0)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[2] < 1.5 * peaks[1] < log.nbytes / 4
+    trial = read_recording(tmp_path / "recording").trials[0]
+    np.testing.assert_array_equal(trial.position, log["position"].astype(np.float32))
+    np.testing.assert_array_equal(trial.time, log["time"])
+
+
+def test_tick_times_are_those_of_all_ticks() -> None:
+    times = np.random.default_rng(0).lognormal(-8.0, 1.0, 20_000)
+    run = LoopRun(ticks=Counter(np.round(1e6 * times).astype(int).tolist()))
+    wanted = [np.quantile(times, share) for share in (0.5, 0.999, 1.0)]
+    np.testing.assert_allclose([*run.tick_times.values()], wanted, rtol=0.02)
 
 
 def wait_until(true: Callable[[], bool]) -> None:

@@ -10,8 +10,11 @@ from hydra.utils import instantiate
 
 import tactile_cube
 from tactile_cube.composition import composed
+from tactile_cube.deployment import simulated_hand
 from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.limits import RATE, StopRules
+from tactile_cube.deployment.simulated_hand import SimulatedHand
+from tactile_cube.hand import DLR_HAND2
 
 
 def quiet(line: str) -> None:
@@ -42,6 +45,19 @@ def test_the_log_of_a_dry_run_is_a_recording_that_the_model_follows_down_to_the_
     description.write_text(description.read_text().replace("3.69", "3.3"))
     wrong = tactile_cube.compare(recording, "band.simulations=0", "step=0.001", say=quiet)
     assert wrong.error > 2.0 * compared.error
+
+
+def test_the_angle_of_the_object_is_kept_as_long_as_a_stop_may_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulated_hand, "LONGEST_STOP", 30)
+    hand, turned = SimulatedHand(), [0.0]
+    hand.release()
+    for _ in range(100):
+        hand.send(DLR_HAND2.start_angles + 0.15)
+        turned.append(hand.turned(hand.wait()))
+    hand.close()
+    assert np.unique(turned).size > 50
+    assert hand.turned(0.08) == turned[80]
+    assert hand.turned(0.05) == hand.turned(0.01) == turned[71], "the oldest that is known"
 
 
 def test_a_broken_link_stops_the_fingers_and_what_came_before_is_kept() -> None:

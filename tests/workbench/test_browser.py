@@ -210,6 +210,21 @@ def test_a_diagnosis_is_stopped_in_the_middle_and_another_one_answers(window: An
     assert over_noise(window, f"+ {STRIBECK}") < 1.1
 
 
+def test_files_above_200_mb_are_refused_before_they_are_sent(window: Any, measured: Recording) -> None:
+    said: list[str] = []
+    window.on("dialog", lambda dialog: (said.append(dialog.message), dialog.dismiss()))
+    pretend = "(size) => Object.defineProperty(File.prototype, 'size', {get: () => size, configurable: true})"
+    window.evaluate(pretend, 201e6)
+    drop(window, ("big.csv", "t\n1\n"))
+    with window.expect_file_chooser() as chooser:
+        window.locator("input[type=file]").click()
+    chooser.value.set_files({"name": "big.csv", "mimeType": "text/csv", "buffer": b"t\n1\n"})
+    window.evaluate(pretend, 199e6)
+    drop(window, ("small.csv", "t\n1\n"))
+    window.get_by_text("To be imported: small.csv").wait_for()
+    assert said == 2 * ["more than 200 MB: name the path of the files instead"]
+
+
 def test_two_windows_show_one_state_and_the_keyboard_is_enough(
     window: Any, served: tuple[str, Path], measured: Recording
 ) -> None:
@@ -217,6 +232,8 @@ def test_two_windows_show_one_state_and_the_keyboard_is_enough(
     other = window.context.browser.new_page()
     other.goto(served[0])
     other.get_by_role("cell", name="refitted", exact=True).wait_for()
+    third = window.context.browser.new_context().new_page()
+    third.goto(served[0].partition("enter")[0])
     radio = window.get_by_role("radio", name=FIRST)
     radio.focus()
     window.keyboard.press("Space")
@@ -229,6 +246,8 @@ def test_two_windows_show_one_state_and_the_keyboard_is_enough(
     other.get_by_role("cell", name="by hand").wait_for()
     other.get_by_role("button", name="Undo").click()
     window.get_by_role("cell", name="by hand").wait_for(state="hidden")
+    assert third.inner_text("body").strip() == "Open the address that the workbench printed."
+    third.context.close()
     other.close()
 
 

@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from email.message import Message
@@ -23,7 +24,7 @@ from tactile_cube.errors import InputError
 pytest.importorskip("bokeh")
 
 from tactile_cube.workbench.desk import Desk
-from tactile_cube.workbench.server import start
+from tactile_cube.workbench.server import MESSAGE, start
 from tests.workbench.in_a_thread import served_in_a_thread
 
 
@@ -119,6 +120,27 @@ def test_a_large_request_is_refused_before_it_is_read(address: str) -> None:
         assert line.recv(100).startswith(b"HTTP/1.1 4") or line.recv(1) == b""
 
 
+def test_a_message_above_the_limit_closes_the_connection_before_it_is_sent(address: str) -> None:
+    known = entered(address)
+    token = re.findall(r'"token":"([^"]+)"', ask(urljoin(address, "/"), **known).text)[0]
+    upgrade = {"Host": f"127.0.0.1:{port_of(address)}", "Origin": urljoin(address, "/")[:-1], "Upgrade": "websocket",
+               "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+               "Sec-WebSocket-Protocol": f"bokeh, {token}"} | known  # fmt: skip
+    head = "".join(f"{name}: {value}\r\n" for name, value in upgrade.items())
+    for size, ends in ((MESSAGE, False), (MESSAGE + 1, True)):
+        with socket.create_connection(("127.0.0.1", port_of(address)), timeout=60) as line:
+            line.sendall(f"GET /ws HTTP/1.1\r\n{head}\r\n".encode())
+            assert line.recv(100).startswith(b"HTTP/1.1 101")
+            line.sendall(b"\x82\xff" + size.to_bytes(8) + b"mask" + b"first bytes")
+            line.settimeout(5.0)
+            with contextlib.suppress(TimeoutError, ConnectionResetError):
+                while line.recv(10_000):
+                    pass
+                assert ends
+                continue
+            assert not ends
+
+
 def port_of(address: str) -> int:
     return int(re.findall(r":(\d+)/", address)[0])
 
@@ -163,6 +185,31 @@ def test_no_log_file_or_command_line_has_the_token_and_others_read_nothing(tmp_p
     assert not (tmp_path / "run" / "open.html").exists()
     kept = [path for path in (tmp_path / "run").rglob("*") if path.is_file()]
     assert [path for path in kept if token in path.read_text()] == []
+
+
+READ = """
+import os, pathlib, sys
+os.setgroups([]); os.setgid(65534); os.setuid(65534)
+for path in pathlib.Path(sys.argv[1]).rglob("*"):
+    try:
+        print(path, path.read_bytes())
+    except OSError:
+        pass
+"""
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root becomes somebody else")
+def test_another_user_of_the_machine_reads_none_of_its_files() -> None:
+    with tempfile.TemporaryDirectory(dir="/tmp") as place:
+        Path(place).chmod(0o755)
+        (Path(place) / "seen").write_text("by all")
+        words = [sys.executable, "-m", "tactile_cube.workbench", "open=false", f"hydra.run.dir={place}/run"]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as run, ended(run):
+            assert run.stdout is not None
+            assert any("http://" in line for line in run.stdout)
+            read = subprocess.run([sys.executable, "-c", READ, place], capture_output=True, text=True, check=True)
+        assert {path.name for path in Path(place).rglob("*") if path.is_file()} > {"workbench.log", "config.yaml"}
+        assert read.stdout == f"{place}/seen b'by all'\n"
 
 
 def test_a_port_that_is_taken_is_named(address: str, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ class LoopLog:
     """Measurements that were believed and the commands that were sent then, in an `.npy` file that grows.
 
     A thread writes, so that no tick waits for the disk. Whenever the program ends, by a crash too, `numpy.load` reads
-    the file up to the last chunk.
+    the file up to the last chunk. Time counts from the first row.
 
     Args:
         path: file to write.
@@ -46,6 +46,7 @@ class LoopLog:
         self._filling, self._filled, self._written = np.empty(CHUNK, self._type), 0, 0
         self._chunks: queue.Queue[Rows | None] = queue.Queue(BEHIND)
         self._failure: OSError | None = None
+        self._began: float | None = None
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = path.open("wb")
         self._write(self._filling[:0])
@@ -81,8 +82,10 @@ class LoopLog:
             OSError: the disk is full, or too slow.
         """
         torque = np.nan if reading.torque is None else reading.torque
+        self._began = reading.time if self._began is None else self._began
         row: Any = self._filling[self._filled]
-        row["time"], row["position"], row["command"], row["torque"] = reading.time, reading.q_m, command, torque
+        row["time"], row["torque"] = reading.time - self._began, torque
+        row["position"], row["command"] = reading.q_m, command
         self._filled += 1
         if self._filled < CHUNK:
             return
@@ -143,8 +146,7 @@ def write_runs(
 
 
 def _table(number: int, run: Rows) -> TrialTable:
-    """A run as a trial of kind `policy`, its time from 0 [s]."""
+    """A run as a trial of kind `policy`; its signals stay on the disk."""
     entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
-    measured = not np.isnan(run["torque"]).any()
-    time = run["time"] - run["time"][0]
-    return TrialTable(entry, time, run["command"], run["position"], run["torque"] if measured else None)
+    measured = not np.isnan(run["torque"].min())  # a copy of them all would not fit into the memory
+    return TrialTable(entry, run["time"], run["command"], run["position"], run["torque"] if measured else None)

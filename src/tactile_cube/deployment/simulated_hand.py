@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,8 @@ from tactile_cube.simulation import SimulationOptions, Start, World
 
 Array = NDArray[np.float64]
 AWAY = (0.0, 0.0, -0.3)  # [m] where the cube waits
+LONGEST_STOP = 100_000
+"""Periods for which the angle of the object is kept: a stop takes some 100, in 5 s of computing 30 000."""
 NO_FILTER = 1e-9  # [s]: the loop filters, the world must not filter again
 
 
@@ -61,11 +64,12 @@ class SimulatedHand:
         empty = replace(self._given, filter_time=NO_FILTER, gravity_scale=0.0, gravity_onset=0, table_height=None)
         self._world.reset(empty, Start(np.maximum(away, hand.lower), AWAY))
         self._q_d = np.array(self._world.q_m)
-        self._frame, self._theta = frame_along(self._setting.task.axis_vector()), [0.0]
+        self._frame, self._theta = frame_along(self._setting.task.axis_vector()), deque([0.0], LONGEST_STOP)
 
     def turned(self, at: float) -> float:
-        """Return how far the object had been turned the wanted way at a time [s] of the clock, unwrapped [rad]."""
-        return self._setting.task.direction * self._theta[round(at * self._rate)]
+        """Return how far the object had been turned the wanted way when the run ended, at `at` [s], unwrapped [rad]."""
+        since = min(self._ticks - round(at * self._rate), len(self._theta) - 1)
+        return self._setting.task.direction * self._theta[-1 - since]
 
     def wait(self) -> float:
         """Let the world go on by a period, by more where the tick is late."""

@@ -62,7 +62,9 @@ class TimeChart:
             (self.simulated, "model", SIMULATED, "solid"),
         )
         for source, name, color, dash in lines:
-            self.angle.line("t", "y", source=source, color=color, line_dash=dash, legend_label=name, line_width=1.5)
+            self.angle.line(
+                "t", "y", source=source, color=color, line_dash=dash, legend_label=plain(name), line_width=1.5
+            )
         for source, color, dash in ((self.beside, BEFORE, "dashed"), (self.simulated, ERROR, "solid")):
             self.error.line("t", "e", source=source, color=color, line_dash=dash, line_width=1.5)
         self.band = BoxAnnotation(fill_color=FLOOR, fill_alpha=0.2, level="underlay")

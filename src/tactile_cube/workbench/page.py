@@ -26,7 +26,7 @@ from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeCha
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import RIGS, TABLES
 from tactile_cube.workbench.state import ModelStage, Value, Workbench
-from tactile_cube.workbench.text import Html, choose, html, listed, plain, show
+from tactile_cube.workbench.text import LABEL, Html, choose, html, listed, plain, show
 from tactile_cube.workbench.widgets import NONE, RED, YELLOW, ImportForm, button, column_of, row_of, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
@@ -353,7 +353,8 @@ class Page:
         low, high = one.unknown.low, one.unknown.high
         slider = Slider(
             start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
-            title=f"{plain(name)} [{one.unit}]: {one.value:.4g}{found}; now", format=PrintfTickFormatter(format="%.4g"),
+            title=plain(f"{name} [{one.unit}]: {one.value:.4g}{found}; now", 3 * LABEL),
+            format=PrintfTickFormatter(format="%.4g"),
         )  # fmt: skip
         slider.on_change("value", lambda attr, old, new: self._move(one, new))
         slider.on_change("value_throttled", lambda attr, old, new: self._set(one, new))

@@ -76,7 +76,7 @@ def serve(job: Job) -> None:
 
     logging.getLogger("bokeh").setLevel(logging.ERROR)
     os.umask(0o077)
-    for file in job.folder.glob("*.log"):
+    for file in (*job.folder.glob("*.log"), *job.folder.glob(".hydra/*")):  # written before
         file.chmod(0o600)
     config = job.config
     desk = Desk(job.folder, config.own_effects or (), config.seed, config.model)

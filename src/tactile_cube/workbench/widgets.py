@@ -10,7 +10,7 @@ from bokeh.models import Button, Column, Div, LayoutDOM, Row, Select, TextInput
 from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.sources.units import ANGLE_UNITS, TIME_UNITS, TORQUE_UNITS
 from tactile_cube.workbench.desk import Desk
-from tactile_cube.workbench.text import Html, choose, html, listed, show
+from tactile_cube.workbench.text import Html, choose, html, listed, plain, show
 
 GAINS = {"kp": "K_P [N m/rad]", "kd": "K_D [N m s/rad]", "torque_limit": "torque limit [N m]"}
 NOMINAL = {
@@ -44,7 +44,7 @@ def text_of(*parts: str, styles: dict[str, str] | None = None, **more: Any) -> D
 
 def button(label: str, work: Callable[[], object], kind: str = "default") -> Button:
     """A button that does something."""
-    made = Button(label=label, button_type=kind, width=150, align="end")
+    made = Button(label=plain(label), button_type=kind, width=150, align="end")
     made.on_click(lambda: work())
     return made
 
@@ -57,12 +57,12 @@ class ImportForm:
         self.waiting, self.columns = text_of(), column_of()
         self.table = text_of(styles={"overflow-x": "auto"})
         self.seen: tuple[list[str], list[str]] | None = None  # columns and joints: as long as they stay, choices do
-        self.gains = {name: TextInput(title=title, width=150) for name, title in GAINS.items()}
-        self.nominal = {name: TextInput(title=title, width=150) for name, title in NOMINAL.items()}
+        self.gains = {name: TextInput(title=plain(title), width=150) for name, title in GAINS.items()}
+        self.nominal = {name: TextInput(title=plain(title), width=150) for name, title in NOMINAL.items()}
         self.mode = Select(title="commands are", options=["position", "torque"], value="position", width=110)
         self.length = TextInput(title="cut into trials of [s]", width=150)
         self.units = {
-            f"{name}_unit": Select(title=f"{name} in", options=[AUTO, *units], value=AUTO, width=150)
+            f"{name}_unit": Select(title=plain(f"{name} in"), options=[AUTO, *map(plain, units)], value=AUTO, width=150)
             for name, units in UNITS.items()
         }
         self.before = Select(title="trials of this recording", options=[TOGETHER, ALONE], value=TOGETHER, width=200)
@@ -127,7 +127,7 @@ def _columns_row(label: str, name: str, chosen: dict[str, str], columns: list[st
     """A select of columns for each signal, with the column that is chosen."""
     selects = []
     for signal, value in chosen.items():
-        selects.append(Select(title=signal, width=140))
+        selects.append(Select(title=plain(signal), width=140))
         choose(selects[-1], [NONE, *columns], value)
     name_of = Div(width=80, disable_math=True, styles={"overflow-wrap": "anywhere"})
     show(name_of, label)

@@ -1,6 +1,5 @@
 """Write a recording: recording.yaml, rig.urdf and one table a trial."""
 
-import io
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -20,9 +19,11 @@ from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_record
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.timing import rows_of
 from tactile_cube.untrusted_file import below
-from tactile_cube.whole_file import write_npz, write_whole, written_together
+from tactile_cube.whole_file import whole_file, write_npz, write_whole, written_together
 
 Array = NDArray[np.float64]
+BLOCK = 100_000
+"""Rows of a table that are written at a time: signals may lie on the disk, as those of a log do."""
 
 
 @dataclass(frozen=True)
@@ -75,21 +76,32 @@ def write_recording(folder: Path, recording: RecordingTables) -> None:
 
 def _write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
     """Write one trial as Parquet, CSV or NPZ, by the ending of `path`; signals as 32-bit numbers, time as 64-bit."""
-    columns: dict[str, NDArray[np.floating]] = {"time": table.time}
+    columns = {"time": table.time}
     for index, joint in enumerate(joints):
         for signal in SIGNALS:
             values = getattr(table, signal)
             if values is not None and not np.isnan(values[:, index]).all():
-                columns[f"{joint}.{signal}"] = values[:, index].astype(np.float32)
+                columns[f"{joint}.{signal}"] = values[:, index]
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".npz":
-        write_npz(path, columns)
+        write_npz(path, _narrow(columns))
     elif path.suffix == ".csv":
-        write_whole(path, polars.DataFrame(columns).write_csv().encode())
+        write_whole(path, polars.DataFrame(_narrow(columns)).write_csv().encode())
     else:
-        content = io.BytesIO()
-        polars.DataFrame(columns).write_parquet(content)
-        write_whole(path, content.getbuffer())
+        _write_parquet(path, columns)
+
+
+def _narrow(columns: Mapping[str, Array], rows: slice = slice(None)) -> dict[str, NDArray[np.floating]]:
+    return {name: values[rows].astype("f8" if name == "time" else "f4") for name, values in columns.items()}
+
+
+def _write_parquet(path: Path, columns: Mapping[str, Array]) -> None:
+    from pyarrow import parquet, table  # imports slowly
+
+    schema = table(_narrow(columns, slice(0))).schema
+    with whole_file(path) as file, parquet.ParquetWriter(file, schema, compression="zstd") as writer:
+        for first in range(0, len(columns["time"]), BLOCK):
+            writer.write_table(table(_narrow(columns, slice(first, first + BLOCK))))
 
 
 def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
