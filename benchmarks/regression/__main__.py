@@ -36,7 +36,7 @@ def judged(draw: dict[str, Any], folder: Path) -> dict[str, Any]:
     truth = write(out=folder, **words)
     progress: list[str] = []
     began = time.process_time()
-    found = diagnose(folder / "recording", "engine=fast", say=progress.append)
+    found = diagnose(folder / "recording", say=progress.append)
     seconds = time.process_time() - began
     write_model(found.model, folder / "model.yaml")
     unseen = compare(folder / "recording" / "validation", "band.simulations=0", model=folder / "model.yaml")
