@@ -64,7 +64,7 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     segments, unknowns = scores.shape
     correction = segments / max(segments - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse
-    variance = max(fitted.cost / max(np.count_nonzero(problem.weight), 1), 1.0)
+    variance = max(fitted.cost / max(float(np.count_nonzero(problem.weight)), 1.0), 1.0)
     return np.asarray(np.sqrt(np.maximum(np.diag(robust), variance * np.diag(inverse))))
 
 
