@@ -15,7 +15,6 @@ from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 DAMPING = 1e-4  # of a first step, in units of the information
-CONSISTENT = 3  # times that the weight of expectations is taken by the error that it leaves
 CONVERGED = 2e-3  # relative gain below which a fit ends that only has to be compared with others
 SHORTER = (
     6  # shorter and shorter steps that are tried before a fit ends; each costs one simulation, derivatives cost many
@@ -67,11 +66,9 @@ def fit(
     best = _linearised(problem, model, unknowns, everything, frozen)
     damping = DAMPING
     for iteration in range(iterations):
-        weight = _weight_after(problem, best)
+        weight = noise_inflation(problem, best.cost)
         for _ in range(SHORTER):
-            step, scales = _step(problem, best, weight, damping)
-            moved = put_all(best.model, everything, read_all(best.model, everything) + step * scales)
-            tried = _evaluated(problem, best, moved)
+            tried = _evaluated(problem, best, _stepped(problem, best, weight, damping))
             if tried.cost + weight * tried.prior_penalty < best.cost + weight * best.prior_penalty:
                 break
             damping *= 10.0
@@ -143,26 +140,8 @@ def _information(problem: Problem, columns: Array) -> Array:
     return np.asarray(np.einsum("grp,grq->pq", columns, problem.free(columns), optimize=True))
 
 
-def _weight_after(problem: Problem, fitted: Fit) -> float:
-    """Weight of what is expected beforehand by the error that a step would leave, not by the one that there is.
-
-    What the step explains is no noise. So a law that is missing is not held back by the error that it makes up for,
-    and where the constants alone are fitted the error stays and with it the weight.
-    """
-    weight = 1.0
-    pull = np.einsum("grp,gr->p", fitted.columns, problem.free(fitted.residual), optimize=True)
-    for _ in range(CONSISTENT):
-        step, _ = _step(problem, fitted, weight, DAMPING)
-        left = fitted.cost - 2.0 * pull @ step + step @ fitted.information @ step
-        weight = noise_inflation(problem, float(left))
-    return weight
-
-
-def _step(problem: Problem, fitted: Fit, trust: float, damping: float) -> tuple[Array, Array]:
-    """Damped Gauss-Newton step (P,) and its scales (P,).
-
-    An unknown that would leave its bounds stops there and the others are solved anew.
-    """
+def _stepped(problem: Problem, fitted: Fit, trust: float, damping: float) -> Model:
+    """Damped Gauss-Newton step; an unknown that would leave its bounds stops there and the others are solved anew."""
     values = read_all(fitted.model, fitted.unknowns)
     scale, centre, low, high = (
         np.array([getattr(u, key) for u in fitted.unknowns]) for key in ("scale", "centre", "low", "high")
@@ -171,7 +150,8 @@ def _step(problem: Problem, fitted: Fit, trust: float, damping: float) -> tuple[
     pull = np.einsum("grp,gr->p", fitted.columns, problem.free(fitted.residual), optimize=True)
     gradient = pull - weight * (values - centre) / scale
     information = fitted.information + np.diag(weight)
-    return bounded_step(information, gradient, damping, (low - values) / scale, (high - values) / scale), scale
+    step = bounded_step(information, gradient, damping, (low - values) / scale, (high - values) / scale)
+    return put_all(fitted.model, fitted.unknowns, values + step * scale)
 
 
 def bounded_step(information: Array, gradient: Array, damping: float, least: Array, most: Array) -> Array:
