@@ -1,16 +1,22 @@
-"""A recording says which effects it could not show, were they there."""
+"""What a diagnosis recommends, and which effects a recording could not show, were they there."""
 
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.effects.scales import FINGER
-from tactile_cube.identification.diagnosis import Unseen, unseen
+from tactile_cube.identification.diagnosis import Unseen, no_worse, unseen
 from tactile_cube.identification.in_words import unseen_effects
+from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.standard_model import fit_standard_model
+from tactile_cube.identification.verdict import Simulations, Verdict
+from tactile_cube.measurement.comparing.noise_floor import noise_floor
 from tactile_cube.measurement.joint_scales import joint_scales
-from tests.identification.rigs_of_any_size import Size, simulated
+from tactile_cube.measurement.split import held_out_split
+from tests.identification.rigs_of_any_size import NOISE, Size, simulated
 
 SATURATION, STOP = find_effect("torque_saturation"), find_effect("joint_stop")
 
@@ -57,3 +63,17 @@ def test_an_effect_is_told_once_with_all_its_joints() -> None:
         "These trials cannot reveal joint_stop at q1 (moved q1), q2 (moved q2)."
     ]
     assert unseen_effects({}) == []
+
+
+def test_nothing_that_claims_to_be_all_is_recommended_where_the_standard_model_follows_better(tmp_path: Path) -> None:
+    payload = find_effect("payload")
+    recording = simulated(tmp_path, Size(), payload, {"mass": 0.02, "distance": 0.1})
+    noise, parts = np.full(1, NOISE), held_out_split(recording)
+    search = Search(*parts, noise, (payload,), lambda line: None)
+    standard = fit_standard_model(*parts, noise, effects=(payload,))
+    simulations = Simulations(search, search.base, noise_floor(recording))
+    wrong, nothing = Verdict("missing_effect", search.base), Verdict("adequate", search.base)
+    verdict = no_worse(wrong, standard, search, simulations, search.free_runs)
+    assert verdict.kind == "unknown_effect"
+    assert verdict.chosen.fit.model == standard.model
+    assert no_worse(nothing, standard, search, simulations, search.free_runs) == nothing

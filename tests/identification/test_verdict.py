@@ -86,6 +86,14 @@ def test_a_base_that_leaves_something_at_one_joint_is_not_adequate() -> None:
     assert decide(replace(found, base=replace(found.base, judgement=one_joint))).kind == "unknown_effect"
 
 
+def test_a_law_that_contains_a_rival_is_no_rival_beside_it() -> None:
+    chosen = explanation("torque_bias", 1.03)
+    curve, constant = explanation("torque_curve", 1.03, seed=1), explanation("torque_gain", 1.031, seed=1)
+    assert curve.size <= chosen.size + 1
+    assert decide(findings(20.0, chosen, curve, constant)).rivals == (constant,)
+    assert decide(findings(20.0, chosen, curve)).rivals == (curve,)
+
+
 def test_two_effects_that_do_equally_well_are_ambiguous() -> None:
     verdict = decide(findings(20.0, explanation("torque_bias", 1.03), explanation("torque_gain", 1.031, seed=1)))
     assert verdict.kind == "ambiguous"

@@ -6,7 +6,7 @@ import pytest
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.split import held_out_split, turned, with_test_part
+from tactile_cube.measurement.split import held_out_split, with_test_part
 from tests.measurement.small_rig import setting, write
 
 
@@ -57,16 +57,3 @@ def test_the_trials_that_test_are_neither_fitted_nor_chosen_by(tmp_path: Path, i
 def test_few_trials_are_all_needed_by_the_fit(tmp_path: Path) -> None:
     fit, _ = held_out_split(read_recording(write(tmp_path)))
     assert with_test_part(fit, 2) == (fit, None)
-
-
-@pytest.mark.parametrize("initialisations", [1, 3, 6])
-def test_every_trial_is_held_out_in_turn(tmp_path: Path, initialisations: int) -> None:
-    whole = twelve(tmp_path, initialisations)
-    first = held_out_split(whole)
-    divisions = [first, *turned(*first)]
-    assert sorted(t.name for _, held in divisions for t in held.trials) == sorted(t.name for t in whole.trials)
-    for fit, held in divisions:
-        assert len(held.trials) == 4, "a third each"
-        assert len({t.name for t in (*fit.trials, *held.trials)}) == 12
-        if initialisations > 1:
-            assert {t.initialisation for t in fit.trials}.isdisjoint(t.initialisation for t in held.trials)

@@ -14,6 +14,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.disturbances import Disturbance, in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
+from tactile_cube.identification.fitting.held_out import HeldOut
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
@@ -123,9 +124,10 @@ def diagnose_recording(
     say(standard.sentence(common_unit(recording.units.values())))
     inquiry, left_out, suspected = beside_disturbances(whole)
     search, findings, simulations, verdict = inquiry.answer
-    verdict = no_worse(verdict, standard, search, simulations)
     _, held_out, tested = inquiry.parts
     test = held_out if tested is None else tested
+    untouched = HeldOut(search.shooting, test, search.noise, nominal_model(test, known).offsets)
+    verdict = no_worse(verdict, standard, search, simulations, untouched)
 
     def tested_with(chosen: Explanation) -> tuple[dict[str, ErrorSummary], dict[str, float]]:
         models = {"refitted": findings.base.fit.model, "with_effects": simulations.final(chosen).model}
@@ -166,13 +168,20 @@ def diagnose_recording(
     return replace(diagnosis, experiment=experiment)
 
 
-def no_worse(verdict: Verdict, standard: StandardModel, search: Search, simulations: Simulations) -> Verdict:
-    """The verdict, with the standard model in the place of one that is not the whole of it and follows worse."""
-    if verdict.kind not in NOT_ALL or standard.fit is None:
+def no_worse(
+    verdict: Verdict, standard: StandardModel, search: Search, simulations: Simulations, untouched: HeldOut
+) -> Verdict:
+    """The verdict, with the standard model in the place of what follows untouched trials worse.
+
+    A law that is the whole may differ in detail from the real thing, and is the better answer. Where the refitted
+    constants leave the noise alone nothing is recommended beside them, and none is needed.
+    """
+    if verdict.kind == "adequate" or standard.fit is None:
         return verdict
-    if not search.free_runs.worse(simulations.final(verdict.chosen).model, standard.model):
+    alike = search.criteria.least_gain if verdict.kind in NOT_ALL else search.criteria.detail
+    if not untouched.worse(simulations.final(verdict.chosen).model, standard.model, alike):
         return verdict
-    search.say("the standard model follows the held-out trials better than what was found")
+    search.say("the standard model follows untouched trials better than what was found")
     fitted = fit(search.problem, standard.model, search.unknowns(standard.model), iterations=0)
     judged = search.judged(standard.model)
     better = gain(search.base.judgement, judged)

@@ -20,6 +20,7 @@ from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.model_file import ModelFile
+from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.base import base_unknowns, every_effect
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
 from tactile_cube.identification.fitting.held_out import HeldOut
@@ -38,7 +39,6 @@ Array = NDArray[np.float64]
 WINDOWS = (0.05, 0.2, 1.0, 4.0)  # [s] of a finger: short ones from far off, long ones for what is slow
 FEWEST_ROWS = 8
 LONGEST_FITTED = 24.0  # [s] of a finger by the number of joints: enough data for a first answer
-MISSED = 0.25  # of the squared error, from which on an effect is needed though its interval reaches 0
 ROUNDS, ITERATIONS = 2, 6  # of the robust weights in windows of one length; Gauss-Newton steps in each
 OUTLYING = 2.0  # robust standard deviations from which on an error counts in proportion, not squared
 NORMAL_MEDIAN = 0.6745  # median of the absolute value of a standard normal number
@@ -155,7 +155,7 @@ class _Fitting:
         """The plain model in growing windows, by direction too where that is better, then what of it is needed."""
         stated = self.judge.error(self.start)
         best = _Tried(self.start, stated)
-        for laws, gain in ((PLAIN, 0.0), (BY_DIRECTION, MISSED)):
+        for laws, gain in ((PLAIN, 0.0), (BY_DIRECTION, STANDARD.detail)):
             best = self.grown(best, laws, gain)
         if best.fit is None:
             return StandardModel(self.start, None, (), np.zeros(0), stated, stated)
@@ -219,7 +219,7 @@ class _Fitting:
         terms = tuple(t for t in best.model.terms if t not in new or t.label not in needless)
         near = self.robust(replace(best.model, terms=terms), min(self.rows_of(WINDOWS[1]), best.rows))
         fewer = min(near, self.robust(near.model, best.rows), key=lambda one: one.error)
-        return self.needed(fewer) if fewer.error**2 <= (1.0 + MISSED) * best.error**2 else best
+        return self.needed(fewer) if fewer.error**2 <= (1.0 + STANDARD.detail) * best.error**2 else best
 
     def added(self, model: Model) -> tuple[Candidate, ...]:
         """The effects of a model beyond what is known."""

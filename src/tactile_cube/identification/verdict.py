@@ -81,14 +81,14 @@ def at_bound(one: Explanation) -> bool:
 def find_rivals(
     chosen: Explanation, found: Sequence[Explanation], criteria: Criteria = STANDARD
 ) -> tuple[Explanation, ...]:
-    """Sets of as few effects and numbers within the band of the chosen one, but for laws that contain it."""
+    """Sets of as few effects and numbers within the band of the chosen one, but for laws that contain it or a rival."""
     rivals: dict[frozenset[tuple[str, str]], Explanation] = {}
     for other in sorted(found, key=lambda e: e.judgement.costs.sum()):
         other_law = named(other) != named(chosen) and len(named(other)) <= len(named(chosen))
         other_law &= other.size <= chosen.size + 1
         if other_law and not contains(other, chosen) and not worse(other.judgement, chosen.judgement, criteria):
             rivals.setdefault(named(other), other)
-    return tuple(rivals.values())
+    return tuple(one for one in rivals.values() if not any(contains(one, other) for other in rivals.values()))
 
 
 def unexplained_joints(chosen: Explanation, joints: tuple[str, ...], criteria: Criteria = STANDARD) -> list[str]:

@@ -70,23 +70,3 @@ def with_test_part(fitted: Recording, trials: int, seed: int = 0) -> tuple[Recor
         fitted.with_trials([trial for index, trial in rows if index not in chosen]),
         fitted.with_trials([trial for index, trial in rows if index in chosen]),
     )
-
-
-def turned(fitted: Recording, held_out: Recording, parts: int = 3) -> list[tuple[Recording, Recording]]:
-    """Further divisions of the same trials, in which those to fit are held out in turn; of `parts` parts in all.
-
-    Whole initialisations are held out where the first division did so.
-    """
-    between = {trial.initialisation for trial in fitted.trials}
-    whole = len(between) > 1 and between.isdisjoint(trial.initialisation for trial in held_out.trials)
-    groups = [[t for t in fitted.trials if t.initialisation == k] for k in sorted(between)]
-    groups = groups if whole else [[trial] for trial in fitted.trials]
-    others = [[trial for group in groups[k :: parts - 1] for trial in group] for k in range(parts - 1)]
-    return [
-        (
-            fitted.with_trials([*held_out.trials, *(t for other in others if other is not part for t in other)]),
-            fitted.with_trials(part),
-        )
-        for part in others
-        if part
-    ]

@@ -14,7 +14,7 @@ UNKNOWNS = tuple(Unknown("constant", key, 0, -np.inf, np.inf, 1.0) for key in ("
 
 
 @pytest.mark.parametrize("remembered", [0.0, 3.0])
-def test_errors_follow_the_scatter_of_segments_and_are_no_smaller_than_the_sensors_noise_allows(
+def test_errors_follow_the_scatter_of_segments_and_are_no_smaller_than_noise_as_large_as_the_residual_allows(
     remembered: float,
 ) -> None:
     rng = np.random.default_rng(0)
@@ -25,10 +25,26 @@ def test_errors_follow_the_scatter_of_segments_and_are_no_smaller_than_the_senso
     clusters = {"groups": np.repeat(np.arange(SEGMENTS), ROWS), "use_correction": False}
     robust = ols.get_robustcov_results("cluster", **clusters).bse * np.sqrt(SEGMENTS / (SEGMENTS - 2))
     information = flat.T @ flat
+    left = ols.resid.reshape(SEGMENTS, ROWS)
     fitted = SimpleNamespace(
-        residual=ols.resid.reshape(SEGMENTS, ROWS), columns=columns, information=information, unknowns=UNKNOWNS
+        residual=left, columns=columns, information=information, unknowns=UNKNOWNS, cost=np.sum(left**2)
     )
-    found = standard_errors(SimpleNamespace(free=np.asarray), fitted)  # type: ignore[arg-type]
-    sensor_alone = np.sqrt(np.diag(np.linalg.inv(information)))
-    assert (robust > sensor_alone).all() == (remembered > 0.0)
-    np.testing.assert_allclose(found, np.maximum(robust, sensor_alone), rtol=1e-6)
+    problem = SimpleNamespace(free=np.asarray, weight=np.ones_like(left))
+    found = standard_errors(problem, fitted)  # type: ignore[arg-type]
+    white = np.sqrt(max(np.mean(left**2), 1.0) * np.diag(np.linalg.inv(information)))
+    assert (robust > white).all() == (remembered > 0.0)
+    np.testing.assert_allclose(found, np.maximum(robust, white), rtol=1e-6)
+
+
+def test_two_long_segments_leave_no_interval_shorter_than_their_residual_does() -> None:
+    """Of two segments and two unknowns the scores are none in the best fit, and so is their scatter."""
+    rng = np.random.default_rng(0)
+    columns, noise = rng.normal(size=(2, ROWS, 2)), 3.0 * rng.normal(size=(2, ROWS))
+    flat = columns.reshape(-1, 2)
+    left = (noise.ravel() - flat @ np.linalg.lstsq(flat, noise.ravel(), rcond=None)[0]).reshape(2, ROWS)
+    fitted = SimpleNamespace(
+        residual=left, columns=columns, information=flat.T @ flat, unknowns=UNKNOWNS, cost=np.sum(left**2)
+    )
+    problem = SimpleNamespace(free=np.asarray, weight=np.ones_like(left))
+    found = standard_errors(problem, fitted)  # type: ignore[arg-type]
+    assert (found >= 2.5 * np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))).all()

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import fit
 from tactile_cube.identification.fitting.problem import Problem
@@ -18,7 +19,6 @@ from tactile_cube.measurement.replay.model import Model
 
 Array = NDArray[np.float64]
 ITERATIONS = 3  # that the joint offsets of unseen initialisations take
-ALIKE = 0.04  # of the squared error: `criteria.least_gain`, what a refit differs by in chance
 
 
 class HeldOut:
@@ -54,6 +54,6 @@ class HeldOut:
             return float("inf")
         return free_run_error(self.trials, runs).overall
 
-    def worse(self, tried: Model, before: Model) -> bool:
-        """Whether a refit does worse than what went before, by more than chance."""
-        return self.error(tried) ** 2 > (1.0 + ALIKE) * self.error(before) ** 2
+    def worse(self, tried: Model, before: Model, alike: float = STANDARD.least_gain) -> bool:
+        """Whether a model does worse than what went before, by more than a part of the squared error."""
+        return self.error(tried) ** 2 > (1.0 + alike) * self.error(before) ** 2

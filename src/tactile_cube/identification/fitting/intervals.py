@@ -53,7 +53,8 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     """Standard errors (P,) of the unknowns, in units of their scales.
 
     The residual of a model that is not perfect remembers itself; so the scatter of the score is taken segment by
-    segment (cluster-robust), and never less than the sensor's noise alone would give.
+    segment (cluster-robust), and never less than white noise as large as the residual would give: of few long segments
+    the scatter says little.
     """
     freed = problem.free(fitted.residual)
     scores = np.einsum("grp,gr->gp", fitted.columns, freed, optimize=True)
@@ -63,7 +64,8 @@ def standard_errors(problem: Problem, fitted: Fit) -> Array:
     segments, unknowns = scores.shape
     correction = segments / max(segments - unknowns, 1)
     robust = inverse @ (scores.T @ scores * correction) @ inverse
-    return np.asarray(np.sqrt(np.maximum(np.diag(robust), np.diag(inverse))))
+    variance = max(fitted.cost / max(float(np.count_nonzero(problem.weight)), 1.0), 1.0)
+    return np.asarray(np.sqrt(np.maximum(np.diag(robust), variance * np.diag(inverse))))
 
 
 def bounds(fitted: Fitted) -> dict[tuple[str, str, int, int], tuple[float, float, float]]:

@@ -132,11 +132,6 @@ class Division:
         self.validation.linearise_starts(found)
         return judge(self.validation, self.held_out, found)
 
-    def settled(self, model: Model) -> tuple[Fit, Judgement]:
-        """A model with everything refitted, and how it does on the held-out trials."""
-        fitted = self.refitted(model)
-        return fitted, self.judged(fitted.model)
-
 
 def some(windows: Windows, segments: int) -> Windows:
     """Windows of about so many segments, spread over trials and over the time within trials."""

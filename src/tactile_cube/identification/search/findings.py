@@ -18,6 +18,8 @@ from tactile_cube.identification.search.proposals import (
     CLOSE,
     Looks,
     detailed,
+    explains_most,
+    further,
     grown,
     look,
     near,
@@ -137,17 +139,26 @@ def cheapest(found: Sequence[Proposal], search: Search) -> list[Proposal]:
 
 
 def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:
-    """Sets with another law in the place of one of the chosen ones that fit as well with everything free."""
+    """Sets with another law in the place of one of the chosen ones that fit as well with everything free.
+
+    The laws that a chosen one becomes at the edge of its numbers come first; what has many more numbers is no twin.
+    """
     known = {named_by(one.effects) for one in judged}
     itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
     for place, effect in enumerate(chosen.effects):
         looks = first
         if len(chosen.effects) > 1:
             looks = look(search, without(search, itself, place), list(effect.joints))
-        for candidate, fitted in looks.tried:
+        laws = [one for one in looks.tried if one[0].size <= effect.size + 1 and explains_most(search, looks, one[1])]
+        laws.sort(key=lambda one: one[0].effect.name not in effect.effect.contains)
+        for candidate, fitted in laws[: 2 * JUDGED]:
             names = named_by((*looks.parent.effects, candidate))
-            if len(found) < JUDGED and names not in known and near(search, looks, fitted, [itself]):
-                known.add(names)
+            if len(found) >= JUDGED or names in known:
+                continue
+            known.add(names)
+            if not near(search, looks, fitted, [itself]):
+                fitted = further(looks, fitted)
+            if near(search, looks, fitted, [itself]):
                 found.append(refitted(search, looks, [(candidate, fitted)]))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
 

@@ -23,6 +23,7 @@ from tactile_cube.identification.search.search import Search
 Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
 STEPS = 2  # of Gauss-Newton that every law gets
+MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
 SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
 SPECIAL = 3  # best laws of which a profile is looked at for simpler ones
@@ -127,6 +128,19 @@ def whole(search: Search, found: Sequence[Proposal]) -> bool:
 def near(search: Search, looks: Looks, fitted: Fit, found: Sequence[Proposal]) -> bool:
     """Whether a law has come near the best set by its own steps, on few windows."""
     return over_noise(looks.problem, fitted) ** 2 <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2
+
+
+def explains_most(search: Search, looks: Looks, fitted: Fit) -> bool:
+    """Whether a law has explained most of what the set leaves above the noise by its own steps."""
+    count = np.count_nonzero(looks.problem.weight)
+    most = search.criteria.most
+    return bool(fitted.cost - count <= max((1.0 - most) * (looks.frozen.cost - count), (CLOSE - 1.0) * count))
+
+
+def further(looks: Looks, fitted: Fit) -> Fit:
+    """A law after more steps of its own: a twin is as good only once the constants beside it have moved."""
+    own = fitted.unknowns[len(looks.frozen.unknowns) :]
+    return fit(looks.problem, fitted.model, own, MORE_STEPS, looks.frozen)
 
 
 def over_noise(problem: Problem, fitted: Fit) -> float:

@@ -14,7 +14,6 @@ from tactile_cube.measurement.replay.model import Model
 Array = NDArray[np.float64]
 BINS = 24
 MANY = 10 * BINS  # samples that a curve needs
-ENOUGH = 20_000  # samples of which the equations of motion are asked
 FEATURES = 150  # random cosines of the black box
 RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 PARABOLA = 0.015  # [s] of a finger: half width of the parabola that reads slope and curvature
@@ -108,44 +107,6 @@ def _drive(problem: Problem, model: Model, position: Array, velocity: Array) -> 
     kp, kd, most = np.repeat(windows.gains, windows.segments, axis=0).swapaxes(0, 1)[:, :, None]
     drive = kp * constants["kp"] * (commands - position) - kd * constants["kd"] * velocity
     return np.asarray(np.clip(drive, -most * constants["torque_limit"], most * constants["torque_limit"]))
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What was logged of all joints, each (samples, n), by one low-pass filter, so that linear laws hold in it.
-
-    Attributes:
-        velocity: [rad/s].
-        direction: its sign; between -1 and 1 where that changes.
-        acceleration: [rad/s^2].
-        drive: torque that the controller asks of the drives, less the friction that is stated [N m].
-        taken: torque that the motion takes by the equations of motion [N m].
-    """
-
-    velocity: Array
-    direction: Array
-    acceleration: Array
-    drive: Array
-    taken: Array
-
-
-def logged_motion(problem: Problem, recording: Recording, model: Model) -> Motion:
-    """The inverse view of a log: no simulation, so that it holds where one would run away from the measurement too."""
-    n, segment, step, time = len(recording.joints), problem.windows.segment, recording.step, problem.shooting.time
-    shape = (len(problem.weight), segment, -1)
-    weight, measured = (one.reshape(shape)[..., :n] for one in (problem.weight, problem.measured))
-    some = slice(None, None, 1 + measured[..., 0].size // ENOUGH)
-    position, velocity, acceleration = _derivatives(measured, step, 0.0)  # the filter smooths, and all alike
-    offsets = np.array([model.offsets[int(k)] for k in problem.segment_initialisation])[:, None]
-    q, v, a = (one[some].reshape(-1, n) for one in (position + offsets, velocity, acceleration))
-    taken = problem.shooting.tree.inverse_dynamics(q, v, a, recording.gravity)
-    taken += model.constants["reflected_inertia"] * a
-    direction = np.sign(_derivatives(measured, step, time)[1])
-    drive = _drive(problem, model, position, velocity) - model.constants["static_friction"] * direction
-    inner = slice(segment // 8, -segment // 8)
-    inside = np.all(weight[some][:, inner] > 0, axis=2)
-    logged = (*(one[some] for one in (velocity, direction, acceleration, drive)), taken.reshape(-1, segment, n))
-    return Motion(*(_derivatives(one, step, time)[0][:, inner][inside] for one in logged))
 
 
 def shapes(missing: Missing) -> list[Shape]:

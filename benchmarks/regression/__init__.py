@@ -1,0 +1,1 @@
+"""Small recordings made from known seeds, each with the answer that a diagnosis is to give."""

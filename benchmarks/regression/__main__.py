@@ -1,0 +1,86 @@
+"""Answers to recordings that are known: what a change of the search has made better or worse.
+
+    python -m benchmarks.regression --out outputs/regression
+
+One process, one line a recording; the same command goes on where it stopped. What counts as right stands in
+benchmarks/blind/scoring.py. These draws are spent: they say what has changed, and never how good a search is.
+"""
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.blind.generator import write
+from benchmarks.blind.scoring import score
+from tactile_cube.api.comparison import compare
+from tactile_cube.api.diagnosis import diagnose
+from tactile_cube.drivetrain.model_file import write_model
+
+OUTCOMES = ("right", "acceptable", "wrong")
+"""The best one first."""
+DRAWS = Path(__file__).with_name("draws.yaml")
+
+
+def draws() -> list[dict[str, Any]]:
+    """The recordings: a seed, the words of its generator, and the outcome that is expected."""
+    return list(yaml.safe_load(DRAWS.read_text()))
+
+
+def judged(draw: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """One recording made, diagnosed as a user does, and judged."""
+    words = {key: value for key, value in draw.items() if key != "expects"}
+    truth = write(out=folder, **words)
+    progress: list[str] = []
+    began = time.process_time()
+    found = diagnose(folder / "recording", say=progress.append)
+    seconds = time.process_time() - began
+    write_model(found.model, folder / "model.yaml")
+    unseen = compare(folder / "recording" / "validation", "band.simulations=0", model=folder / "model.yaml")
+    ratio = unseen.error / truth["sensor_floor"]
+    one = score(truth, found.data, ratio)
+    return {
+        "seed": draw["seed"],
+        "truth": one.truth,
+        "answer": one.answer,
+        "rivals": found.data["sets"],
+        "outcome": one.outcome,
+        "why": one.why,
+        "confident": one.confident,
+        "expects": draw["expects"],
+        "unseen": round(ratio, 3),
+        "seconds": round(seconds, 1),
+        "progress": progress,
+    }
+
+
+def main() -> None:
+    """Judge what is not judged yet."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("outputs/regression"))
+    parser.add_argument("--only", type=int, nargs="+", help="these seeds")
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    answers = args.out / "answers.jsonl"
+    done = {json.loads(x)["seed"] for x in answers.read_text().splitlines()} if answers.is_file() else set()
+    failed = False
+    for draw in draws():
+        if draw["seed"] in done or (args.only and draw["seed"] not in args.only):
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            one = judged(draw, Path(folder))
+        with answers.open("a") as lines:
+            lines.write(json.dumps(one) + "\n")
+        failed |= OUTCOMES.index(one["outcome"]) > OUTCOMES.index(one["expects"])
+        line = f"{one['seed']} {one['truth']} -> {one['answer']} {one['rivals'] or ''}"
+        print(f"{line} {one['outcome']} ({one['why']}), unseen {one['unseen']}, {one['seconds']} CPU s", flush=True)
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()
