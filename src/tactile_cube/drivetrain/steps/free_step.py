@@ -94,11 +94,11 @@ def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
     A model that `follows` takes the equations of motion from step `row` of a path (steps PATH_WIDTH,), which another
     one has noted that went along it before; a path of less than a step is none.
     """
-    dt, follows = memory[plant.DT], memory[plant.FOLLOWS] != 0.0
+    dt, width = memory[plant.DT], PATH_WIDTH // C if len(path) >= PATH_WIDTH else 0
+    follows = width > 0 and memory[plant.FOLLOWS] != 0.0
     for c in range(C):
         x = signals_of(c, memory)
         q, v = block(memory, plant.Q, (n,), c), block(memory, plant.V, (n,), c)
-        width = PATH_WIDTH // C if len(path) >= PATH_WIDTH else 0
         here = shaped_view(path, (row * C + c) * width, (width,))
         if follows:
             take_equations(c, x, q, here, memory)
