@@ -34,9 +34,9 @@ def test_recordings_are_diagnosed_into_folders_of_their_names_and_one_that_canno
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "two.urdf").write_text(URDF)
-    hidden = 'source.hidden=["torque_bias@b: bias=0.05"]'
-    sound = tmp_path / "sound"
-    tactile_cube.record(sound, *RIG, f"source.urdf={tmp_path}/two.urdf", hidden, "source.validation=false")
+    sound, hidden = tmp_path / "sound", ["torque_bias@b: bias=0.05"]
+    rig = RIG | {"source.urdf": tmp_path / "two.urdf", "source.hidden": hidden, "source.validation": False}
+    tactile_cube.record(sound, source="rig", values=rig)
     monkeypatch.setattr(batch, "each", one_after_the_other)
     found = dict(tactile_cube.diagnose_each([sound, tmp_path / "gone"], out=tmp_path / "out"))
     assert isinstance(found[tmp_path / "gone"], InputError)
