@@ -29,10 +29,8 @@ from tactile_cube.randomization import GraspStarts
 from tactile_cube.simulation import SimulationOptions
 from tactile_cube.training.build import build_run
 from tactile_cube.training.environment import as_environment
-from tactile_cube.training.finished import Finished
 from tactile_cube.training.ledger import LEDGER, Costs, read_costs, write_costs
-from tactile_cube.training.recovery import train_on
-from tactile_cube.training.run import INTERRUPTED, MASTERED, POLICY, Run
+from tactile_cube.training.run import INTERRUPTED, MASTERED, POLICY, Finished, Run, train_on
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 from tactile_cube.whole_file import write_whole
 

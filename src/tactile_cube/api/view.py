@@ -15,7 +15,7 @@ from tactile_cube.evaluation.policy_path import BASELINES, policy_path
 from tactile_cube.evaluation.training_curve import Curve, read_curve
 from tactile_cube.evaluation.verdict import EpisodeResult
 from tactile_cube.visualization.episode_recording import description, write_pair
-from tactile_cube.visualization.viewer import VIEWERS, show_files
+from tactile_cube.visualization.rerun_recording import VIEWERS, show_files
 
 
 @dataclass(frozen=True)
