@@ -65,6 +65,7 @@ def _run(name: str) -> None:
         def task(config: DictConfig) -> float | None:
             return jobs(config)
 
+        task.__module__ = f"{__package__}.{name}"  # Hydra names the job and its log by it
         try:
             hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(task)()
         finally:

@@ -157,7 +157,8 @@ def test_a_sweep_keeps_its_record_in_its_own_folder(tmp_path: Path, monkeypatch:
 
 
 def test_a_sweeper_is_given_the_objective_of_each_run(tmp_path: Path) -> None:
-    (tmp_path / "searching.py").write_text(
+    (tmp_path / "hydra_plugins").mkdir()
+    (tmp_path / "hydra_plugins" / "searching.py").write_text(
         "from hydra._internal.core_plugins.basic_sweeper import BasicSweeper\n"
         "class Searching(BasicSweeper):\n"
         "    def sweep(self, arguments):\n"
@@ -171,7 +172,7 @@ def test_a_sweeper_is_given_the_objective_of_each_run(tmp_path: Path) -> None:
         "evaluate",
         "-m",
         *words,
-        "hydra.sweeper._target_=searching.Searching",
+        "hydra.sweeper._target_=hydra_plugins.searching.Searching",
     ]
     run = subprocess.run(
         command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=280, check=False
