@@ -149,14 +149,14 @@ def signatures(motions: tuple[str, ...]) -> dict[str, list[tuple[object, object,
     """Effect -> for each motion time [s], command [rad] and residual [mrad] of its joint."""
     import numpy as np
 
-    from tactile_cube.api.job import called_job
+    from tactile_cube.api.job import worded_job
     from tactile_cube.measurement.recordings.description import TrialEntry
     from tactile_cube.measurement.replay.model import Model, terms_of
     from tactile_cube.measurement.replay.simulator import Simulator
     from tactile_cube.measurement.sources.session import silent_trial, unmeasured
     from tactile_cube.measurement.sources.simulated_rig import SimulatedRig
 
-    config = called_job("record", ("source=finger", "out=unused")).config.source
+    config = worded_job("record", ("source=finger", "out=unused")).config.source
     source = SimulatedRig(
         controller=config.controller, nominal=config.nominal, true_spread=0.0, duration=6.0, reach=0.5
     )

@@ -24,7 +24,6 @@ STEPS, MOVED_AT, SHORTEST, LONGEST = 100, 35, 2, 7
 """Policy steps of an episode, the one at which the finger moves, and how many it holds its target."""
 GAMMA = 0.95
 """Discount of the recipe."""
-SETTINGS = ("+experiment=alone", "task=float", "task.filter_time=0.1", "exploration=none")
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,10 @@ def main() -> None:
     parser.add_argument("--moves", type=int, default=32, help="from each start, the fingers in turn")
     parser.add_argument("--seed", type=int, default=100)
     given = parser.parse_args()
-    env, policy = tactile_cube.make_env(*SETTINGS), find_policy(given.policy).policy
+    config = tactile_cube.env_config(
+        experiment="alone", task="float", exploration="none", values={"task.filter_time": 0.1}
+    )
+    env, policy = tactile_cube.make_env(config), find_policy(given.policy).policy
     draws, per_finger = np.random.default_rng(given.seed), 3
     gains, better, lost = [], 0, 0
     for start in range(given.starts):

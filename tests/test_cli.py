@@ -110,15 +110,16 @@ def test_fail_prints_one_line_and_exits_with_2(capsys: pytest.CaptureFixture[str
 
 def test_a_value_that_another_choice_of_a_group_had_is_named() -> None:
     with pytest.raises(InputError) as info:
-        env_config("+experiment=alone", "curriculum=linear")
+        env_config(experiment="alone", curriculum="linear")
     assert "LinearCurriculum.__init__() got an unexpected keyword argument" in str(info.value)
     assert "full_key: env.curriculum; if it was set for another choice of the group, ~GROUP.KEY" in str(info.value)
-    assert env_config("+experiment=alone", "curriculum=linear", "~curriculum.low", "~curriculum.high").curriculum
+    without = {"~curriculum.low": None, "~curriculum.high": None}
+    assert env_config(experiment="alone", curriculum="linear", values=without).curriculum
 
 
 @pytest.mark.parametrize("experiment", ["alone", "curriculum"])
 def test_any_curriculum_can_be_left_out(experiment: str) -> None:
-    assert isinstance(env_config(f"+experiment={experiment}", "curriculum=none").curriculum, NoCurriculum)
+    assert isinstance(env_config(experiment=experiment, curriculum="none").curriculum, NoCurriculum)
 
 
 def test_folders_of_a_sweep_neither_begin_with_a_dash_nor_nest_nor_grow_too_long() -> None:

@@ -35,7 +35,7 @@ def env() -> Iterator[GymnasiumRotation]:
 
 
 def test_checker_of_gymnasium_is_content() -> None:
-    env = gymnasium.make("tactile_cube/Rotation-v0", render_mode="rgb_array", overrides=("task.episode_steps=5",))
+    env = gymnasium.make("tactile_cube/Rotation-v0", render_mode="rgb_array", values={"task.episode_steps": 5})
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped)
@@ -131,7 +131,7 @@ def test_the_scripted_gait_earns_the_success_that_evaluate_gives_it() -> None:
 
 
 def test_registered_name_takes_options_of_the_configuration() -> None:
-    env = gymnasium.make("tactile_cube/Rotation-v0", task="float", overrides=("task.filter_time=0.25",))
+    env = gymnasium.make("tactile_cube/Rotation-v0", task="float", values={"task.filter_time": 0.25})
     observation, _ = env.reset(seed=0)
     assert observation.shape == (120,)
     task = env.unwrapped._env.base_env.tasks[0].task

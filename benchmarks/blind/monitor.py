@@ -53,8 +53,9 @@ def drawn(draw: int, seed: int, significance: float, folder: Path) -> dict[str, 
 
     model = tactile_cube.identify(recorded("reference"), [f"{KNOWN}@j"], say=quiet).model
     altered = recorded("other", friction=1.5 * damping) if change == MORE_FRICTION else recorded("other", change)
-    setting = f"significance={significance}"
-    same, other = (tactile_cube.monitor(one, model, setting, say=quiet) for one in (recorded("same"), altered))
+    same, other = (
+        tactile_cube.monitor(one, model, significance=significance, say=quiet) for one in (recorded("same"), altered)
+    )
     return {"draw": draw, "change": change, "null": row(same), "changed": row(other)}
 
 

@@ -25,7 +25,7 @@ SHOWN = {
     "private_mb": "memory [MB]", "open_files": "open files", "threads": "threads", "log_kb": "logs [kB]",
     "steps": "steps",
 }  # fmt: skip
-BENCH = ("source.joints=[q3]", "source.duration=3", "source.hidden=[]", "source.validation=false")
+BENCH = {"source.joints": ["q3"], "source.duration": 3, "source.hidden": [], "source.validation": False}
 """One joint and trials of 3 s: a diagnosis is short."""
 TRAINING = ("+experiment=smoke", "training.steps=100000000", "training.replay_size=20000", "name=growth")
 
@@ -92,7 +92,7 @@ def diagnose_often(number: int, out: Path) -> list[dict[str, float]]:
     with tempfile.TemporaryDirectory() as place, (out / "diagnoses.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS)
         table.writeheader()
-        measured = tactile_cube.record(Path(place) / "bench", *BENCH)[""]
+        measured = tactile_cube.record(Path(place) / "bench", values=BENCH)[""]
         for done in range(1, number + 1):
             tactile_cube.diagnose(measured).write(Path(place) / "answer")
             row = reading(psutil.Process(), Path(place), time.monotonic() - began)

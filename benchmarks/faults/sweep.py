@@ -16,7 +16,7 @@ from pathlib import Path
 
 from benchmarks.faults.campaign import SHORT, results, same
 from tactile_cube.agent.policy_file import current_commit
-from tactile_cube.training.finished import FILE
+from tactile_cube.training.run import FILE
 
 SEEDS = 4
 STRUCK = 1

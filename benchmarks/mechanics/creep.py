@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.mechanics.case import Answer
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 from tactile_cube.simulation.world import World
 
 SQUEEZE = 0.01

@@ -13,7 +13,7 @@ from benchmarks.mechanics.case import Answer
 from tactile_cube.hand import DLR_HAND2, grasp_angles, tip_positions
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 from tactile_cube.simulation.world import World
 
 Array = NDArray[np.float64]

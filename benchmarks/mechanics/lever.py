@@ -22,7 +22,7 @@ from benchmarks.mechanics.pinch import (
     pinch,
     roll_of,
 )
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 from tactile_cube.simulation.world import World
 
 SQUEEZE = 0.002

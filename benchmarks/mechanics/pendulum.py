@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from benchmarks.mechanics.case import Answer
 from benchmarks.mechanics.pinch import GRAVITY, ROUND_TIPS, box, centre_of_mass, grip, pinch, roll_of
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 from tactile_cube.simulation.world import World
 
 SQUEEZE = 0.003

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.mechanics.held_cube import measure_accuracy
 from tactile_cube.hand import DLR_HAND2, Gait
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 from tactile_cube.simulation.world import World
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from benchmarks.mechanics.case import Answer, Case
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 from tactile_cube.simulation.world import World
 
 ACCURACY = {"fast": SimulationOptions, "faithful": SimulationOptions.faithful}

@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.paper.page import paper_page, read_all
 from benchmarks.paper.rows import read_comparison
 from tactile_cube.evaluation.training_curve import RUN, read_sweep, sweep_table
-from tactile_cube.training.finished import FILE as FINISHED
+from tactile_cube.training.run import FILE as FINISHED
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 TABLE_I = {

@@ -21,27 +21,26 @@ from tactile_cube.evaluation.episode_record import EpisodeRecord
 Array = NDArray[np.float64]
 DATA = Path(__file__).parents[2] / "docs" / "results" / "data" / "paper_budget.json"
 POLICIES = ("hold", "published", "fingertips", "default")
-PUBLISHED = "reward=paper"
 TERMS = ("spin", "height", "plane", "tilt", "proximal")
 RADIAN = ("tilt", "plane", "height")
 FIRST = 10  # policy steps in which the hand closes: 1 s
-WORLDS = {
-    "as evaluated": (),
-    "MuJoCo": ("engine=mujoco",),
-    "1 kHz": ("+env.simulation.dt=1e-3", "+env.simulation.substeps=100"),
-    "0.5 ms, 150 iterations": (
-        "+env.simulation.dt=5e-4",
-        "+env.simulation.substeps=200",
-        "+env.simulation.solver_iterations=150",
-    ),
-    "soft tips, 0.1 mm/N": ("+env.constants.tip_compliance=1e-4",),
-    "spinning friction 3 mm": ("+env.constants.tip_spinning_friction=0.003",),
-    "spinning friction 30 mm": ("+env.constants.tip_spinning_friction=0.03",),
-    "K_e as printed": ("+env.constants.elasticity_sign=-1",),
-    "T_s 0.08 s (cut-off 2 Hz)": ("+task.filter_time=0.08",),
-    "5 % of the weight": ("+task.gravity_scale=0.05",),
+WORLDS: dict[str, dict[str, Any]] = {
+    "as evaluated": {},
+    "MuJoCo": {"engine": "mujoco"},
+    "1 kHz": {"+env.simulation.dt": 1e-3, "+env.simulation.substeps": 100},
+    "0.5 ms, 150 iterations": {
+        "+env.simulation.dt": 5e-4,
+        "+env.simulation.substeps": 200,
+        "+env.simulation.solver_iterations": 150,
+    },
+    "soft tips, 0.1 mm/N": {"+env.constants.tip_compliance": 1e-4},
+    "spinning friction 3 mm": {"+env.constants.tip_spinning_friction": 0.003},
+    "spinning friction 30 mm": {"+env.constants.tip_spinning_friction": 0.03},
+    "K_e as printed": {"+env.constants.elasticity_sign": -1},
+    "T_s 0.08 s (cut-off 2 Hz)": {"+task.filter_time": 0.08},
+    "5 % of the weight": {"+task.gravity_scale": 0.05},
 }
-"""Words for evaluate."""
+"""Settings of evaluate."""
 
 
 def budget(policy: str, world: str, episodes: int, seconds: float) -> dict[str, Any]:
@@ -51,8 +50,9 @@ def budget(policy: str, world: str, episodes: int, seconds: float) -> dict[str, 
         "turned" [rad], "return", the weighed terms by name, "first" (their sum in the first second), and "path": plane
         and tilt if each physics step's motion were paid instead of the net change over a policy step.
     """
-    words = (f"protocol.episodes={episodes}", f"protocol.seconds={seconds}", "+env.simulation.trace=true", "seed=5")
-    played = tactile_cube.evaluate(policy, PUBLISHED, "protocol=paper", *words, *WORLDS[world], say=lambda *_: None)
+    short = {"protocol.episodes": episodes, "protocol.seconds": seconds, "+env.simulation.trace": True}
+    values = {"protocol": "paper", "reward": "paper", **short, **WORLDS[world]}
+    played = tactile_cube.evaluate(policy, seed=5, values=values, say=lambda *_: None)
     records = [played.episode(number) for number in range(episodes)]
     rows = [_row(record) for record in records]
     return {"policy": policy, "world": world} | {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}

@@ -41,7 +41,7 @@ def judged(draw: dict[str, Any], folder: Path) -> dict[str, Any]:
     found = diagnose(folder / "recording", say=progress.append)
     seconds = time.process_time() - began
     write_model(found.model, folder / "model.yaml")
-    unseen = compare(folder / "recording" / "validation", "band.simulations=0", model=folder / "model.yaml")
+    unseen = compare(folder / "recording" / "validation", values={"band.simulations": 0}, model=folder / "model.yaml")
     ratio = unseen.error / truth["sensor_floor"]
     one = score(truth, found.data, ratio)
     return {

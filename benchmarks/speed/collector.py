@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from benchmarks.speed.report import Growth, Section, rates
 from benchmarks.speed.the_task import table_config, table_environment
 from benchmarks.speed.timing import in_turns
+from tactile_cube.agent.agent import AgentSettings
 from tactile_cube.agent.networks import Actor
-from tactile_cube.agent.settings import AgentSettings
 from tactile_cube.gymnasium_env import GymnasiumRotation
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment

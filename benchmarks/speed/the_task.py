@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tactile_cube.simulation.options import EngineName
+from tactile_cube.simulation.engine import EngineName
 from tactile_cube.training.environment import Environment, rotation_environment
 from tactile_cube.transforms import EnvConfig
 

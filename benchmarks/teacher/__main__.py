@@ -10,12 +10,14 @@ import argparse
 import time
 from pathlib import Path
 
+import yaml
+
 import tactile_cube
 from benchmarks.teacher.gait_search import search_gait, write_gait
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.transforms.make_env import rotation_env
 
-SETTINGS = {"reward": "air", "start": "wide_yaw", "curriculum": "none", "task.filter_time": "0.25"}
+SETTINGS = {"reward": "air", "start": "wide_yaw", "curriculum": "none", "task.filter_time": 0.25}
 """Where the recipe's curriculum begins."""
 
 
@@ -32,8 +34,8 @@ def main() -> None:
     given.out.mkdir(parents=True, exist_ok=True)
     began = time.process_time()
     ledger = Ledger(given.out / LEDGER, 1, lambda: time.process_time() - began, in_process=True)
-    chosen = SETTINGS | dict(word.split("=", 1) for word in given.settings)
-    config = tactile_cube.env_config(*(f"{key}={value}" for key, value in chosen.items()))
+    asked = dict(word.split("=", 1) for word in given.settings)
+    config = tactile_cube.env_config(values=SETTINGS | {key: yaml.safe_load(value) for key, value in asked.items()})
     worlds = [rotation_env(config) for _ in range(given.worlds)]
     found = search_gait(worlds, given.generations, given.population, given.seed, book=ledger.write)
     write_gait(given.out / "gait.yaml", found, given.seed, ledger.costs())

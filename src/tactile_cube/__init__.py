@@ -1,9 +1,9 @@
 """Teach a torque-controlled hand to turn an object by touch alone, in a simulation that matches the measured hand.
 
-Nearly each command of the package is also a function of it: `train`, `evaluate`, `compare`, `diagnose`, `identify`,
-`record`, `export`, `export_model`, `deploy`, `view`, `monitor` and `effects`; `search_grasps`, `make_env`,
-`load_policy`, `read_recording` and `recording_from_arrays` give what they work on. Nothing slow is imported before it
-is used.
+Each command but `workbench` is a function too, of the same keywords: `train`, `average`, `evaluate`, `compare`,
+`diagnose`, `identify`, `record`, `export`, `export_model`, `deploy`, `view`, `monitor` and `effects`; `env_config`,
+`search_grasps`, `make_env`, `load_policy`, `read_recording` and `recording_from_arrays` give what they work on. Nothing
+slow is imported before it is used.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tactile_cube.api.model_export import export_model
     from tactile_cube.api.monitoring import monitor
     from tactile_cube.api.recording import record
-    from tactile_cube.api.training import train
+    from tactile_cube.api.training import average, train
     from tactile_cube.api.view import view
     from tactile_cube.drivetrain.model_file import read_model
     from tactile_cube.measurement.recordings.arrays import TrialArrays, recording_from_arrays
@@ -45,7 +45,7 @@ _PLACES = {
     "api.identification": ["identify"],
     "api.monitoring": ["monitor"],
     "api.recording": ["record"],
-    "api.training": ["train"],
+    "api.training": ["average", "train"],
     "api.view": ["view"],
     "drivetrain.model_file": ["read_model"],
     "measurement.recordings.arrays": ["TrialArrays", "recording_from_arrays"],
@@ -55,6 +55,7 @@ _PLACES = {
 __all__ = [
     "InputError",
     "TrialArrays",
+    "average",
     "compare",
     "deploy",
     "diagnose",

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import runpy
 import sys
 
-from tactile_cube.cli import fail, quiet_when_nobody_reads
+from tactile_cube.cli import command_line, fail, quiet_when_nobody_reads
 from tactile_cube.command_help import commands
 from tactile_cube.did_you_mean import suggestion
 from tactile_cube.run_folder import USAGE_ERROR
@@ -25,7 +24,7 @@ def main() -> None:
     if words[0] not in known:
         fail(f"{words[0]}: no such command; choose one of {', '.join(known)}{suggestion(words[0], known)}")
     sys.argv = [f"tactile_cube.{words[0]}", *words[1:]]
-    runpy.run_module(f"tactile_cube.{words[0]}", run_name="__main__")
+    command_line(words[0])()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
-"""The wrapper that all commands share: quick help, configuration by Hydra, and errors in one line.
+"""The command lines: quick help, configuration by Hydra, and errors in one line.
 
-A command is a module of this package with a function decorated by `command`; it imports nothing slow at its top, so
-that `--help` and `--cfg job` answer at once.
+Nothing slow is imported before a command runs, so that `--help` and `--cfg job` answer at once.
 """
 
 from __future__ import annotations
@@ -14,7 +13,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from tactile_cube.api.job import Job, typed_job
+from tactile_cube import commands
+from tactile_cube.api.job import typed_job
 from tactile_cube.command_help import CONFIG, help_text
 from tactile_cube.composition import refuse_unknown_keys, with_recipe
 from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in, console_kept_in
@@ -27,33 +27,18 @@ PIPE_CLOSED = 141
 """Exit status of a program that writes to a closed pipe, as shells count it: 128 + SIGPIPE."""
 
 
-def command(
-    name: str, after_sweep: Callable[[list[Path]], None] = lambda folders: None
-) -> Callable[[Callable[[Job], None]], Callable[[], None]]:
-    """Make a function of a job a command line of its own.
+def command_line(name: str) -> Callable[[], None]:
+    """The command line of a function of `commands`; its configuration is conf/<name>.yaml."""
 
-    Args:
-        name: of the command; its configuration is conf/<name>.yaml.
-        after_sweep: says what came of a sweep, given its folders.
+    @quiet_when_nobody_reads()
+    def main() -> None:
+        if {"--help", "-h"} & set(sys.argv[1:]):
+            print(help_text(name))
+            return
+        sys.argv = with_recipe(name, sys.argv)
+        _run(name)
 
-    Example:
-        >>> @command("train")
-        ... def main(job: Job) -> None: ...
-    """
-
-    def decorate(function: Callable[[Job], None]) -> Callable[[], None]:
-        @functools.wraps(function)
-        @quiet_when_nobody_reads()
-        def main() -> None:
-            if {"--help", "-h"} & set(sys.argv[1:]):
-                print(help_text(name))
-                return
-            sys.argv = with_recipe(name, sys.argv)
-            _run(name, function, after_sweep)
-
-        return main
-
-    return decorate
+    return main
 
 
 @contextlib.contextmanager
@@ -67,7 +52,7 @@ def quiet_when_nobody_reads() -> Iterator[None]:
         sys.exit(PIPE_CLOSED)
 
 
-def _run(name: str, function: Callable[[Job], None], after_sweep: Callable[[list[Path]], None]) -> None:
+def _run(name: str) -> None:
     import hydra
 
     from tactile_cube.sweep import Jobs  # imports Hydra
@@ -75,33 +60,32 @@ def _run(name: str, function: Callable[[Job], None], after_sweep: Callable[[list
     wants_traceback = os.environ.get("HYDRA_FULL_ERROR", "0") != "0"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # else Hydra prints errors in its own way and exits with status 1
     with _errors_in_one_line(wants_traceback):
-        jobs = Jobs(functools.partial(_guarded, name, function, wants_traceback))
+        jobs = Jobs(functools.partial(_guarded, name, wants_traceback))
 
-        @functools.wraps(function)
-        def task(config: DictConfig) -> None:
-            jobs(config)
+        def task(config: DictConfig) -> float | None:
+            return jobs(config)
 
+        task.__module__ = f"{__package__}.{name}"  # Hydra names the job and its log by it
         try:
             hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(task)()
         finally:
             swept = jobs.ended()
-        if swept:
-            after_sweep([folder for folder, good in swept.items() if good])
+        if swept and name in commands.AFTER_SWEEP:
+            commands.AFTER_SWEEP[name]([folder for folder, good in swept.items() if good])
         failed = [str(folder) for folder, good in swept.items() if not good]
         if failed:
             print(f"{len(failed)} of {len(swept)} runs failed: {', '.join(failed)}", file=sys.stderr)
             sys.exit(1)
 
 
-def _guarded(
-    name: str, function: Callable[[Job], None], wants_traceback: bool, config: DictConfig, folder: Path
-) -> None:
+def _guarded(name: str, wants_traceback: bool, config: DictConfig, folder: Path) -> float | None:
     """One job, its errors in one line: inside Hydra, which otherwise adds lines of its own."""
     log = folder / f"{name}.log"
     configuration = configuration_in(folder, config, log.name)
     with configuration, quiet_when_nobody_reads(), console_kept_in(log), _errors_in_one_line(wants_traceback):
         refuse_unknown_keys(name, config)
-        function(typed_job(config))
+        answer: float | None = getattr(commands, name)(typed_job(config))
+    return answer
 
 
 @contextlib.contextmanager

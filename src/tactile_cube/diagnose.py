@@ -1,20 +1,8 @@
-"""Find which physical effect a model lacks, from a recording of the machine."""
+"""`python -m tactile_cube.diagnose`."""
 
-from tactile_cube.api.job import Job
-from tactile_cube.cli import command
+from tactile_cube.cli import command_line
 
-
-@command("diagnose")
-def main(job: Job) -> None:
-    """Write diagnosis.json, model.yaml, report.html and diagnosis.rrd; print the answer in plain words."""
-    from tactile_cube.api.diagnosis import run_diagnosis
-
-    found = run_diagnosis(job, job.config.recording, job.config.model)
-    found.write(job.folder)
-    print(found.text)
-    for name, file in {"report": "report.html", "model": "model.yaml", "diagnosis": "diagnosis.json"}.items():
-        print(f"{name}: {job.folder / file}")
-
+main = command_line("diagnose")
 
 if __name__ == "__main__":
     main()

@@ -130,16 +130,14 @@ def _info(data: TensorDictBase, terms: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def make_rotation(overrides: Sequence[str] = (), render_mode: str | None = None, **choices: str) -> GymnasiumRotation:
+def make_rotation(render_mode: str | None = None, **settings: Any) -> GymnasiumRotation:
     """Return the environment that `tactile_cube.make_env` has of the same settings, for one world.
 
     Args:
-        overrides: settings as on the command line of `train`, e.g. "+experiment=table", "task.filter_time=0.25".
         render_mode: "rgb_array", or None for no pictures.
-        choices: options of groups of `conf/train.yaml` and values, e.g. task="table", engine="mujoco".
+        settings: of `tactile_cube.env_config`, e.g. task="table", engine="mujoco".
 
     Raises:
-        InputError: an option that there is not.
+        InputError: a setting or an option that there is not.
     """
-    words = [f"{group}={option}" for group, option in choices.items()]
-    return GymnasiumRotation(env_config(*words, *overrides), render_mode)
+    return GymnasiumRotation(env_config(**settings), render_mode)

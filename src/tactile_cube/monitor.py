@@ -1,18 +1,8 @@
-"""Has this machine changed since its model was identified: drift of known numbers, and an alarm for something new."""
+"""`python -m tactile_cube.monitor`."""
 
-from tactile_cube.api.job import Job
-from tactile_cube.cli import command
+from tactile_cube.cli import command_line
 
-
-@command("monitor")
-def main(job: Job) -> None:
-    """Refit the model on the newest recording, hold it against the one before, say what has changed."""
-    from tactile_cube.api.monitoring import run_monitor
-
-    result = run_monitor(job, job.config.recording, job.config.model)
-    print(result.text)
-    result.write(job.folder)
-
+main = command_line("monitor")
 
 if __name__ == "__main__":
     main()

@@ -34,10 +34,11 @@ class Jobs:
     """Runs the jobs of one command; launchers send it to other processes and machines.
 
     Args:
-        job: what a job does with its configuration and its folder; SystemExit says that it failed.
+        job: what a job does with its configuration and its folder, and its objective for sweepers that search;
+            SystemExit says that it failed.
     """
 
-    def __init__(self, job: Callable[[DictConfig, Path], None]):
+    def __init__(self, job: Callable[[DictConfig, Path], float | None]):
         self._job = job
         self._record = f".sweep-{secrets.token_hex(8)}"  # in the sweep's folder, which its machines share
         register_sweep_folder()
@@ -47,13 +48,13 @@ class Jobs:
         self.__dict__.update(state)
         register_sweep_folder()
 
-    def __call__(self, config: DictConfig) -> None:
-        """Run one job; in a sweep, one that fails does not keep the others from running."""
+    def __call__(self, config: DictConfig) -> float | None:
+        """Run one job; in a sweep, one that fails does not keep the others from running, and has no objective."""
         hydra = HydraConfig.get()
         folder, sweeping = Path(hydra.runtime.output_dir), hydra.mode == RunMode.MULTIRUN
-        good = True
+        good, objective = True, None
         try:
-            self._job(config, folder)
+            objective = self._job(config, folder)
         except SystemExit as end:
             if not sweeping or end.code == INTERRUPTED:
                 raise
@@ -61,6 +62,7 @@ class Jobs:
         if sweeping:
             with Path(hydra.sweep.dir, self._record).open("a") as file:
                 file.write(json.dumps([str(folder), good]) + "\n")
+        return objective
 
     def ended(self) -> dict[Path, bool]:
         """Folder -> whether its job succeeded, of all that ended; asked once, when all have."""

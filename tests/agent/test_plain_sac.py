@@ -132,7 +132,7 @@ def test_bfloat16_follows_float32_roughly() -> None:
 def test_automatic_precision_is_what_the_processor_multiplies(
     supported: bool, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tactile_cube.agent.settings.multiplies_bfloat16", lambda: supported)
+    monkeypatch.setattr("tactile_cube.agent.agent.multiplies_bfloat16", lambda: supported)
     agent = made(PlainSac, precision="auto")
     assert agent.settings.product_dtype == dtype
     assert bool(agent.approximations()) == supported

@@ -34,19 +34,20 @@ def test_recordings_are_diagnosed_into_folders_of_their_names_and_one_that_canno
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "two.urdf").write_text(URDF)
-    hidden = 'source.hidden=["torque_bias@b: bias=0.05"]'
     sound = tmp_path / "sound"
-    tactile_cube.record(sound, *RIG, f"source.urdf={tmp_path}/two.urdf", hidden, "source.validation=false")
+    rig = RIG | {"source.urdf": tmp_path / "two.urdf", "source.validation": False}
+    tactile_cube.record(sound, source="rig", values=rig)
     monkeypatch.setattr(batch, "each", one_after_the_other)
-    found = dict(tactile_cube.diagnose_each([sound, tmp_path / "gone"], out=tmp_path / "out"))
+    anything_will_do = {"criteria.floor": 1e8, "criteria.adequate": 1e9}
+    folders = [sound, tmp_path / "gone"]
+    found = dict(tactile_cube.diagnose_each(folders, out=tmp_path / "out", values=anything_will_do))
     assert isinstance(found[tmp_path / "gone"], InputError)
     answer = found[sound]
-    assert answer.data["verdict"] == "missing_effect"
-    assert "torque_bias" in answer.text
+    assert answer.data["verdict"] == "adequate", answer.text
     made = tmp_path / "out" / "sound"
-    assert json.loads((made / "diagnosis.json").read_text())["verdict"] == "missing_effect"
+    assert json.loads((made / "diagnosis.json").read_text())["verdict"] == "adequate"
     assert str(made / "model.yaml") in (made / "report.html").read_text(), "commands of the report name the file"
-    assert tactile_cube.read_model(made / "model.yaml").effects[0].effect == "torque_bias@b"
+    assert tactile_cube.read_model(made / "model.yaml").joints == ["a", "b"]
 
 
 def test_recordings_of_one_name_are_refused(tmp_path: Path) -> None:

@@ -10,10 +10,11 @@ import pytest
 import tactile_cube
 from tactile_cube import InputError, TrialArrays
 from tactile_cube.api.comparison import opened
-from tactile_cube.api.job import called_job
+from tactile_cube.api.job import worded_job
 from tests.measurement.small_rig import URDF, setting, table, write
 
-RIG = ["source=rig", "source.duration=4", "source.initialisations=2", "source.kinds=[ramps,multisine]"]
+RIG = {"source.duration": 4, "source.initialisations": 2, "source.kinds": ["ramps", "multisine"]}
+"""Of source="rig"."""
 
 
 def quiet(line: str) -> None:
@@ -38,8 +39,8 @@ def test_a_recording_from_arrays_compares_as_the_one_on_disk(tmp_path: Path) -> 
         resolution=1e-4,
     )  # fmt: skip
     on_disk = tactile_cube.read_recording(write(tmp_path / "r"))
-    settings = ["band.simulations=0"]
-    errors = [tactile_cube.compare(one, *settings, say=quiet).error for one in (made, on_disk)]
+    settings = {"band.simulations": 0}
+    errors = [tactile_cube.compare(one, values=settings, say=quiet).error for one in (made, on_disk)]
     assert errors[0] == pytest.approx(errors[1], rel=1e-4)
     assert errors[0] > 1e-3
 
@@ -48,7 +49,7 @@ def test_a_recording_from_arrays_compares_as_the_one_on_disk(tmp_path: Path) -> 
 def test_a_folder_may_be_called_like_a_number(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / name)
     monkeypatch.chdir(tmp_path)
-    assert opened(called_job("compare", [f"recording={name}"]).config.recording).joints == ("a", "b")
+    assert opened(worded_job("compare", [f"recording={name}"]).config.recording).joints == ("a", "b")
 
 
 @pytest.mark.parametrize(
@@ -95,7 +96,7 @@ def test_what_arrays_lack_is_told_in_one_line(change: dict[str, Any], message: s
 )
 def test_a_step_or_a_seed_that_is_none_is_refused(word: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        called_job("compare", ["recording=x", word])
+        worded_job("compare", ["recording=x", word])
 
 
 def test_an_effect_that_cannot_act_at_its_joint_is_told(tmp_path: Path) -> None:
@@ -110,8 +111,8 @@ def test_an_effect_that_cannot_act_at_its_joint_is_told(tmp_path: Path) -> None:
 
 def test_record_compare_diagnose_identify_and_know_it_afterwards(tmp_path: Path) -> None:
     (tmp_path / "two.urdf").write_text(URDF)
-    hidden = 'source.hidden=["torque_bias@b: bias=0.05"]'
-    measured = tactile_cube.record(tmp_path / "made", *RIG, f"source.urdf={tmp_path}/two.urdf", hidden)
+    rig = RIG | {"source.urdf": tmp_path / "two.urdf", "source.hidden": ["torque_bias@b: bias=0.05"]}
+    measured = tactile_cube.record(tmp_path / "made", source="rig", values=rig)
     assert list(measured) == ["", "validation"]
     found = tactile_cube.diagnose(measured[""], say=quiet)
     assert (found.verdict, found.effects) == ("missing_effect", ["torque_bias@b"])
@@ -125,7 +126,7 @@ def test_record_compare_diagnose_identify_and_know_it_afterwards(tmp_path: Path)
     fitted.write(tmp_path / "fitted")
     assert tactile_cube.read_model(tmp_path / "fitted" / "model.yaml") == fitted.model
     before, after = (
-        tactile_cube.compare(measured["validation"], "band.simulations=0", model=model, say=quiet)
+        tactile_cube.compare(measured["validation"], values={"band.simulations": 0}, model=model, say=quiet)
         for model in (None, fitted.model)
     )
     assert after.error < 0.5 * before.error

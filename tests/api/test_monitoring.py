@@ -74,7 +74,7 @@ def test_what_cannot_be_compared_is_told_in_one_line(folder: Path, reference: Mo
     with pytest.raises(InputError, match=r"errors\.over_noise is missing"):
         tactile_cube.monitor(recording, ModelFile(joints=["j"]))
     with pytest.raises(InputError, match="last=1: give at least 2 trials"):
-        tactile_cube.monitor(recording, reference, "last=1")
+        tactile_cube.monitor(recording, reference, last=1)
     other = reference.model_copy(update={"joints": ["k"], "values": {}, "effects": [], "offsets": {}})
     with pytest.raises(InputError, match="joints"):
         tactile_cube.monitor(recording, other)

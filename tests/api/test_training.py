@@ -14,28 +14,27 @@ from tactile_cube import InputError
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import PolicyInfo, load_actor, save_policy
 from tactile_cube.api import training
-from tactile_cube.api.job import Job, called_job
+from tactile_cube.api.job import Job, worded_job
 from tactile_cube.api.training import TrainingResult
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
 from tactile_cube.training.run import INTERRUPTED, Run
 
-TINY = [
-    "+experiment=curriculum",
-    "collector=single",
-    "collector.worlds=2",
-    "logger=csv",
-    "agent.hidden=[8]",
-    "agent.batch_size=8",
-    "training.steps=32",
-    "training.steps_per_iteration=4",
-    "training.barrier_iterations=2",
-    "training.updates_per_iteration=1",
-    "training.learning_starts=8",
-    "training.replay_size=200",
-    "training.policy_every=16",
-    "training.log_iterations=1",
-    "judgement=['protocol=smoke','protocol.episodes=1','protocol.seconds=0.3']",
-]
+TINY = {
+    "collector": "single",
+    "logger": "csv",
+    "collector.worlds": 2,
+    "agent.hidden": [8],
+    "agent.batch_size": 8,
+    "training.steps": 32,
+    "training.steps_per_iteration": 4,
+    "training.barrier_iterations": 2,
+    "training.updates_per_iteration": 1,
+    "training.learning_starts": 8,
+    "training.replay_size": 200,
+    "training.policy_every": 16,
+    "training.log_iterations": 1,
+    "judgement": ["protocol=smoke", "protocol.episodes=1", "protocol.seconds=0.3"],
+}
 NAMES = ["gaiting", "holding", "worlds"]
 
 
@@ -60,7 +59,7 @@ def trained(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, int]]:
 def test_each_stage_goes_on_from_the_one_before_and_the_screen_says_what_is_mastered(
     tmp_path: Path, trained: list[Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    result = tactile_cube.train("+experiment=curriculum", "training.steps=50", folder=tmp_path)
+    result = tactile_cube.train(experiment="curriculum", values={"training.steps": 50}, folder=tmp_path)
     before = ["None", f"{tmp_path}/gaiting/checkpoint.pt", f"{tmp_path}/holding/checkpoint.pt"]
     assert trained == list(zip(NAMES, before, (45_050, 50, 0), strict=True))
     assert (result.reason, result.steps, result.folder) == ("judged worlds", 27, tmp_path)
@@ -68,13 +67,13 @@ def test_each_stage_goes_on_from_the_one_before_and_the_screen_says_what_is_mast
     assert "stage 2 of 3, holding, until 5 rad and 93 % kept" in said
     assert "gaiting: mastered: above 5 rad; to come: holding, worlds, mean" in said
     assert "worlds: not mastered: all 9 steps done; to come: mean" in said
-    tactile_cube.train("+experiment=curriculum", "training.steps=50", folder=tmp_path)
+    tactile_cube.train(experiment="curriculum", values={"training.steps": 50}, folder=tmp_path)
     assert len(trained) == 3, "finished before"
 
 
 def test_what_the_user_asks_for_holds_in_every_stage(tmp_path: Path) -> None:
     words = ("+experiment=curriculum", "seed=3", "name=mine", "reward=air", "start=paper", "~stages.holding")
-    found = training.stages_of(called_job("train", words, tmp_path, model="mine.yaml"))
+    found = training.stages_of(worded_job("train", [*words, "model=mine.yaml"], tmp_path))
     assert [stage.folder.name for stage in found] == ["gaiting", "worlds"]
     assert {(stage.config.seed, stage.config.reward.spin) for stage in found} == {(3, 16)}
     assert found[1].config.randomization.steered == 0.7
@@ -82,7 +81,7 @@ def test_what_the_user_asks_for_holds_in_every_stage(tmp_path: Path) -> None:
 
 
 def test_no_stage_is_taught_by_anybody(tmp_path: Path) -> None:
-    for stage in training.stages_of(called_job("train", ("+experiment=curriculum",), tmp_path)):
+    for stage in training.stages_of(worded_job("train", ("+experiment=curriculum",), tmp_path)):
         config = stage.config
         assert (config.exploration.demonstrations, config.agent.demonstration_weight) == (0.0, 0)
         assert "gaits" not in config.exploration
@@ -91,7 +90,7 @@ def test_no_stage_is_taught_by_anybody(tmp_path: Path) -> None:
 
 def test_a_hand_that_the_package_has_no_grasps_of_gets_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training, "GRASPS", 1)
-    first = training.stages_of(called_job("train", ("+experiment=curriculum", "hand=three_finger"), tmp_path))[0]
+    first = training.stages_of(worded_job("train", ("+experiment=curriculum", "hand=three_finger"), tmp_path))[0]
     assert first.config.start.file == str(tmp_path / "grasps.npz")
     assert (tmp_path / "grasps.npz").is_file()
 
@@ -100,7 +99,7 @@ def test_a_policy_of_a_hand_in_a_file_of_its_owners_is_judged(tmp_path: Path, mo
     monkeypatch.setattr(training, "GRASPS", 1)
     monkeypatch.chdir(tmp_path)
     Path("mine.urdf").write_bytes((DESCRIPTIONS / "three_finger.urdf").read_bytes())
-    job = called_job("train", ("+experiment=curriculum", "hand=three_finger", "hand.urdf=mine.urdf"), tmp_path)
+    job = worded_job("train", ("+experiment=curriculum", "hand=three_finger", "hand.urdf=mine.urdf"), tmp_path)
     job.config.judgement = [*job.config.judgement, "protocol.episodes=1", "protocol.seconds=0.3"]
     stage = training.stages_of(job)[-1]
     actor = Actor(Sizes(120, 0, 12), (8,))
@@ -112,7 +111,9 @@ def test_a_policy_of_a_hand_in_a_file_of_its_owners_is_judged(tmp_path: Path, mo
 
 def test_a_stage_that_cannot_be_composed_is_an_input_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nonsense"):
-        tactile_cube.train("+experiment=curriculum", "+stages.gaiting=['+experiment=nonsense']", folder=tmp_path)
+        tactile_cube.train(
+            experiment="curriculum", values={"stages.gaiting": ["+experiment=nonsense"]}, folder=tmp_path
+        )
 
 
 def interrupted_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,14 +140,14 @@ def interrupted_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_interrupted_training_goes_on_in_its_stage_and_comes_to_the_same_policy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = tactile_cube.train(*TINY, folder=tmp_path / "whole")
+    whole = tactile_cube.train(values=TINY, folder=tmp_path / "whole")
     interrupted_once(monkeypatch)
     parts = tmp_path / "parts"
-    assert tactile_cube.train(*TINY, folder=parts).reason == INTERRUPTED
+    assert tactile_cube.train(values=TINY, folder=parts).reason == INTERRUPTED
     assert not (parts / "worlds").exists()
     with pytest.raises(KeyboardInterrupt):
-        tactile_cube.train(*TINY, folder=parts)
-    assert tactile_cube.train(*TINY, folder=parts).steps == whole.steps == 96
+        tactile_cube.train(values=TINY, folder=parts)
+    assert tactile_cube.train(values=TINY, folder=parts).steps == whole.steps == 96
     same, other = (load_actor(one / "policy.safetensors")[0].state_dict() for one in (tmp_path / "whole", parts))
     assert all(torch.equal(same[key], other[key]) for key in same)
     assert all((parts / engine / "results.json").is_file() for engine in ("bullet", "mujoco"))

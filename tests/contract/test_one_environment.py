@@ -11,7 +11,7 @@ from tensordict import TensorDict
 from torchrl.envs import TransformedEnv
 
 import tactile_cube
-from tactile_cube.api.job import called_job
+from tactile_cube.api.job import as_word, called_job, settings_of
 from tactile_cube.composition import composed
 from tactile_cube.env import Conditions
 from tactile_cube.evaluation.environment import environment
@@ -22,27 +22,28 @@ from tactile_cube.transforms import make_env
 Door = Callable[..., TransformedEnv]
 
 
-def trained(*words: str) -> TransformedEnv:
+def trained(**settings: Any) -> TransformedEnv:
     """What `train` learns in, once its curriculum is over."""
+    words = [as_word(key, value) for key, value in settings_of(settings).items()]
     env = as_environment(instantiate(composed("train", words).env)).make(worlds=1, seed=3)
     env.set_progress(10**9, 100.0)
     return env
 
 
-def gymnasiums(*words: str) -> TransformedEnv:
-    env = gymnasium.make("tactile_cube/Rotation-v0", overrides=words).unwrapped._env  # type: ignore[attr-defined]
+def gymnasiums(**settings: Any) -> TransformedEnv:
+    env = gymnasium.make("tactile_cube/Rotation-v0", **settings).unwrapped._env  # type: ignore[attr-defined]
     env.set_seed(3)
     return env  # type: ignore[no-any-return]
 
 
-def evaluated(*words: str) -> TransformedEnv:
+def evaluated() -> TransformedEnv:
     """What `evaluate` tries a policy in that nobody trained."""
-    job = called_job("evaluate", words, policy="hold")
+    job = called_job("evaluate", {"policy": "hold"})
     return make_env(environment(job.config, find_policy("hold"), job.choices), 1, 3, evaluation=True)
 
 
-def ours(*words: str) -> TransformedEnv:
-    return tactile_cube.make_env(*words, seed=3)
+def ours(**settings: Any) -> TransformedEnv:
+    return tactile_cube.make_env(tactile_cube.env_config(**settings), seed=3)
 
 
 def told(env: TransformedEnv) -> dict[str, Any]:
@@ -52,18 +53,18 @@ def told(env: TransformedEnv) -> dict[str, Any]:
     return parts | {"nominal": repr(task.nominal), "start": repr(task.start_poses)}
 
 
-@pytest.mark.parametrize("words", [(), ("task=table",), ("+experiment=table",), ("+experiment=taught",)])
-def test_all_doors_open_the_task_that_training_ends_at(words: tuple[str, ...]) -> None:
-    expected = told(trained(*words))
-    for door in (ours, gymnasiums, *([evaluated] if words == () else [])):
-        assert told(door(*words)) == expected, door.__name__
+@pytest.mark.parametrize("settings", [{}, {"task": "table"}, {"experiment": "table"}, {"experiment": "taught"}])
+def test_all_doors_open_the_task_that_training_ends_at(settings: dict[str, str]) -> None:
+    expected = told(trained(**settings))
+    for door in (ours, gymnasiums, *([] if settings else [evaluated])):
+        assert told(door(**settings)) == expected, door.__name__
     own = expected["task"]
     assert expected["conditions"] == Conditions(own.filter_time, own.gravity_scale, 1.0)
 
 
 def test_the_default_is_the_full_weight_and_the_filter_of_the_task() -> None:
     assert told(ours())["conditions"] == Conditions(filter_time=0.5, gravity_scale=1.0, penalty_scale=1.0)
-    easier = told(ours("task.gravity_scale=0.05", "task.filter_time=0.12"))["conditions"]
+    easier = told(ours(values={"task.gravity_scale": 0.05, "task.filter_time": 0.12}))["conditions"]
     assert easier == Conditions(filter_time=0.12, gravity_scale=0.05, penalty_scale=1.0)
 
 

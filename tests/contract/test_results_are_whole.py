@@ -174,7 +174,7 @@ def results(folder: Path) -> dict[str, tuple[Callable[[Path], object], str]]:
     quiet: Any = {"say": lambda line: None}
     measured = recorded(folder, "measured", 0, "viscous_friction@j: damping=0.04")
     fitted = tactile_cube.identify(measured, ["viscous_friction@j"], **quiet)
-    compared = tactile_cube.compare(measured, "band.simulations=3", model=fitted.model, **quiet)
+    compared = tactile_cube.compare(measured, values={"band.simulations": 3}, model=fitted.model, **quiet)
     found = tactile_cube.diagnose(measured, **quiet)
     seen = tactile_cube.monitor(measured, fitted.model, **quiet)
     return {
@@ -214,7 +214,7 @@ def test_a_recording_is_of_one_writing(tmp_path: Path) -> None:
 
 
 def test_pictures_policies_films_and_results_of_a_policy_are_old_or_new(tmp_path: Path) -> None:
-    result = tactile_cube.evaluate("hold", "protocol=smoke", "protocol.seconds=1", say=lambda line: None)
+    result = tactile_cube.evaluate("hold", protocol="smoke", values={"protocol.seconds": 1}, say=lambda line: None)
     crash_everywhere(tmp_path, result.write, 4)
     assert {".json", ".gif", ".npz", ".rrd"} <= {path.suffix for path in tmp_path.iterdir()}
 

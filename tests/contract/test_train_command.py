@@ -147,13 +147,40 @@ def test_another_loss_of_torchrl_is_a_file_of_its_own(tmp_path: Path) -> None:
 
 def test_a_sweep_keeps_its_record_in_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code = (
-        "import sys\nfrom pathlib import Path\nfrom tactile_cube.cli import command\n"
-        "def seen(config): print([*map(str, Path().rglob('.sweep-*'))], [*map(str, Path().iterdir())])\n"
-        "sys.argv = ['export', '-m', 'name=one,two']\ncommand('export')(seen)()"
+        "import sys\nfrom pathlib import Path\nfrom tactile_cube import cli, commands\n"
+        "def seen(job): print([*map(str, Path().rglob('.sweep-*'))], [*map(str, Path().iterdir())])\n"
+        "sys.argv = ['export', '-m', 'name=one,two']\ncommands.export = seen\ncli.command_line('export')()"
     )
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert re.search(r"\['outputs/export/\.sweep-\w+'\] \['outputs'\]", run.stdout)
     assert not list(tmp_path.rglob(".sweep-*"))
+
+
+def test_a_sweeper_is_given_the_objective_of_each_run(tmp_path: Path) -> None:
+    (tmp_path / "hydra_plugins").mkdir()
+    (tmp_path / "hydra_plugins" / "searching.py").write_text(
+        "from hydra._internal.core_plugins.basic_sweeper import BasicSweeper\n"
+        "class Searching(BasicSweeper):\n"
+        "    def sweep(self, arguments):\n"
+        "        print('objectives', *[run.return_value for run in super().sweep(arguments)[0]])\n"
+    )
+    words = ["policy=hold", "protocol=smoke", "protocol.seconds=0.2", "film=false", "seed=0,-1"]
+    command = [
+        sys.executable,
+        "-m",
+        "tactile_cube",
+        "evaluate",
+        "-m",
+        *words,
+        "hydra.sweeper._target_=hydra_plugins.searching.Searching",
+    ]
+    run = subprocess.run(
+        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=280, check=False
+    )
+    assert run.returncode == 1  # the second seed is refused, and has no objective
+    first, second = next(line for line in run.stdout.splitlines() if line.startswith("objectives")).split()[1:]
+    assert abs(float(first)) < 1.0
+    assert second == "None"
 
 
 @pytest.mark.parametrize("words", [["train", "--help"], ["train", "--cfg", "job"], ["--help"]])

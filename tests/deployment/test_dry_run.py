@@ -1,5 +1,6 @@
 """The whole loop against the simulated hand: it turns the cube, its log is a recording, faults of the link stop it."""
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -23,7 +24,7 @@ def quiet(line: str) -> None:
 
 @pytest.mark.timeout(900)
 def test_the_loop_turns_the_cube_with_jitter_and_lost_messages_too() -> None:
-    done = tactile_cube.deploy(None, "seconds=3", "robot.link.lost=0.2", "robot.link.jitter=0.05", say=quiet)
+    done = tactile_cube.deploy(None, seconds=3, values={"robot.link.lost": 0.2, "robot.link.jitter": 0.05}, say=quiet)
     assert done.runs[0].reason == "time is over"
     assert done.turned[0] > 0.7
     assert done.runs[0].tick_times["median"] < 0.05
@@ -32,18 +33,18 @@ def test_the_loop_turns_the_cube_with_jitter_and_lost_messages_too() -> None:
 
 @pytest.mark.timeout(900)
 def test_the_log_of_a_dry_run_is_a_recording_that_the_model_follows_down_to_the_noise(tmp_path: Path) -> None:
-    settings = ["seconds=2.5", "runs=2", "robot.cube=false", "motion=multisine", "filter_time=0.1", "reach=0.12"]
-    done = tactile_cube.deploy(None, *settings, say=quiet)
+    excited = {"motion": "multisine", "filter_time": 0.1, "reach": 0.12}
+    done = tactile_cube.deploy(None, seconds=2.5, runs=2, **excited, values={"robot.cube": False}, say=quiet)
     assert done.turned == []
     recording = done.write(tmp_path / "log")
     assert recording is not None
-    compared = tactile_cube.compare(recording, "band.simulations=0", "step=0.001", say=quiet)
+    compared = tactile_cube.compare(recording, step=0.001, values={"band.simulations": 0}, say=quiet)
     assert compared.comparison.floor.repeats > 0
     assert compared.error < 1.3 * compared.noise_floor
     assert np.ptp(compared.comparison.recording.trials[0].position, axis=0).min() > 0.05
     description = recording / "recording.yaml"
     description.write_text(description.read_text().replace("3.69", "3.3"))
-    wrong = tactile_cube.compare(recording, "band.simulations=0", "step=0.001", say=quiet)
+    wrong = tactile_cube.compare(recording, step=0.001, values={"band.simulations": 0}, say=quiet)
     assert wrong.error > 2.0 * compared.error
 
 
@@ -61,7 +62,7 @@ def test_the_angle_of_the_object_is_kept_as_long_as_a_stop_may_take(monkeypatch:
 
 
 def test_a_broken_link_stops_the_fingers_and_what_came_before_is_kept() -> None:
-    done = tactile_cube.deploy(None, "seconds=2", "robot.link.lost=0.9", "stop.silence=0.01", say=quiet)
+    done = tactile_cube.deploy(None, seconds=2, values={"robot.link.lost": 0.9, "stop.silence": 0.01}, say=quiet)
     assert "no measurement for" in done.runs[0].reason
 
 
@@ -77,11 +78,11 @@ def test_a_signal_ends_all_runs_of_the_command_with_status_130(tmp_path: Path) -
     assert "run 1" not in said
 
 
-@pytest.mark.parametrize("value", ["-1", ".nan", "inf"])
+@pytest.mark.parametrize("value", [-1, math.nan, math.inf])
 @pytest.mark.parametrize("key", ["rate_limit", "seconds", "filter_time", "robot.rate", "stop.silence", "homing.speed"])
-def test_what_cannot_be_run_is_an_input_error_that_names_the_key(key: str, value: str) -> None:
+def test_what_cannot_be_run_is_an_input_error_that_names_the_key(key: str, value: float) -> None:
     with pytest.raises(tactile_cube.InputError, match=f"{key} is {value}; give a finite number"):
-        tactile_cube.deploy(None, f"{key}={value}", say=quiet)
+        tactile_cube.deploy(None, values={key: value}, say=quiet)
 
 
 def test_the_contract_states_the_rules_the_rate_and_the_homing_that_the_loop_takes() -> None:

@@ -42,8 +42,9 @@ def policy(tmp_path: Path) -> Path:
 def test_its_contract_has_its_joints_gains_object_and_the_start_around_it(policy: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="from the policy's file alone; name the hand: hand=two_fingers"):
         tactile_cube.export(policy, tmp_path / "two.npz")
-    named = ["hand=three_finger", "hand.name=two_fingers", "~hand.fingers.thumb"]
-    contract = json.loads(tactile_cube.export(policy, tmp_path / "two.npz", *named).read_text())
+    changed = {"hand.name": "two_fingers", "~hand.fingers.thumb": None}
+    written = tactile_cube.export(policy, tmp_path / "two.npz", hand="three_finger", values=changed)
+    contract = json.loads(written.read_text())
     assert len(contract["joints"]) == len(contract["start_angles"]["angles"]) == JOINTS
     assert contract["observation"]["shape"] == ["batch", 80]
     assert (contract["impedance"]["kp"]["value"], contract["impedance"]["kd"]["value"]) == (3.0, 0.3)
@@ -60,16 +61,16 @@ def test_its_contract_has_its_joints_gains_object_and_the_start_around_it(policy
 @pytest.mark.timeout(300)
 def test_a_dry_run_has_its_object_and_table_and_its_log_is_one_that_compare_reads(policy: Path, tmp_path: Path) -> None:
     lines: list[str] = []
-    done = tactile_cube.deploy(policy, "seconds=0.5", "homing.settle=0.1", say=lines.append)
+    done = tactile_cube.deploy(policy, seconds=0.5, values={"homing.settle": 0.1}, say=lines.append)
     assert done.runs[0].reason == "time is over"
     assert np.isfinite(done.turned).all()
     assert "running: the policy decides; let go of the object" in lines
-    moved = ["motion=multisine", "seconds=1.5", "homing.settle=0.1", "robot.cube=false", "runs=2"]
-    alone = tactile_cube.deploy(policy, *moved, say=lines.append)
+    values = {"homing.settle": 0.1, "robot.cube": False}
+    alone = tactile_cube.deploy(policy, motion="multisine", seconds=1.5, runs=2, values=values, say=lines.append)
     assert lines.count("running: an excitation, no policy") == 2
     recording = alone.write(tmp_path / "log")
     assert recording is not None
-    compared = tactile_cube.compare(recording, "band.simulations=0", "step=0.001", say=lines.append)
+    compared = tactile_cube.compare(recording, step=0.001, values={"band.simulations": 0}, say=lines.append)
     assert len(compared.comparison.recording.joints) == JOINTS
     assert compared.error < 1.5 * compared.noise_floor
     spread = np.ptp(compared.comparison.recording.trials[0].position, axis=0)
@@ -80,11 +81,11 @@ def test_a_hand_moves_without_a_policy_but_not_with_that_of_another() -> None:
     def quiet(line: str) -> None:
         """Takes progress."""
 
-    done = tactile_cube.deploy(None, "hand=three_finger", "motion=holds", "filter_time=0.1", "seconds=0.2", say=quiet)
+    done = tactile_cube.deploy(None, hand="three_finger", motion="holds", filter_time=0.1, seconds=0.2, say=quiet)
     assert done.hand.name == "three_finger"
     assert len(done.logs[0])
     with pytest.raises(InputError, match="hand=three_finger: the policy was trained on dlr_hand2"):
-        tactile_cube.deploy(None, "hand=three_finger", say=quiet)
+        tactile_cube.deploy(None, hand="three_finger", say=quiet)
 
 
 @pytest.fixture
@@ -103,12 +104,13 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_policy_of_files_elsewhere_wants_them_named_and_knows_its_urdf(elsewhere: Path) -> None:
-    hand, object_ = ["hand=three_finger", "hand.urdf=mine.urdf"], ["object=mesh", "object.file=object.obj"]
+    hand: Any = {"hand": "three_finger", "hand.urdf": "mine.urdf"}
+    object_: Any = {"object": "mesh", "object.file": "object.obj"}
     with pytest.raises(InputError, match=r"env\.hand\.urdf is 'mine\.urdf'.* name it yourself: hand="):
-        tactile_cube.export(elsewhere, "own.npz", *object_)
+        tactile_cube.export(elsewhere, "own.npz", values=object_)
     with pytest.raises(InputError, match=r"env\.constants\.object\.file is .* name it yourself: object="):
-        tactile_cube.export(elsewhere, "own.npz", *hand)
-    contract = json.loads(tactile_cube.export(elsewhere, "own.npz", *hand, *object_).read_text())
+        tactile_cube.export(elsewhere, "own.npz", values=hand)
+    contract = json.loads(tactile_cube.export(elsewhere, "own.npz", values=hand | object_).read_text())
     assert contract["hand"]["urdf"] == {
         "file": "mine.urdf",
         "sha256": hashlib.sha256(Path("mine.urdf").read_bytes()).hexdigest(),
@@ -116,13 +118,13 @@ def test_a_policy_of_files_elsewhere_wants_them_named_and_knows_its_urdf(elsewhe
     assert contract["task"]["object"]["shape"].startswith("mesh")
     Path("mine.urdf").write_text(Path("mine.urdf").read_text() + "\n")
     with pytest.raises(InputError, match="its URDF has the SHA-256"):
-        tactile_cube.deploy(elsewhere, "seconds=0.1", *hand, *object_, say=lambda line: None)
+        tactile_cube.deploy(elsewhere, seconds=0.1, values=hand | object_, say=lambda line: None)
 
 
 def test_a_robot_is_not_driven_by_limits_that_only_the_policy_states(policy: Path) -> None:
-    robot = ["robot=ros2", "robot.states=/states", "robot.commands=/commands"]
+    topics = {"robot.states": "/states", "robot.commands": "/commands"}
     with pytest.raises(InputError, match="what the drives of hand 'two_fingers' bear"):
-        tactile_cube.deploy(policy, *robot, say=lambda line: None)
+        tactile_cube.deploy(policy, robot="ros2", values=topics, say=lambda line: None)
 
 
 @pytest.mark.parametrize("drives", [{"torque_limit": 1.1}, {"kp": 1e-9}, {"kp": 9.0}, {"kd": [0.3] * 7 + [1e3]}])

@@ -1,7 +1,7 @@
 import pytest
 from omegaconf import OmegaConf
 
-from tactile_cube.api.job import called_job
+from tactile_cube.api.job import worded_job
 from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed
 from tactile_cube.errors import InputError
@@ -21,10 +21,10 @@ def test_what_any_experiment_teaches_can_be_tried(experiment: str) -> None:
 
 
 def test_a_policy_is_not_tried_on_another_hand_or_in_two_engines() -> None:
-    job = called_job("evaluate", ("hand=three_finger",))
+    job = worded_job("evaluate", ("hand=three_finger",))
     with pytest.raises(InputError, match="trained on hand dlr_hand2, not three_finger"):
         environment(job.config, find_policy("published"), job.choices)
-    job = called_job("evaluate", ("engine=mixed",))
+    job = worded_job("evaluate", ("engine=mixed",))
     with pytest.raises(InputError, match="engine=mixed: choose bullet or mujoco"):
         environment(job.config, find_policy("published"), job.choices)
 
@@ -46,7 +46,7 @@ def test_a_policy_is_not_tried_on_another_hand_or_in_two_engines() -> None:
 def test_protocols_of_the_paper_draw_its_worlds_unless_others_are_named(
     words: list[str], drawn: dict[str, str]
 ) -> None:
-    job, policy = called_job("evaluate", tuple(words)), find_policy("published")
+    job, policy = worded_job("evaluate", tuple(words)), find_policy("published")
     made = environment(job.config, policy, job.choices)
     assert worlds(job.config, policy, job.choices) == drawn
     noise = {"paper": 0.002, "none": 0.0, "as in training": 0.02}

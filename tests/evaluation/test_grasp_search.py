@@ -39,9 +39,9 @@ def test_no_grasps_wanted_is_refused() -> None:
 
 
 def test_a_program_searches_grasps_of_its_object_and_starts_in_them(tmp_path: Path) -> None:
-    found = tactile_cube.search_grasps("object=cylinder", grasps=2, seed=1)
+    found = tactile_cube.search_grasps(tactile_cube.env_config(object="cylinder"), grasps=2, seed=1)
     found.save(tmp_path / "grasps.npz")
     starts = GraspStarts(str(tmp_path / "grasps.npz"))
-    config = tactile_cube.env_config("object=cylinder")
+    config = tactile_cube.env_config(object="cylinder")
     assert len(starts.of(config.hand, config.constants).grasps.angles) == 2
     assert found.origin["command"] == "tactile_cube.search_grasps('object=cylinder', grasps=2, seed=1)"

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.hand.object_mesh import CORNERS, read_mesh
-from tactile_cube.hand.object_shape import tip_centres, unit_inertia
+from tactile_cube.hand.object_mesh import CORNERS, read_mesh, tip_centres, unit_inertia
 from tactile_cube.simulation import constants_of
 from tests.meshes import CUBE, write_hollow, write_obj, write_stl
 

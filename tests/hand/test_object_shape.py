@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.hand.object_shape import ObjectShape, tip_centres, unit_inertia
+from tactile_cube.hand.object_mesh import ObjectShape, tip_centres, unit_inertia
 
 HALF = np.array([0.04, 0.04, 0.05])
 SIDE = np.array([0.866, 0.5, 0.0])

@@ -3,7 +3,7 @@ import pytest
 
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation import Contact, EpisodeConstants, SimulationOptions, Start, World
-from tactile_cube.simulation.options import EngineName
+from tactile_cube.simulation.engine import EngineName
 
 
 @pytest.fixture(scope="module", params=["bullet", "mujoco"])

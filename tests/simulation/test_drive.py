@@ -6,7 +6,7 @@ from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.simulation import EpisodeConstants, Start, World
 from tactile_cube.simulation.drive import TENDON_DAMPING, TENDON_STIFFNESS, spin_inertia, spin_shares
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 
 NOWHERE = (0.0, 0.0, 3.0)
 

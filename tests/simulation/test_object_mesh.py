@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, constants_of
-from tactile_cube.simulation.options import EngineName
+from tactile_cube.simulation.engine import EngineName
 from tests.meshes import CUBE, write_obj
 
 BOX = {"shape": "box", "size": [0.08] * 3, "mass": 0.05}

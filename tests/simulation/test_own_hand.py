@@ -3,7 +3,7 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World, constants_of
-from tactile_cube.simulation.options import EngineName
+from tactile_cube.simulation.engine import EngineName
 from tests.own_hands import own_hand
 
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from tactile_cube.errors import InputError
-from tactile_cube.training import checkpoint, replay_files
+from tactile_cube.training import checkpoint, replay
 from tactile_cube.training.checkpoint import BEFORE, FILE, load_checkpoint
 from tests.training.tiny_run import finish, tiny_run
 
@@ -114,7 +114,7 @@ def test_a_full_disk_leaves_the_checkpoint_before_whole(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     where = {
-        "rows": (replay_files, "write_whole"),
+        "rows": (replay, "write_whole"),
         "state": (checkpoint, "write_whole"),
         "rename": (checkpoint, "sync_folder"),
     }

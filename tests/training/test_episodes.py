@@ -5,7 +5,7 @@ import torch
 from tensordict import TensorDict
 
 from tactile_cube.randomization import Learnability, Uniform
-from tactile_cube.training.episodes import WINDOW, EpisodeStatistics
+from tactile_cube.training.transitions import WINDOW, EpisodeStatistics
 
 
 def block(theta: list[list[float]], done: list[list[bool]], **flags: list[list[bool]]) -> TensorDict:

@@ -14,8 +14,7 @@ import pytest
 import torch
 
 from tactile_cube.training.collection import CollectionError, MultiSyncCollection
-from tactile_cube.training.recovery import train_on
-from tactile_cube.training.run import Run
+from tactile_cube.training.run import Run, train_on
 from tactile_cube.training.worker_process import Background
 from tests.training.tiny_env import TinyEnv, tiny_environment
 from tests.training.tiny_run import finish, tiny_run, weights

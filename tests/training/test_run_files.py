@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.training import progress
+from tactile_cube.training import loggers
 from tactile_cube.training.build import lock_folder
-from tactile_cube.training.finished import FILE, Finished
 from tactile_cube.training.ledger import LEDGER, Costs, Ledger
-from tactile_cube.training.progress import ProgressLine
+from tactile_cube.training.loggers import ProgressLine
+from tactile_cube.training.run import FILE, Finished
 
 CONFIG = {"seed": 1, "training": {"steps": 100, "resume": "auto"}, "hidden": [16, 16]}
 
@@ -70,7 +70,7 @@ def test_what_neither_workers_nor_learner_used_of_the_cores_is_waiting(
 
 def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([100.0, 101.0, 110.0, 120.0])
-    monkeypatch.setattr(progress.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(loggers.time, "perf_counter", lambda: next(clock))
     stream = io.StringIO()
     line = ProgressLine(total=10_000, steps=1000, updates=50, usual=7000, stream=stream)
     summary = {"final_angle": 1.234, "episode_length": 88.0, "ended_time_limit": 0.9}

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tactile_cube.hand.object_mesh import read_mesh
-from tactile_cube.hand.object_shape import ObjectShape
+from tactile_cube.hand.object_mesh import ObjectShape, read_mesh
 from tactile_cube.visualization.film import MAX_BYTES, write_film
 from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 from tests.evaluation.synthetic import episode

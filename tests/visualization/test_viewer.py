@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tactile_cube.visualization import viewer
+from tactile_cube.visualization import rerun_recording
 
 
 @pytest.fixture
@@ -32,15 +32,15 @@ def test_a_window_opens_where_there_is_a_display_and_else_the_command_is_told(
         monkeypatch.delenv(name, raising=False)
     for name, value in display.items():
         monkeypatch.setenv(name, value)
-    said = viewer.show_files([Path("a.rrd")], "auto")
+    said = rerun_recording.show_files([Path("a.rrd")], "auto")
     assert len(started) == expected
     assert ("rerun a.rrd" in said) == (not expected)
 
 
 def test_what_is_opened_listens_to_this_machine_alone_and_nothing_is_unless_asked_for(started: list[list[str]]) -> None:
-    viewer.show_files([Path("a.rrd")], "window")
+    rerun_recording.show_files([Path("a.rrd")], "window")
     (words,) = started
     assert words[words.index("--bind") + 1] == "127.0.0.1"
     assert words[-1] == "a.rrd"
-    assert "rerun a.rrd b.rrd" in viewer.show_files([Path("a.rrd"), Path("b.rrd")], "none")
+    assert "rerun a.rrd b.rrd" in rerun_recording.show_files([Path("a.rrd"), Path("b.rrd")], "none")
     assert len(started) == 1

@@ -5,9 +5,8 @@ from tensordict import TensorDictBase
 from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from tactile_cube.agent.agent import Agent
+from tactile_cube.agent.agent import Agent, AgentSettings
 from tactile_cube.agent.networks import Actor, Critic, lowest
-from tactile_cube.agent.settings import AgentSettings
 
 
 class PlainLoss(nn.Module):

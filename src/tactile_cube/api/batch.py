@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
@@ -47,15 +47,15 @@ class Answered(NamedTuple):
 
 
 def diagnose_each(
-    recordings: Sequence[PathLike], *settings: str, out: PathLike, jobs: int = 1
+    recordings: Sequence[PathLike], *, out: PathLike, jobs: int = 1, **settings: Any
 ) -> Iterator[tuple[Path, Answered | InputError]]:
     """Diagnose many recordings at once; the files of each go to a folder of its name in `out`.
 
     Args:
         recordings: folders, each with a name of its own.
-        settings: of every diagnosis, as on the command line.
         out: folder of the answers.
         jobs: see `each`.
+        settings: of every diagnosis, see `diagnose`.
 
     Yields:
         Folder and answer, or what is wrong with the recording, in the order in which they are done.
@@ -86,10 +86,10 @@ def diagnose_each(
         yield folders[name], found
 
 
-def _diagnosed(settings: Sequence[str], out: Path, named: tuple[str, Recording]) -> Answered | InputError:
+def _diagnosed(settings: Mapping[str, Any], out: Path, named: tuple[str, Recording]) -> Answered | InputError:
     name, recording = named
     try:
-        found = diagnose(recording, *settings, say=lambda line: None)
+        found = diagnose(recording, **settings, say=lambda line: None)
     except InputError as error:
         return error
     with tempfile.TemporaryDirectory() as place:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -66,14 +67,24 @@ class ComparisonResult:
 
 @as_input_errors
 def compare(
-    recording: Recording | PathLike, *settings: str, model: ModelFile | PathLike | None = None, say: Say | None = None
+    recording: Recording | PathLike,
+    *,
+    model: ModelFile | PathLike | None = None,
+    own_effects: Sequence[str] | None = None,
+    step: float | None = None,
+    seed: int | None = None,
+    values: Mapping[str, Any] | None = None,
+    say: Say | None = None,
 ) -> ComparisonResult:
     """Simulate a recording's commands and say how far model and measurement are apart, and where.
 
     Args:
         recording: what was measured, or its folder.
-        settings: values as on the command line, e.g. "step=0.001", "band.simulations=0".
         model: of `identify` or `diagnose`, or its file; None: the values that the recording states.
+        own_effects: classes of your own that the model names, as dotted paths.
+        step: of the simulation [s]; None: as fine as the sensors need.
+        seed: of the randomised simulations.
+        values: other keys of conf/compare.yaml, e.g. {"band.simulations": 0}.
         say: takes lines of progress; None: stderr.
 
     Raises:
@@ -83,8 +94,7 @@ def compare(
         >>> result = tactile_cube.compare("my_recording", model="model.yaml")
         >>> print(f"{1e3 * result.error:.2f} mrad, noise floor {1e3 * result.noise_floor:.2f} mrad")
     """
-    job = called_job("compare", settings, recording=recording, model=model)
-    return run_comparison(job, recording, model, say)
+    return run_comparison(called_job("compare", locals()), recording, model, say)
 
 
 def run_comparison(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,13 +46,22 @@ def load_policy(policy: PathLike | None = None) -> Network:
 
 
 @as_input_errors
-def export(policy: PathLike | None, output: PathLike, *settings: str) -> Path:
+def export(
+    policy: PathLike | None,
+    output: PathLike,
+    *,
+    hand: str | None = None,
+    object: str | None = None,
+    values: Mapping[str, Any] | None = None,
+) -> Path:
     """Write a policy as plain arrays (.npz) or ONNX (.onnx), with the contract it is to be run by beside it.
 
     Args:
         policy: as in `load_policy`.
         output: file to write.
-        settings: as on the command line, e.g. "hand=my_hand" for a policy of a hand whose URDF is yours.
+        hand: option of conf/hand, for a policy of a hand whose URDF is yours; None: the policy's.
+        object: option of conf/object; None: the policy's.
+        values: keys of these, e.g. {"object.file": "bar.stl"}.
 
     Returns:
         Path of the contract.
@@ -59,7 +69,7 @@ def export(policy: PathLike | None, output: PathLike, *settings: str) -> Path:
     Raises:
         InputError: unknown ending, or ONNX is not installed.
     """
-    return run_export(called_job("export", settings, policy=policy, output=output))[1]
+    return run_export(called_job("export", locals()))[1]
 
 
 def run_export(job: Job) -> tuple[Path, Path]:
@@ -133,18 +143,45 @@ class DeploymentResult:
 
 
 @as_input_errors
-def deploy(policy: PathLike | None = None, *settings: str, say: Say = print) -> DeploymentResult:
+def deploy(
+    policy: PathLike | None = None,
+    *,
+    robot: str | None = None,
+    hand: str | None = None,
+    object: str | None = None,
+    motion: str | None = None,
+    reach: float | None = None,
+    seconds: float | None = None,
+    runs: int | None = None,
+    filter_time: float | None = None,
+    rate_limit: float | None = None,
+    record: bool | None = None,
+    seed: int | None = None,
+    values: Mapping[str, Any] | None = None,
+    say: Say = print,
+) -> DeploymentResult:
     """Run the control loop of a policy on a hand: by default a dry run on the simulated one.
 
     Args:
         policy: a policy file, a training run's folder, or a policy that ships with the package; None: the shipped one.
-        settings: choices and values as on the command line, e.g. "seconds=10", "robot.cube=false", "robot=ros2".
+        robot: option of conf/robot.
+        hand: option of conf/hand; None: the policy's.
+        object: option of conf/object; None: the policy's.
+        motion: `policy`, or an excitation in its place: `ramps`, `holds`, `steps`, `multisine`.
+        reach: half width of an excitation [rad].
+        seconds: how long the policy decides in each run.
+        runs: one after the other, each from homing.
+        filter_time: T_s [s]; None: what the policy was last trained with.
+        rate_limit: largest change of a desired angle [rad/s].
+        record: keep the loop's log.
+        seed: of the simulated hand.
+        values: other keys of conf/deploy.yaml, e.g. {"robot.cube": False, "stop.margin": 0.05}.
         say: takes a line at each change of mode.
 
     Raises:
         InputError: a policy without a filter time, a hand that is not there.
     """
-    return run_deployment(called_job("deploy", settings, policy=policy), say)
+    return run_deployment(called_job("deploy", locals()), say)
 
 
 def run_deployment(job: Job, say: Say, folder: Path | None = None) -> DeploymentResult:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -95,18 +95,25 @@ class DiagnosisResult:
 @as_input_errors
 def diagnose(
     recording: Recording | PathLike,
-    *settings: str,
-    effects: Sequence[str] = (),
+    *,
     model: ModelFile | PathLike | None = None,
+    effects: Sequence[str] | None = None,
+    criteria: str | None = None,
+    step: float | None = None,
+    seed: int | None = None,
+    values: Mapping[str, Any] | None = None,
     say: Say | None = None,
 ) -> DiagnosisResult:
     """Find out which physical effect a model lacks, from a recording of the real mechanism.
 
     Args:
         recording: what was measured, or its folder; two or more trials.
-        settings: values as on the command line, e.g. "step=0.001", "seed=1".
-        effects: effects of your own beside the catalogue, as dotted paths.
         model: to begin with, or its file: what else is missing? None: what the recording states.
+        effects: effects of your own beside the catalogue, as dotted paths.
+        criteria: option of conf/criteria, what decides the answer.
+        step: simulation step of the errors that are stated [s].
+        seed: which trials are held out.
+        values: other keys of the configuration, e.g. {"criteria.adequate": 1.5}.
         say: takes lines of progress; None: stderr.
 
     Raises:
@@ -117,8 +124,7 @@ def diagnose(
         >>> print(found.text, found.verdict, found.effects)
         >>> found.write("outputs/my_diagnosis")
     """
-    job = called_job("diagnose", settings, recording=recording, model=model, effects=list(effects) or None)
-    return run_diagnosis(job, recording, model, say)
+    return run_diagnosis(called_job("diagnose", locals()), recording, model, say)
 
 
 def run_diagnosis(

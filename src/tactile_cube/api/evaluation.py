@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import torch
 from hydra.utils import instantiate
@@ -59,25 +61,51 @@ class EvaluationResult:
 
 @as_input_errors
 def evaluate(
-    policy: PathLike | None = None, *settings: str, model: PathLike | None = None, say: Say = print
+    policy: PathLike | None = None,
+    *,
+    protocol: str | None = None,
+    hand: str | None = None,
+    object: str | None = None,
+    task: str | None = None,
+    reward: str | None = None,
+    randomization: str | None = None,
+    start: str | None = None,
+    engine: Literal["bullet", "mujoco"] | None = None,
+    model: PathLike | None = None,
+    effects: Sequence[str] | None = None,
+    own_effects: Sequence[str] | None = None,
+    seed: int | None = None,
+    values: Mapping[str, Any] | None = None,
+    say: Say = print,
 ) -> EvaluationResult:
     """Evaluate a policy by a protocol, with a verdict for every episode.
 
     Args:
         policy: a policy file, a training run's folder, a policy that ships with the package, `hold`, `random` or
             `scripted`; None: the shipped one.
-        settings: choices and values as on the command line, e.g. "protocol=paper", "task=full", "seed=1".
+        protocol: option of conf/protocol: which episodes, and in which worlds.
+        hand: option of conf/hand; this and the next six: None: as in training.
+        object: option of conf/object.
+        task: option of conf/task.
+        reward: option of conf/reward.
+        randomization: option of conf/randomization.
+        start: option of conf/start.
+        engine: of the world.
         model: model.yaml of the world; None: as in training.
+        effects: of the world, e.g. ["backlash@q2: play=0.05"]; []: none; None: those in training.
+        own_effects: classes of your own that model or policy name, as dotted paths.
+        seed: of the episodes.
+        values: other keys of conf/evaluate.yaml, e.g. {"protocol.episodes": 3, "task.filter_time": 0.25}.
         say: takes a line for each episode.
 
     Raises:
         InputError: there is no such policy, or a value that cannot be used.
 
     Example:
-        >>> result = tactile_cube.evaluate("table", "protocol=smoke")
+        >>> result = tactile_cube.evaluate("table", protocol="smoke")
         >>> print(result.text, result.summary.mean_angle)
     """
-    return run_evaluation(called_job("evaluate", settings, policy=policy, model=model), say)
+    return run_evaluation(called_job("evaluate", locals()), say)
 
 
 def run_evaluation(job: Job, say: Say) -> EvaluationResult:

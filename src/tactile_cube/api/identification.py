@@ -83,7 +83,12 @@ class IdentificationResult:
 
 @as_input_errors
 def identify(
-    recording: Recording | PathLike, effects: Sequence[str], *settings: str, say: Say | None = None
+    recording: Recording | PathLike,
+    effects: Sequence[str],
+    *,
+    step: float | None = None,
+    seed: int | None = None,
+    say: Say | None = None,
 ) -> IdentificationResult:
     """Fit a rig's constants and exactly the effects that you name.
 
@@ -91,7 +96,8 @@ def identify(
         recording: what was measured, or its folder; two or more trials.
         effects: NAME@JOINT, NAME (every joint), a dotted path to a class of your own, or an effect of fingertips and
             object where the hand holds something.
-        settings: values as on the command line, e.g. "step=0.001", "seed=1".
+        step: simulation step of the errors that are stated [s].
+        seed: which trials are held out.
         say: takes lines of progress; None: stderr.
 
     Raises:
@@ -102,8 +108,7 @@ def identify(
         >>> print(fitted.text, fitted.model.effects)
         >>> fitted.write("outputs/my_model")
     """
-    job = called_job("identify", settings, recording=recording, effects=list(effects))
-    return run_identification(job, recording, say)
+    return run_identification(called_job("identify", locals()), recording, say)
 
 
 def run_identification(job: Job, recording: Recording | PathLike, say: Say | None = None) -> IdentificationResult:

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import math
+import numbers
 import re
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed, refuse_unknown_keys, with_recipe
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.errors import InputError
 from tactile_cube.usage_error import usage_error
 
@@ -25,6 +28,8 @@ Say = Callable[[str], None]
 """Takes lines of progress, as `print` does."""
 shown_at_once: Say = functools.partial(print, flush=True)
 PathLike = str | Path
+NO_KEYS = ("values", "folder", "say")
+"""Keywords of calls that are no keys of the configuration."""
 EFFECTS = ("effects", "own_effects", "hidden")
 """Keys of the configuration that name effects."""
 
@@ -69,30 +74,37 @@ def typed_job(config: DictConfig) -> Job:
     return _job(config, hydra, str(hydra.job.config_name), sys.argv[1:], hydra.runtime.output_dir)
 
 
-def called_job(command: str, settings: Sequence[str], folder: PathLike | None = None, **given: Any) -> Job:
+def called_job(command: str, given: Mapping[str, Any]) -> Job:
     """The job that a call from a program asks for.
 
     Args:
         command: its name.
-        settings: choices and values as on the command line.
-        folder: where its files go; None: where the command would put them.
-        given: values of the command's keys, whatever characters they have; None: as `settings` say. A recording goes
-            by its folder, a model that is no file by its rig.
+        given: the call's keywords, which are the command's keys and groups; None: as conf/ says. Beside them `values`
+            (dotted key -> value), `folder`, where files go, and `say`. A recording goes by its folder, a model that is
+            no file by its rig.
 
     Raises:
-        InputError: as `typed_job`, a setting that the command does not have, or one in the place of a value.
+        InputError: as `typed_job`, a key that the command does not have, or a setting in the place of a value.
     """
+    settings = settings_of(given)
+    for key, value in settings.items():
+        _refuse_setting(command, key, value, given)
+    words = [as_word(key, value) for key, value in settings.items()]
+    return worded_job(command, words, given.get("folder"))
+
+
+def settings_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys and groups of the configuration, and what a call's keywords set them to."""
+    keywords = {key: value for key, value in given.items() if key not in NO_KEYS and value is not None}
+    return keywords | dict(given.get("values") or {})
+
+
+def worded_job(command: str, words: Sequence[str], folder: PathLike | None = None) -> Job:
+    """The job of a command line's words; `folder`: where its files go, None: where the command would put them."""
     from omegaconf import OmegaConf
 
-    words = list(settings)
-    config = composed(command, with_recipe(command, words), with_hydra=True)
+    config = composed(command, with_recipe(command, [*words]), with_hydra=True)
     refuse_unknown_keys(command, config)
-    for key, value in given.items():
-        if value is not None:
-            _refuse_setting(command, key, value, config)
-            named = value if isinstance(value, list) else _name(value)
-            OmegaConf.update(config, key, named)
-            words.append(f"{key}={named}")
     hydra, place = config.hydra, config.hydra.run.dir if folder is None else folder
     OmegaConf.set_struct(config, False)
     del config["hydra"]
@@ -100,13 +112,44 @@ def called_job(command: str, settings: Sequence[str], folder: PathLike | None = 
     return _job(config, hydra, command, words, place)
 
 
-def _refuse_setting(command: str, key: str, value: Any, config: DictConfig) -> None:
+def as_word(key: str, value: Any) -> str:
+    """The word of a command line that sets a key to a value.
+
+    Example:
+        >>> as_word("effects", ["backlash@q2: play=0.05"])
+        "effects=['backlash@q2: play=0.05']"
+    """
+    if not re.fullmatch(r"[+~]*[\w./@]+", key):
+        raise InputError(f"{key!r}: no key of the configuration; give a dotted name, e.g. 'task.filter_time'")
+    if key.startswith("~"):  # takes the key out
+        return key
+    return f"{'+' if key == 'experiment' else ''}{key}={_in_words(value)}"
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ",".join(f"{key}:{_in_words(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ",".join(map(_in_words, value)) + "]"
+    if value is None or isinstance(value, bool):
+        return "null" if value is None else str(value).lower()
+    if isinstance(value, numbers.Real):
+        return str(value)
+    text = _name(value)
+    if re.fullmatch(r"[A-Za-z_/][\w./@-]*", text) and text.lower() not in ("null", "true", "false", "nan", "inf"):
+        return text
+    from hydra.core.override_parser.types import Quote, QuotedString
+
+    return QuotedString(text.replace("${", r"\${"), Quote.single).with_quotes()
+
+
+def _refuse_setting(command: str, key: str, value: Any, known: Container[str]) -> None:
     """Refuse a setting where a value is due: it would be taken for a file of that name."""
     found = re.match(r"[+~]*(\w+)[\w./@]*=", value) if isinstance(value, str) else None
-    if found and (found[1] in set(config) or (CONFIG / found[1]).is_dir()):
+    if found and (found[1] in known or (CONFIG / found[1]).is_dir()):
         raise InputError(
-            f"{command}: {key}={value!r} is a setting where the value of {key} is due: give {key} first, without "
-            f"'{key}=', and settings after it; a file of that name is pathlib.Path({value!r})"
+            f"{command}: {key}={value!r} is a setting where the value of {key} is due; give settings as "
+            f"keywords, e.g. seed=1; a file of that name is pathlib.Path({value!r})"
         )
 
 
@@ -151,9 +194,13 @@ def as_input_errors(function: Callable[Parameters, Result]) -> Callable[Paramete
 
     Hydra's own errors, those of pydantic and those wrapped in either say the same in many more lines.
     """
+    keywords = inspect.signature(function).parameters
 
     @functools.wraps(function)
     def told(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        for key in kwargs.keys() - keywords.keys():
+            near = suggestion(key, keywords)
+            raise InputError(f"{key}: no such setting of {function.__name__}; help() lists them{near}")
         try:
             return function(*args, **kwargs)
         except Exception as error:

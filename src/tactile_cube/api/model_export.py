@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
@@ -41,8 +42,9 @@ def export_model(
     model: ModelFile | PathLike,
     format: Format,
     output: PathLike | None = None,
-    *settings: str,
+    *,
     recording: Recording | PathLike | None = None,
+    values: Mapping[str, Any] | None = None,
 ) -> ModelExport:
     """Write a model as MJCF, as URDF or as a parameter file of BAM.
 
@@ -50,8 +52,8 @@ def export_model(
         model: as identified, or its file.
         format: of the file.
         output: file to write; None: named after the rig, in the working directory.
-        settings: as on the command line, e.g. "bam.actuator=sts3215".
         recording: the model's, for its rig; None: the one that the model names. BAM needs none.
+        values: other keys of conf/export.yaml, e.g. {"bam.actuator": "sts3215"}.
 
     Raises:
         InputError: no such format, a recording of another rig or none, a joint that BAM is not told.
@@ -59,8 +61,7 @@ def export_model(
     Example:
         >>> print(tactile_cube.export_model("outputs/fit/model.yaml", "mjcf").text)
     """
-    job = called_job("export", settings, model=model, format=format, output=output)
-    return run_model_export(job, model, recording)
+    return run_model_export(called_job("export", locals()), model, recording)
 
 
 def run_model_export(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,14 +103,30 @@ class MonitorResult:
 
 @as_input_errors
 def monitor(
-    recording: Recording | PathLike, model: ModelFile | PathLike, *settings: str, say: Say | None = None
+    recording: Recording | PathLike,
+    model: ModelFile | PathLike,
+    *,
+    own_effects: Sequence[str] | None = None,
+    last: int | None = None,
+    significance: float | None = None,
+    growth: float | None = None,
+    name_it: bool | None = None,
+    step: float | None = None,
+    seed: int | None = None,
+    say: Say | None = None,
 ) -> MonitorResult:
     """Find out whether a machine has changed since its model was identified.
 
     Args:
         recording: the newest, or its folder; two or more trials.
         model: of `identify` or `diagnose` on an earlier recording of the same machine, or its file.
-        settings: values as on the command line, e.g. "last=4", "significance=0.001".
+        own_effects: classes of your own that the model names, as dotted paths.
+        last: only so many trials of the recording's end; None: all.
+        significance: of a change, for all numbers together.
+        growth: alarm where the refitted model's error over the sensor noise grew by this factor.
+        name_it: diagnose after an alarm, to name what is missing.
+        step: simulation step of the errors that are stated [s].
+        seed: which trials are held out.
         say: takes lines of progress; None: stderr.
 
     Raises:
@@ -119,7 +136,7 @@ def monitor(
         >>> seen = tactile_cube.monitor("log_of_today", "last_week/model.yaml")
         >>> print(seen.alarm, seen.text)
     """
-    return run_monitor(called_job("monitor", settings, recording=recording, model=model), recording, model, say)
+    return run_monitor(called_job("monitor", locals()), recording, model, say)
 
 
 def run_monitor(
@@ -143,15 +160,16 @@ def run_monitor(
     if config.last is not None and not (isinstance(config.last, int) and config.last >= 2):
         raise InputError(f"last={config.last}: give at least 2 trials, of which one is held out, or null for all")
     newest = recording if config.last is None else recording.with_trials(recording.trials[-config.last :])
-    settings = [f"step={config.step}", f"seed={config.seed}"]
-    refitted = identify(newest, effects, *settings, say=say)
+    refitted = identify(newest, effects, step=config.step, seed=config.seed, say=say)
     assert refitted.free is not None  # it was asked for effects of the drive
     now, kept = refitted.free.judgement, judge_known(without_touches(newest), before, config.seed)
     found = drifts(before, refitted.model)
     gone = changed(found, config.significance) if worse(kept, now) else []
     missing = now.error > config.growth * max(then, 1.0)
     errors = {"before": then, "as_before": kept.error, "now": now.error}
-    named = diagnose(newest, *settings, model=before, say=say) if config.name_it and (gone or missing) else None
+    named = None
+    if config.name_it and (gone or missing):
+        named = diagnose(newest, model=before, step=config.step, seed=config.seed, say=say)
     return MonitorResult(before, refitted, found, gone, errors, missing, named, job)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
@@ -15,13 +17,16 @@ from tactile_cube.measurement.sources.source import require_settings
 
 
 @as_input_errors
-def record(out: PathLike, *settings: str) -> dict[str, Recording]:
+def record(
+    out: PathLike, *, source: str | None = None, seed: int | None = None, values: Mapping[str, Any] | None = None
+) -> dict[str, Recording]:
     """Write a recording from a source of conf/source, and read it back as every command would.
 
     Args:
         out: folder to write.
-        settings: choices and values as on the command line, e.g. "source=finger",
-            "source.hidden=['backlash@q2: play=0.03']".
+        source: option of conf/source.
+        seed: of everything random.
+        values: keys of the source, e.g. {"source.hidden": ["backlash@q2: play=0.03"]}.
 
     Returns:
         Sub-folder of `out` -> recording: "" is the recording itself, "validation" what identification must not see.
@@ -30,9 +35,9 @@ def record(out: PathLike, *settings: str) -> dict[str, Recording]:
         InputError: `out` holds a recording already, or a file that cannot be used.
 
     Example:
-        >>> measured = tactile_cube.record("made", "source=finger", "source.hidden=[backlash@q2]")[""]
+        >>> measured = tactile_cube.record("made", source="finger", values={"source.hidden": ["backlash@q2"]})[""]
     """
-    return run_recording(called_job("record", settings, out=out))
+    return run_recording(called_job("record", locals()))
 
 
 def run_recording(job: Job) -> dict[str, Recording]:

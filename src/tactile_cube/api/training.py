@@ -6,11 +6,11 @@ import csv
 import hashlib
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
@@ -18,8 +18,8 @@ from omegaconf import OmegaConf
 from tactile_cube.agent.averaging import averaged, kept_policies
 from tactile_cube.agent.policy_file import save_policy
 from tactile_cube.api.environment import grasps_of
-from tactile_cube.api.evaluation import evaluate
-from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
+from tactile_cube.api.evaluation import run_evaluation
+from tactile_cube.api.job import Job, PathLike, as_input_errors, as_word, called_job, worded_job
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import networks_path
@@ -29,10 +29,8 @@ from tactile_cube.randomization import GraspStarts
 from tactile_cube.simulation import SimulationOptions
 from tactile_cube.training.build import build_run
 from tactile_cube.training.environment import as_environment
-from tactile_cube.training.finished import Finished
 from tactile_cube.training.ledger import LEDGER, Costs, read_costs, write_costs
-from tactile_cube.training.recovery import train_on
-from tactile_cube.training.run import INTERRUPTED, MASTERED, POLICY, Run
+from tactile_cube.training.run import INTERRUPTED, MASTERED, POLICY, Finished, Run, train_on
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 from tactile_cube.whole_file import write_whole
 
@@ -81,12 +79,55 @@ class TrainingResult:
 
 
 @as_input_errors
-def train(*settings: str, model: PathLike | None = None, folder: PathLike | None = None) -> TrainingResult:
+def train(
+    *,
+    experiment: str | None = None,
+    hand: str | None = None,
+    object: str | None = None,
+    task: str | None = None,
+    reward: str | None = None,
+    randomization: str | None = None,
+    start: str | None = None,
+    exploration: str | None = None,
+    curriculum: str | None = None,
+    env: str | None = None,
+    agent: str | None = None,
+    replay: str | None = None,
+    collector: str | None = None,
+    training: str | None = None,
+    logger: str | None = None,
+    without: str | None = None,
+    engine: Literal["bullet", "mujoco", "mixed"] | None = None,
+    model: PathLike | None = None,
+    own_effects: Sequence[str] | None = None,
+    seed: int | None = None,
+    values: Mapping[str, Any] | None = None,
+    folder: PathLike | None = None,
+) -> TrainingResult:
     """Train a policy, or go on training it: the same call resumes.
 
     Args:
-        settings: choices and values as on the command line, e.g. "+experiment=table", "seed=1".
-        model: model.yaml that describes the hand; None: as the settings say.
+        experiment: option of conf/experiment, which changes several choices at once; None: `curriculum`.
+        hand: option of conf/hand; this and the next fourteen: None: as the experiment says.
+        object: option of conf/object.
+        task: option of conf/task.
+        reward: option of conf/reward.
+        randomization: option of conf/randomization.
+        start: option of conf/start.
+        exploration: option of conf/exploration.
+        curriculum: option of conf/curriculum.
+        env: option of conf/env.
+        agent: option of conf/agent.
+        replay: option of conf/replay.
+        collector: option of conf/collector.
+        training: option of conf/training.
+        logger: option of conf/logger.
+        without: option of conf/without, with experiment="ablations".
+        engine: of the worlds.
+        model: model.yaml that describes the hand.
+        own_effects: classes of your own that the model names, as dotted paths.
+        seed: of everything random.
+        values: other keys of the configuration, dotted -> value, e.g. {"task.filter_time": 0.25}.
         folder: run folder; None: outputs/train/<name>-seed<seed>.
 
     Raises:
@@ -94,10 +135,42 @@ def train(*settings: str, model: PathLike | None = None, folder: PathLike | None
         CollectionError: worker processes failed again and again; the same call goes on from the last checkpoint.
 
     Example:
-        >>> result = tactile_cube.train("+experiment=table", "training.steps=60000")
+        >>> result = tactile_cube.train(experiment="table", values={"training.steps": 60000})
         >>> print(result.final_angle, result.policy)
     """
-    return run_training(called_job("train", settings, folder, model=model))
+    return run_training(called_job("train", locals()))
+
+
+@dataclass(frozen=True)
+class AveragedPolicy:
+    """A policy whose weights are the mean of several, and after how many steps each of these was kept."""
+
+    policy: Path
+    steps: tuple[int, ...]
+
+
+@as_input_errors
+def average(run: PathLike, *, last: int | None = None, output: PathLike | None = None) -> AveragedPolicy:
+    """Average the weights of the last policies that a training run has kept.
+
+    Args:
+        run: folder of the run.
+        last: how many.
+        output: file to write; None: policy_averaged.safetensors in the run's folder.
+
+    Raises:
+        InputError: the run kept fewer.
+    """
+    return run_averaging(called_job("average", locals()))
+
+
+def run_averaging(job: Job) -> AveragedPolicy:
+    """Write the policy of a job."""
+    run = Path(job.config.run)
+    actor, info = averaged(kept_policies(run, job.config.last))
+    output = Path(job.config.output or run / "policy_averaged.safetensors")
+    save_policy(output, actor, info)
+    return AveragedPolicy(output, tuple(info.averaged))
 
 
 def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
@@ -173,7 +246,7 @@ def stages_of(job: Job) -> list[Job]:
     for name, words in job.config.stages.items():
         fitting = [word for word in words if _key(word).partition(".")[0] not in chosen]  # not of another choice
         asked = {_key(word): word for word in (*fitting, *own, f"name={name}")}
-        stage = called_job("train", [*asked.values()], job.folder / name, model=job.config.model)
+        stage = worded_job("train", [*asked.values()], job.folder / name)
         if jobs:
             stage.config.training.init_from = str(jobs[-1].folder / "checkpoint.pt")
         if "file" in stage.config.start and stage.config.start.file is None:
@@ -200,7 +273,8 @@ def judged(job: Job, last: Path) -> str:
     said, named = [], {_key(word) for word in job.words} & {"hand", "object"}  # which no policy's file has read
     again = [word for word in job.words if _key(word).partition(".")[0] in named]
     for engine in ENGINES:
-        result = evaluate(policy, *job.config.judgement, *again, f"engine={engine}")
+        words = [as_word("policy", policy), *job.config.judgement, *again, f"engine={engine}"]
+        result = run_evaluation(worded_job("evaluate", words), print)
         result.write(job.folder / engine, film=False)
         said.append(f"{engine}: {result.text}")
     print("\n".join(said))

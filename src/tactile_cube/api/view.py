@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
-from tactile_cube.api.evaluation import EvaluationResult, evaluate
+from tactile_cube.api import evaluation
+from tactile_cube.api.evaluation import EvaluationResult
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import BASELINES, policy_path
 from tactile_cube.evaluation.training_curve import Curve, read_curve
 from tactile_cube.evaluation.verdict import EpisodeResult
 from tactile_cube.visualization.episode_recording import description, write_pair
-from tactile_cube.visualization.viewer import VIEWERS, show_files
+from tactile_cube.visualization.rerun_recording import VIEWERS, show_files
 
 
 @dataclass(frozen=True)
@@ -38,13 +40,27 @@ class ViewResult:
 
 
 @as_input_errors
-def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say = print) -> ViewResult:
+def view(
+    run: PathLike,
+    *,
+    episodes: int | None = None,
+    seconds: float | None = None,
+    evaluate: Mapping[str, Any] | None = None,
+    viewer: Literal["auto", "window", "none"] | None = None,
+    seed: int | None = None,
+    folder: PathLike | None = None,
+    say: Say = print,
+) -> ViewResult:
     """Write the best and the worst episode of a run as one Rerun recording, and open it where there is a display.
 
     Args:
         run: folder of a training run, a policy file, or a policy that ships with the package; of a folder of `evaluate`
             or `compare`, the recordings in it are opened.
-        settings: values as on the command line, e.g. "episodes=4", "viewer=none".
+        episodes: so many are run, and the best and the worst of them recorded.
+        seconds: time limit of an episode; None: the task's own.
+        evaluate: other settings of `evaluate`, e.g. {"task": "full"}.
+        viewer: a window, none, or a window where there is a display.
+        seed: of the episodes.
         folder: where the recording goes; None: outputs/view/...
         say: takes a line for each episode.
 
@@ -52,10 +68,10 @@ def view(run: PathLike, *settings: str, folder: PathLike | None = None, say: Say
         InputError: there is no such run, or a value that cannot be used.
 
     Example:
-        >>> seen = tactile_cube.view("table", "episodes=4", "viewer=none")
+        >>> seen = tactile_cube.view("table", episodes=4, viewer="none")
         >>> print(seen.files[0], seen.episodes["best"].final_angle)
     """
-    return run_view(called_job("view", settings, folder, run=run), say)
+    return run_view(called_job("view", locals()), say)
 
 
 def run_view(job: Job, say: Say) -> ViewResult:
@@ -79,9 +95,9 @@ def _write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
     config = job.config
     # found here, so that an error names the key that the user wrote
     curve = None if config.run in BASELINES else learning_curve(policy_path(config.run, "run").parent)
-    settings = [f"protocol.episodes={config.episodes}", f"seed={config.seed}", *config.evaluate]
-    settings += [] if config.seconds is None else [f"protocol.seconds={config.seconds}"]
-    tried = evaluate(config.run, *settings, say=say)
+    settings = {"protocol.episodes": config.episodes, "seed": config.seed, **config.evaluate}
+    settings |= {} if config.seconds is None else {"protocol.seconds": config.seconds}
+    tried = evaluation.evaluate(config.run, values=settings, say=say)
     ordered = sorted(tried.variants[0].results, key=lambda result: result.final_angle)
     chosen = {"best": ordered[-1], "worst": ordered[0]}
     recorded = {

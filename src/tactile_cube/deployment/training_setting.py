@@ -14,7 +14,7 @@ from tactile_cube.env import Task
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.kinematics import tip_positions
-from tactile_cube.hand.object_shape import tip_centres
+from tactile_cube.hand.object_mesh import tip_centres
 from tactile_cube.randomization import StartStates
 from tactile_cube.simulation import EpisodeConstants, constants_of
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
-from tactile_cube.hand.object_mesh import ObjectMesh
-from tactile_cube.hand.object_shape import ObjectShape
+from tactile_cube.hand.object_mesh import ObjectMesh, ObjectShape
 from tactile_cube.untrusted_file import read_npz
 from tactile_cube.whole_file import write_npz
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.errors import InputError
 from tactile_cube.hand.gait import places
 from tactile_cube.hand.hand import Hand
-from tactile_cube.hand.object_shape import tip_centres
+from tactile_cube.hand.object_mesh import tip_centres
 from tactile_cube.randomization import Grasps
 from tactile_cube.simulation import EpisodeConstants, Start, World
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand.chain import PlanarChain
 from tactile_cube.hand.hand import Hand
-from tactile_cube.hand.object_shape import ObjectShape, tip_centres
+from tactile_cube.hand.object_mesh import ObjectShape, tip_centres
 from tactile_cube.hand.urdf import Array
 
 _ROOM = 2e-3

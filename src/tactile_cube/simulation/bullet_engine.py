@@ -17,13 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
-from tactile_cube.hand.object_mesh import ObjectMesh
-from tactile_cube.hand.object_shape import NamedShape, ObjectShape, straight_half, unit_inertia
+from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, ObjectShape, straight_half, unit_inertia
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import OBJECT_STATE, SimulationOptions
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand, dlr_hand2
-from tactile_cube.hand.object_mesh import ObjectMesh, read_mesh
-from tactile_cube.hand.object_shape import SHAPES, ObjectShape
+from tactile_cube.hand.object_mesh import SHAPES, ObjectMesh, ObjectShape, read_mesh
 
 Array = NDArray[np.float64]
 _OF_SPACE = ("gravity_direction", "cube_size", "cube_com")

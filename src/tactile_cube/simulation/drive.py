@@ -14,7 +14,7 @@ from tactile_cube.hand import Hand
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import with_inertias
 from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 
 Array = NDArray[np.float64]
 

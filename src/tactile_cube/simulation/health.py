@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.compiled import compiled_once
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 
 Array = NDArray[np.float64]
 

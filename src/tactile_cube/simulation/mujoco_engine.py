@@ -11,9 +11,8 @@ from tactile_cube.hand import Hand
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE
+from tactile_cube.simulation.engine import OBJECT_STATE, SimulationOptions
 from tactile_cube.simulation.mujoco_model import HandSpec
-from tactile_cube.simulation.options import SimulationOptions
 
 Array = NDArray[np.float64]
 

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand import Hand
-from tactile_cube.hand.object_mesh import ObjectMesh
-from tactile_cube.hand.object_shape import NamedShape, straight_half, unit_inertia
+from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, straight_half, unit_inertia
 from tactile_cube.hand.urdf import CollisionShape
 from tactile_cube.simulation.constants import EpisodeConstants
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Surface, surfaces
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.options import SimulationOptions
+from tactile_cube.simulation.engine import SimulationOptions
 
 Array = NDArray[np.float64]
 

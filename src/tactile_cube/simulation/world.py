@@ -14,9 +14,8 @@ from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
 from tactile_cube.simulation.constants import EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, Engine
+from tactile_cube.simulation.engine import OBJECT_STATE, Engine, SimulationOptions
 from tactile_cube.simulation.health import find_fault
-from tactile_cube.simulation.options import SimulationOptions
 
 Array = NDArray[np.float64]
 _JOINT_SIGNALS = {"q": POSITION, "dq": VELOCITY, "q_m": MOTOR_POSITION, "q_d": COMMAND, "torque": TORQUE}

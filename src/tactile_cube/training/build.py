@@ -19,14 +19,14 @@ from tactile_cube.errors import InputError
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
 from tactile_cube.training.environment import Environment
-from tactile_cube.training.episodes import EpisodeStatistics
-from tactile_cube.training.finished import FILE as FINISHED
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.run import BEST_POLICY, POLICY, Run
+from tactile_cube.training.run import FILE as FINISHED
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
+from tactile_cube.training.transitions import EpisodeStatistics
 
 POLICY_SUFFIX = ".safetensors"
 FROZEN = 3000

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
-from tactile_cube.training.replay_files import ReplayFiles, Segment
+from tactile_cube.training.replay import ReplayFiles, Segment
 from tactile_cube.untrusted_file import regular
 from tactile_cube.whole_file import sync_folder, write_whole
 

@@ -19,10 +19,9 @@ from torch import Tensor
 from tactile_cube.agent.agent import Agent
 from tactile_cube.env import Conditions
 from tactile_cube.training.collection import Collection, CollectionError, Progress
-from tactile_cube.training.episodes import EpisodeStatistics
 from tactile_cube.training.replay import Replay
 from tactile_cube.training.settings import TrainingSettings
-from tactile_cube.training.transitions import TransitionAssembler
+from tactile_cube.training.transitions import EpisodeStatistics, TransitionAssembler
 
 
 @dataclass

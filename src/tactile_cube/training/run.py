@@ -1,23 +1,53 @@
-"""A run: its folder, its sessions, when it saves and when it stops."""
+"""A run: its folder, its sessions, faults of its workers, when it saves and when and how it ends."""
 
 import contextlib
+import gc
+import json
 import signal
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from filelock import BaseFileLock
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.agent.policy_file import PolicyInfo, current_commit, save_policy
 from tactile_cube.training.checkpoint import Checkpoints
-from tactile_cube.training.finished import Finished
+from tactile_cube.training.collection import CollectionError
 from tactile_cube.training.ledger import Ledger
-from tactile_cube.training.loggers import MetricLogger
+from tactile_cube.training.loggers import MetricLogger, ProgressLine
 from tactile_cube.training.loop import Learner
-from tactile_cube.training.progress import ProgressLine
 from tactile_cube.training.trial import ENGINES, MEASURED, SCORE
+from tactile_cube.whole_file import write_whole
+
+FILE = "finished.json"
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The end of a run: reason in words, environment steps, mean final angle [rad], resolved configuration."""
+
+    reason: str
+    steps: int
+    final_angle: float
+    config: dict[str, Any]
+
+    def write(self, folder: Path) -> None:
+        """Write it into the run folder."""
+        write_whole(folder / FILE, (json.dumps(asdict(self)) + "\n").encode())
+
+    @classmethod
+    def of(cls, folder: Path, config: dict[str, Any]) -> Self | None:
+        """How the run in a folder ended under exactly these settings; None where it did not, or shall start over."""
+        try:
+            found = cls(**json.loads((folder / FILE).read_text()))
+        except (OSError, ValueError, TypeError):
+            return None
+        # by way of JSON, in which tuples are lists
+        same = found.config == json.loads(json.dumps(config)) and (folder / "policy.safetensors").is_file()
+        return found if same and config["training"]["resume"] != "never" else None
+
 
 INTERRUPTED = "interrupted"
 MASTERED = "mastered:"
@@ -202,3 +232,47 @@ class Run:
             config=self.config,
         )
         save_policy(self.folder / name, actor, info)
+
+
+ATTEMPTS = 3
+"""Times in a row that workers may fail without a barrier reached in between."""
+
+
+def train_on(build: Callable[[], Run], again: Callable[[], Run] | None = None) -> tuple[Run, str]:
+    """Train to the end through faults of the workers; gives the closed run and the reason it ended.
+
+    All since the barrier is done again from the same state, so that its numbers are those of a run without faults.
+    `build` makes the run, fresh or from its last checkpoint; `again` makes it once more after a fault, by default
+    likewise.
+
+    Raises:
+        CollectionError: workers failed `ATTEMPTS` times without a barrier reached in between.
+    """
+    failures, reached = 0, -1
+    while True:
+        run, outcome = _session(build)
+        if run is not None and isinstance(outcome, str):
+            run.conclude(outcome)
+            return run, outcome
+        saved_at = run.saved_at if run is not None else -1
+        failures, reached = (1 if saved_at > reached else failures + 1), max(saved_at, reached)
+        if failures == ATTEMPTS:
+            raise CollectionError(f"{outcome}; {ATTEMPTS} times in a row without a barrier in between")
+        print(f"fault: {outcome}; going back to the last barrier with new workers", flush=True)
+        build = (again or build) if run is not None else build
+        del run
+        gc.collect()  # its replay is as large as the next one's
+
+
+def _session(build: Callable[[], Run]) -> tuple[Run | None, str | CollectionError]:
+    """Train until the end or a fault of the workers."""
+    run = None
+    try:
+        run = build()
+        run.announce()
+        return run, run.train()
+    except CollectionError as error:
+        return run, CollectionError(str(error))  # its cause would keep what failed from being deleted
+    finally:
+        if run is not None:
+            run.close()

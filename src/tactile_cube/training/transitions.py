@@ -1,8 +1,104 @@
-"""From a collected block to transitions for the replay: executed actions, n-step sums, faulty episodes left out."""
+"""From collected blocks to transitions (executed actions, n-step sums, no faulty episodes) and episode statistics."""
 
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
 from torchrl.data import MultiStep
+
+from tactile_cube.randomization import Learnability
+
+WINDOW = 50
+"""Episodes, and blocks of steps, that the statistics go back."""
+WINDOWS = ("angles", "lengths", "endings", "measured")
+
+
+class EpisodeStatistics:
+    """Final angles and lengths of the last episodes without extra exploration, and counts of how episodes ended.
+
+    Args:
+        outcomes: names of the outcome codes, e.g. ("running", "time", "dropped", ...); empty if the world has none.
+        terms: names of the reward terms; what each adds to the reward of a step, over the last blocks, is logged.
+        worlds: what becomes of the worlds that episodes draw.
+    """
+
+    def __init__(
+        self, outcomes: Sequence[str] = (), terms: Sequence[str] = (), worlds: Learnability | None = None
+    ) -> None:
+        self.outcomes, self.terms = tuple(outcomes), tuple(terms)
+        self.worlds = worlds or Learnability({}, 0.0)
+        self.measured: deque[list[float]] = deque(maxlen=WINDOW)
+        self.angles: deque[float] = deque(maxlen=WINDOW)
+        self.lengths: deque[float] = deque(maxlen=WINDOW)
+        self.endings: deque[int] = deque(maxlen=WINDOW)
+        self.episodes = self.faulty = 0
+
+    def add(self, block: TensorDictBase, weights: Tensor | float = 1.0) -> None:
+        """Count the episodes that end in a block (worlds, steps); `weights` are those of the terms (terms,)."""
+        following = block["next"]
+        ended = following["done"].squeeze(-1)
+        faulty = following["faulty"].squeeze(-1)
+        if self.terms:
+            weighted = following["reward_terms"].masked_fill(following["faulty"], 0.0) * weights
+            self.measured.append(weighted.flatten(0, -2).mean(0).tolist())
+        self.faulty += int((ended & faulty).sum())
+        self.episodes += int(ended.sum())
+        exploring = following.get("exploring", None)  # missing where no extra exploration is configured
+        counted = ended & ~faulty
+        if exploring is not None:
+            counted &= ~exploring.squeeze(-1)
+        # time first: the deque shall hold the last episodes in the order in which they ended
+        last = following.transpose(0, 1)[counted.t()]
+        self.angles.extend(last["theta"].flatten().tolist())
+        self.lengths.extend(last["episode_step"].float().flatten().tolist())
+        if self.worlds.ranges:
+            self.worlds.add(last["places"].double().numpy(), last["terminated"].squeeze(-1).numpy())
+        if self.outcomes:
+            self.endings.extend(last["outcome"].flatten().tolist())
+
+    @property
+    def mean_angle(self) -> float:
+        """Mean final angle [rad] of the last episodes; 0 before the first one ended."""
+        return sum(self.angles) / len(self.angles) if self.angles else 0.0
+
+    @property
+    def kept(self) -> float:
+        """Share of the last episodes that came to their time limit; 0 before the window of them is full."""
+        full = len(self.endings) == WINDOW and "time_limit" in self.outcomes
+        return self.endings.count(self.outcomes.index("time_limit")) / WINDOW if full else 0.0
+
+    def summary(self) -> dict[str, float]:
+        """Numbers for the log."""
+        count = max(len(self.lengths), 1)
+        result = {
+            "final_angle": self.mean_angle,
+            "final_angle_best": max(self.angles, default=0.0),
+            "episode_length": sum(self.lengths) / count,
+            "episodes": float(self.episodes),
+            "faulty_episodes": float(self.faulty),
+        }
+        for code, name in enumerate(self.outcomes):
+            if name not in ("running", "faulty"):
+                result[f"ended_{name}"] = self.endings.count(code) / max(len(self.endings), 1)
+        means = zip(*self.measured, strict=True) if self.measured else ([0.0] for _ in self.terms)
+        rewards = {name: sum(values) / len(values) for name, values in zip(self.terms, means, strict=True)}
+        return result | {f"reward_{name}": value for name, value in rewards.items()}
+
+    def state_dict(self) -> dict[str, Any]:
+        """The window and the counts."""
+        windows = {name: list(getattr(self, name)) for name in WINDOWS}
+        return {**windows, "episodes": self.episodes, "faulty": self.faulty, "lost": self.worlds.lost.tolist()}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Inverse of `state_dict`."""
+        for name in WINDOWS:
+            setattr(self, name, deque(state.get(name, ()), maxlen=WINDOW))
+        self.episodes, self.faulty = state["episodes"], state["faulty"]
+        self.worlds.lost = np.array(state.get("lost", [])).reshape(self.worlds.lost.shape)
 
 
 class TransitionAssembler:

@@ -1,13 +1,16 @@
-"""The training environment: worlds and transforms, and the one place that knows the transforms' order."""
+"""The training environment: worlds, transforms in their order, and a generator of its own for the noise."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import torch
+from tensordict import TensorDictBase
+from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.transforms import CatFrames, CatTensors, Compose, ObservationNorm, RenameTransform, Transform
 
@@ -23,7 +26,40 @@ from tactile_cube.simulation import EpisodeConstants, SimulationOptions, World
 from tactile_cube.simulation.health import unresolved
 from tactile_cube.transforms.disturbances import JointOffset, SensorNoise, StickyAction
 from tactile_cube.transforms.finger_exploration import Exploration, FingerExploration
-from tactile_cube.transforms.own_generator import OwnGeneratorEnv
+
+
+class OwnGeneratorEnv(TransformedEnv):  # type: ignore[misc]
+    """A transformed environment on whose random numbers torch's global generator has no influence, nor they on it.
+
+    Its sequence begins with `set_seed`.
+    """
+
+    _generator: Tensor | None = None
+
+    def set_seed(self, seed: int | None = None, static_seed: bool = False) -> int | None:
+        """Seed worlds and noise; gives the next seed."""
+        with self._drawing():
+            following: int | None = super().set_seed(seed, static_seed=static_seed)
+        return following
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
+        with self._drawing():
+            return super()._reset(tensordict, **kwargs)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        with self._drawing():
+            return super()._step(tensordict)
+
+    @contextmanager
+    def _drawing(self) -> Iterator[None]:
+        others = torch.get_rng_state()
+        torch.set_rng_state(others if self._generator is None else self._generator)
+        try:
+            yield
+        finally:
+            self._generator = torch.get_rng_state()
+            torch.set_rng_state(others)
+
 
 ALMOST_ALL = 1.0 - 1e-9
 """The fraction of draws below what counts as a distribution's largest value."""

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.units import THOUSANDTHS, milli
-from tactile_cube.visualization.blueprint import whole
 from tactile_cube.visualization.comparison_figures import marked
 from tactile_cube.visualization.comparison_report import outcome
-from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file
+from tactile_cube.visualization.rerun_recording import Branch, log_robot, recording_file, whole
 
 Array = NDArray[np.float64]
 POSE_RATE = 50.0  # [Hz] of the robot's poses

@@ -16,9 +16,15 @@ from tactile_cube.evaluation.episode_record import Array, EpisodeRecord
 from tactile_cube.evaluation.training_curve import Curve
 from tactile_cube.evaluation.verdict import EpisodeResult
 from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.visualization.blueprint import episode_blueprint, pair_blueprint
 from tactile_cube.visualization.curves import write_learning_curves
-from tactile_cube.visualization.rerun_recording import Branch, Colours, log_robot, recording_file
+from tactile_cube.visualization.rerun_recording import (
+    Branch,
+    Colours,
+    episode_blueprint,
+    log_robot,
+    pair_blueprint,
+    recording_file,
+)
 from tactile_cube.visualization.scene import Part, object_parts
 
 FINGER_COLOURS = ((214, 69, 65), (245, 171, 53), (38, 166, 91), (65, 131, 215), (150, 90, 200), (90, 190, 200))

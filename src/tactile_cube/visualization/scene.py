@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.evaluation.episode_record import Array
 from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.hand.object_mesh import ObjectMesh
-from tactile_cube.hand.object_shape import ObjectShape, straight_half
+from tactile_cube.hand.object_mesh import ObjectMesh, ObjectShape, straight_half
 
 Colour = tuple[float, float, float]
 

@@ -91,7 +91,7 @@ def _diagnose(
         sender.send(line)
 
     try:
-        found = diagnose(recording, f"seed={seed}", effects=effects, model=model, say=say)
+        found = diagnose(recording, seed=seed, effects=effects, model=model, say=say)
         found.write(folder)
         chosen = (found.data["sets"] or [found.effects])[0]
         sender.send(Found(found.text, list(dict.fromkeys(chosen))))

@@ -170,11 +170,11 @@ def evil_recording(folder: Path) -> Path:
 def test_no_command_puts_what_lies_outside_of_a_recording_into_its_files(tmp_path: Path) -> None:
     evil, settings = evil_recording(tmp_path), {"say": lambda line: None}
     model = tmp_path / "identify" / "model.yaml"
-    tactile_cube.compare(evil, "band.simulations=0", **settings).write(tmp_path / "compare")
+    tactile_cube.compare(evil, values={"band.simulations": 0}, **settings).write(tmp_path / "compare")
     tactile_cube.identify(evil, ["torque_bias@b"], **settings).write(model.parent)
     tactile_cube.monitor(evil, model, **settings).write(tmp_path / "monitor")
-    nothing_missing = ["criteria.floor=1e8", "criteria.adequate=1e9"]
-    tactile_cube.diagnose(evil, *nothing_missing, **settings).write(tmp_path / "diagnose")
+    nothing_missing = {"criteria.floor": 1e8, "criteria.adequate": 1e9}
+    tactile_cube.diagnose(evil, values=nothing_missing, **settings).write(tmp_path / "diagnose")
     polars.read_parquet(evil / "first.parquet").write_csv(tmp_path / "log.csv")
     source = CsvFiles(files=[str(tmp_path / "log.csv")], urdf=str(evil / "rig.urdf"), controller=GAINS)
     write_recordings(tmp_path / "record", source.recordings(0))

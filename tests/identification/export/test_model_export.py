@@ -1,6 +1,7 @@
 """Models written for other simulators: played in MuJoCo, and what a format has no place for."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -46,12 +47,13 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """An arm with play in its gear, which no format and no model here has."""
     folder = tmp_path_factory.mktemp("export")
     (folder / "arm.urdf").write_text(ARM)
-    settings = f"""source=rig source.urdf={folder / "arm.urdf"} source.controller.kp=6 source.controller.kd=0.25
-    source.nominal.stiffness=inf source.kinds=[ramps,multisine] source.initialisations=1 source.offset=0
-    source.duration=3 source.validation=false"""
-    return tactile_cube.record(folder / "recording", "source.hidden=['backlash@elbow: play=0.02']", *settings.split())[
-        ""
-    ]
+    arm = {
+        "source.urdf": folder / "arm.urdf", "source.controller.kp": 6, "source.controller.kd": 0.25,
+        "source.nominal.stiffness": math.inf, "source.kinds": ["ramps", "multisine"], "source.initialisations": 1,
+        "source.offset": 0, "source.duration": 3, "source.validation": False,
+        "source.hidden": ["backlash@elbow: play=0.02"],
+    }  # fmt: skip
+    return tactile_cube.record(folder / "recording", source="rig", values=arm)[""]
 
 
 def played(text: str, trial: Trial, recording: Recording, stiffness: float) -> NDArray[np.float64]:
@@ -148,8 +150,8 @@ def test_a_urdf_gets_friction_damping_and_effort(recording: Recording, tmp_path:
 
 def test_bam_gets_its_own_names_and_the_motor_that_has_these_gains(tmp_path: Path) -> None:
     stribeck = {"effect": "stribeck_friction@elbow", "parameters": {"excess": 0.02, "velocity": 0.2, "exponent": 1.5}}
-    words = ("bam.actuator=sts3215", "bam.volts=40")
-    made = tactile_cube.export_model(model(stribeck, *HELD[:2]), "bam", tmp_path / "arm.json", *words)
+    bam = {"bam.actuator": "sts3215", "bam.volts": 40}
+    made = tactile_cube.export_model(model(stribeck, *HELD[:2]), "bam", tmp_path / "arm.json", values=bam)
     data = json.loads(made.output.read_text())
     assert made.not_held == data.pop("not_held") == ["elbow: torque_limit 0.9 N m"]
     kt, resistance = data.pop("kt"), data.pop("R")

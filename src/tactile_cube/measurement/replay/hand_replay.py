@@ -19,7 +19,7 @@ from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 from tactile_cube.simulation.contact_effects import contact_catalogue
-from tactile_cube.simulation.options import EngineName
+from tactile_cube.simulation.engine import EngineName
 
 Array = NDArray[np.float64]
 NO_FILTER = 1e-6  # [s] a recording's commands are what reaches the controller, already filtered

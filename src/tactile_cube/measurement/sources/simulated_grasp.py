@@ -31,7 +31,7 @@ from tactile_cube.measurement.replay.model import Model, terms_of
 from tactile_cube.measurement.replay.simulator import Simulator
 from tactile_cube.measurement.sources.session import SimulatedSession, silent_trial, unmeasured
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
-from tactile_cube.simulation.options import EngineName
+from tactile_cube.simulation.engine import EngineName
 
 Array = NDArray[np.float64]
 CLEARANCE, RETRACTED = 3e-3, 2e-2  # [m] of open fingertips and of fingers that do not take part, off their faces
