@@ -9,8 +9,8 @@ from hydra.utils import instantiate
 
 from tactile_cube.composition import composed
 from tactile_cube.env import Conditions
+from tactile_cube.training.build import as_environment
 from tactile_cube.training.checkpoint import Checkpoints
-from tactile_cube.training.environment import as_environment
 from tactile_cube.training.replay import Replay
 
 

@@ -10,8 +10,8 @@ import torch
 from tensordict import TensorDictBase
 from torchrl.envs import EnvBase, Transform
 
+from tactile_cube.training.build import Environment, rotation_environment
 from tactile_cube.training.collection import MakeEnv
-from tactile_cube.training.environment import Environment, rotation_environment
 from tactile_cube.transforms import EnvConfig
 
 WISH = "TACTILE_CUBE_TEST_WISH"

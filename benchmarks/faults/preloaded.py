@@ -8,7 +8,7 @@ import torch.utils.tensorboard
 from hydra.utils import instantiate
 
 from tactile_cube.composition import composed
-from tactile_cube.training.environment import as_environment
+from tactile_cube.training.build import as_environment
 
 torch.set_num_threads(1)
 worlds = as_environment(instantiate(composed("train", ["+experiment=smoke"]).env)).make(worlds=1, seed=0)

@@ -15,8 +15,8 @@ from benchmarks.speed.timing import in_turns
 from tactile_cube.agent.agent import AgentSettings
 from tactile_cube.agent.networks import Actor
 from tactile_cube.gymnasium_env import GymnasiumRotation
+from tactile_cube.training.build import Environment
 from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
-from tactile_cube.training.environment import Environment
 from tactile_cube.transforms.make_env import rotation_env
 
 YARDSTICK = "the bare task, one world"

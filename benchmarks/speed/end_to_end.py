@@ -20,8 +20,7 @@ from tactile_cube.agent.agent import Agent
 from tactile_cube.agent.plain_sac import PlainSac
 from tactile_cube.agent.sac import Sac
 from tactile_cube.gymnasium_env import GymnasiumRotation
-from tactile_cube.training.build import build_run
-from tactile_cube.training.environment import Environment
+from tactile_cube.training.build import Environment, build_run
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tactile_cube.simulation.engine import EngineName
-from tactile_cube.training.environment import Environment, rotation_environment
+from tactile_cube.training.build import Environment, rotation_environment
 from tactile_cube.transforms import EnvConfig
 
 

@@ -16,7 +16,7 @@ from tactile_cube.composition import composed
 from tactile_cube.env import Conditions
 from tactile_cube.evaluation.environment import environment
 from tactile_cube.evaluation.policies import find_policy
-from tactile_cube.training.environment import as_environment
+from tactile_cube.training.build import as_environment
 from tactile_cube.transforms import make_env
 
 Door = Callable[..., TransformedEnv]

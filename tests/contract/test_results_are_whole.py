@@ -2,7 +2,6 @@
 
 import ast
 import errno
-import importlib
 import io
 import itertools
 import os
@@ -22,6 +21,7 @@ import pytest
 import tactile_cube
 from benchmarks.real_machines.single_joint_urdf import single_joint_urdf
 from tactile_cube.agent.policy_file import load_actor
+from tactile_cube.cli import command_line
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.measurement.recordings.description import Controller, Description, TrialEntry
@@ -221,12 +221,12 @@ def test_pictures_policies_films_and_results_of_a_policy_are_old_or_new(tmp_path
 
 def typed(command: str, *words: str) -> None:
     """Give a command line, in this process; what it refuses in one line is raised."""
-    said, module = io.StringIO(), importlib.import_module(f"tactile_cube.{command}")
+    said = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()), redirect_stderr(said):
         patch.setattr(sys, "argv", [command, *words])
         patch.setenv("HYDRA_FULL_ERROR", "0")
         try:
-            module.main()
+            command_line(command)()
         except SystemExit as ended:
             if ended.code != USAGE_ERROR:
                 raise

@@ -44,4 +44,4 @@ def test_a_program_searches_grasps_of_its_object_and_starts_in_them(tmp_path: Pa
     starts = GraspStarts(str(tmp_path / "grasps.npz"))
     config = tactile_cube.env_config(object="cylinder")
     assert len(starts.of(config.hand, config.constants).grasps.angles) == 2
-    assert found.origin["command"] == "tactile_cube.search_grasps('object=cylinder', grasps=2, seed=1)"
+    assert found.origin["command"] == "tactile_cube.search_grasps(config, grasps=2, seed=1)"

@@ -10,7 +10,7 @@ from torchrl.envs import EnvBase
 
 from tactile_cube.agent.networks import Sizes
 from tactile_cube.env import Conditions
-from tactile_cube.training.environment import Environment
+from tactile_cube.training.build import Environment
 
 SIZES = Sizes(observation=6, privileged=3, action=2)
 TERMS = ("push", "lost")

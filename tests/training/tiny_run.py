@@ -6,8 +6,7 @@ from typing import Any
 import torch
 
 from tactile_cube.agent.plain_sac import PlainSac
-from tactile_cube.training.build import build_run
-from tactile_cube.training.environment import Environment
+from tactile_cube.training.build import Environment, build_run
 from tactile_cube.training.loggers import CsvLogger
 from tactile_cube.training.run import Run
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings

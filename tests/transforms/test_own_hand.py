@@ -6,7 +6,7 @@ from tactile_cube.env import Reward, RotationEnv, Task
 from tactile_cube.env.worlds import WorldsEnv
 from tactile_cube.randomization import Randomization, StartStates
 from tactile_cube.simulation import constants_of
-from tactile_cube.training.environment import rotation_environment
+from tactile_cube.training.build import rotation_environment
 from tactile_cube.transforms import EnvConfig, Exploration
 from tactile_cube.transforms.make_env import transforms
 from tests.conftest import ScriptedWorld

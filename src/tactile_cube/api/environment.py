@@ -89,8 +89,10 @@ def search_grasps(config: EnvConfig | None = None, *, grasps: int = 2000, seed: 
         >>> found = tactile_cube.search_grasps(tactile_cube.env_config(object="cylinder"))
         >>> found.save(Path("grasps.npz"))  # then start="grasps", values={"start.file": "grasps.npz"}
     """
-    env = config or env_config()
-    return grasps_of(env, env.simulation, grasps, seed, f"tactile_cube.search_grasps(grasps={grasps}, seed={seed})")
+    env, given = config or env_config(), "config, " if config else ""
+    return grasps_of(
+        env, env.simulation, grasps, seed, f"tactile_cube.search_grasps({given}grasps={grasps}, seed={seed})"
+    )
 
 
 def grasps_of(env: EnvConfig, options: SimulationOptions, grasps: int, seed: int, command: str) -> Grasps:

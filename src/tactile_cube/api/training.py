@@ -27,8 +27,7 @@ from tactile_cube.evaluation.training_curve import read_curve
 from tactile_cube.hand.urdf_hand import urdf_file
 from tactile_cube.randomization import GraspStarts
 from tactile_cube.simulation import SimulationOptions
-from tactile_cube.training.build import build_run
-from tactile_cube.training.environment import as_environment
+from tactile_cube.training.build import as_environment, build_run
 from tactile_cube.training.ledger import LEDGER, Costs, read_costs, write_costs
 from tactile_cube.training.run import INTERRUPTED, MASTERED, POLICY, Finished, Run, train_on
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings

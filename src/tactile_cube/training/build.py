@@ -5,20 +5,25 @@ import ctypes
 import os
 import shutil
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import torch
 from filelock import BaseFileLock, FileLock, Timeout
+from torch import Tensor
 from torchrl.data import ReplayBuffer, TensorDictReplayBuffer
 
 from tactile_cube.agent.agent import Agent
 from tactile_cube.agent.networks import Actor, Sizes
 from tactile_cube.agent.policy_file import load_actor, require_sizes
+from tactile_cube.env import OUTCOMES, Conditions
+from tactile_cube.env.rotation import OBJECT
 from tactile_cube.errors import InputError
+from tactile_cube.randomization import Learnability
 from tactile_cube.training.checkpoint import FILE, Checkpoints, load_checkpoint, require_same_settings
-from tactile_cube.training.collection import Collection, MultiSyncCollection, SingleCollection
-from tactile_cube.training.environment import Environment
+from tactile_cube.training.collection import Collection, MakeEnv, MultiSyncCollection, SingleCollection
 from tactile_cube.training.ledger import LEDGER, Ledger
 from tactile_cube.training.loggers import MetricLogger
 from tactile_cube.training.loop import Learner
@@ -27,6 +32,58 @@ from tactile_cube.training.run import BEST_POLICY, POLICY, Run
 from tactile_cube.training.run import FILE as FINISHED
 from tactile_cube.training.settings import CollectorSettings, TrainingSettings
 from tactile_cube.training.transitions import EpisodeStatistics
+from tactile_cube.training.trial import Trial
+from tactile_cube.transforms import EnvConfig, make_env
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A family of equal worlds.
+
+    Attributes:
+        make: makes a batch of worlds, in whichever process.
+        sizes: widths of observation, privileged state and action.
+        terms: names of the reward terms, in the order of "reward_terms".
+        reward_weights: weights of the terms (terms,) under the conditions in force.
+        outcomes: names of the codes in the key "outcome".
+        learnability: makes what keeps account of the worlds; None: nothing does.
+        trial: tries an actor in so many episodes an engine, see `Trial`; None: nothing does.
+        approximations: what its worlds compute less well than they could, in words.
+    """
+
+    make: MakeEnv
+    sizes: Sizes
+    terms: tuple[str, ...]
+    reward_weights: Callable[[Conditions], Tensor]
+    outcomes: tuple[str, ...] = ()
+    learnability: Callable[[], Learnability] | None = None
+    trial: Callable[[Actor, int], dict[str, float]] | None = None
+    approximations: tuple[str, ...] = ()
+
+
+def rotation_environment(config: EnvConfig) -> Environment:
+    """The rotation task as configured."""
+    joints = config.hand.joints
+    return Environment(
+        make=partial(make_env, config),
+        sizes=Sizes(2 * joints * config.stack, OBJECT + joints, joints),
+        terms=config.reward.terms,
+        reward_weights=partial(_weights, config),
+        outcomes=OUTCOMES,
+        learnability=partial(config.randomization.learnability, config.constants),
+        trial=Trial(config),
+        approximations=tuple(config.approximations()),
+    )
+
+
+def _weights(config: EnvConfig, conditions: Conditions) -> Tensor:
+    return torch.from_numpy(config.reward.weights(conditions.penalty_scale))
+
+
+def as_environment(made: Any) -> Environment:
+    """What `env` in the configuration stands for: an environment, or the rotation task's configuration."""
+    return made if isinstance(made, Environment) else rotation_environment(made)
+
 
 POLICY_SUFFIX = ".safetensors"
 FROZEN = 3000

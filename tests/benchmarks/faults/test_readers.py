@@ -193,7 +193,7 @@ def test_no_command_imports_what_a_model_names(command: str, tmp_path: Path, mon
     (tmp_path / "stranger.py").write_text("raise SystemExit('imported')")
     model = ModelFile(joints=["a", "b"], effects=[EffectEstimate(effect="stranger.Drag@a")], errors={"over_noise": 1.0})
     write_model(model, tmp_path / "model.yaml")
-    first = {"evaluate": ["hold"], "train": ["+experiment=smoke"]}.get(command, [str(write(tmp_path / "r"))])
+    first = {"evaluate": ["hold"], "train": []}.get(command, [str(write(tmp_path / "r"))])
     with pytest.raises(InputError, match="stranger"):
         getattr(tactile_cube, command)(*first, model=tmp_path / "model.yaml")
 
