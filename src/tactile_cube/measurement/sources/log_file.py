@@ -67,14 +67,10 @@ def read_logs(path: Path) -> list[Log]:
     """
     if path.is_dir():
         return [read_logs(file)[0] for file in _lerobot_files(path)]
-    readers: dict[str, Callable[[Path], Log]] = {
-        ".parquet": _frame_log, ".npz": lambda file: _arrays_log(file, read_npz(file)), ".mat": _mat, ".json": _json,
-    }  # fmt: skip
-    readers |= dict.fromkeys(CSV, _frame_log)
     suffix = path.suffix.lower()
-    if suffix not in readers:
-        raise unknown_ending(path, f"{', '.join(readers)}, or the folder of a LeRobot data set")
-    return [replace(readers[suffix](regular(path)), name=path.stem)]
+    if suffix not in READERS:
+        raise unknown_ending(path, f"{', '.join(READERS)}, or the folder of a LeRobot data set")
+    return [replace(READERS[suffix](regular(path)), name=path.stem)]
 
 
 def _frame_log(path: Path) -> Log:
@@ -302,3 +298,13 @@ def _lerobot_names(path: Path) -> dict[str, list[str]]:
         raise InputError(f"{info}: not the description of a LeRobot data set: {error!r}") from None
     lists = {name: next(iter(one.values()), None) if isinstance(one, dict) else one for name, one in named.items()}
     return {name: [str(one) for one in names] for name, names in lists.items() if isinstance(names, list)}
+
+
+READERS: Mapping[str, Callable[[Path], Log]] = {
+    **dict.fromkeys(CSV, _frame_log),
+    ".parquet": _frame_log,
+    ".npz": lambda file: _arrays_log(file, read_npz(file)),
+    ".mat": _mat,
+    ".json": _json,
+}
+"""Ending of a file that may be a log -> what reads it."""
