@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from glob import glob
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,14 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import lag_between
 from tactile_cube.measurement.recordings.columns import SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
-from tactile_cube.measurement.recordings.description import Description, PerJoint, TrialEntry, per_joint
+from tactile_cube.measurement.recordings.description import Description, PerJoint, TrialEntry
 from tactile_cube.measurement.recordings.plausibility import torque_over_law
-from tactile_cube.measurement.recordings.rig import Rig, RigJoint, read_rig
+from tactile_cube.measurement.recordings.rig import Rig, RigJoint
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
 from tactile_cube.measurement.sources.column_map import NEEDED, ColumnMap, map_columns
 from tactile_cube.measurement.sources.gains import estimated_gains, gain_doubts
-from tactile_cube.measurement.sources.lever import ROBOTS, Lever
 from tactile_cube.measurement.sources.log_file import Log, read_logs
-from tactile_cube.measurement.sources.servo import read_servo
+from tactile_cube.measurement.sources.mechanism import Mechanism
 from tactile_cube.measurement.sources.source import described, rate_of, with_stated
 from tactile_cube.measurement.sources.tidy import apart, joined, trials_of, without_equal_rows
 from tactile_cube.measurement.sources.units import (
@@ -60,7 +59,7 @@ class CsvFiles:
     lever: float | None
     servo: str | None
     gain: float | None
-    controller: Mapping[str, PerJoint | str | None]
+    controller: Mapping[str, Any]
     columns: Mapping[str, str | Mapping[str, str]] | None
     nominal: Mapping[str, PerJoint | None]
     gravity: Iterable[float]
@@ -79,7 +78,7 @@ class CsvFiles:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
-        mode, rig = str(self.controller.get("mode") or "position"), self._rig()
+        mode, rig = str(self.controller.get("mode") or "position"), self._mechanism.rig()
         if mode not in NEEDED:
             raise InputError(f"source.controller.mode={mode}: unknown; choose one of {', '.join(NEEDED)}")
         left: list[str] = []
@@ -95,7 +94,8 @@ class CsvFiles:
         trials = [_trial(piece, columns, units, second, self.rate) for piece in pieces]
         rate = self.rate if self.rate is not None else rate_of(trials[0].time, 3, str(pieces[0].path))
         trials = self._named(trials, pieces, logs, 1 / rate)
-        rig = self._sized(rig, trials, mode)
+        pull = float(np.linalg.norm(list(self.gravity)))
+        rig = self._mechanism.sized(rig, trials, mode, self.controller.get("kp"), pull)
         description = self._description(trials, list(columns.joints), rig, rate, mode)
         doubts = [*columns.doubts, *rig.doubts, *_doubts(units, columns, trials, description, rig)]
         doubts += [f"left out: {reason}" for reason in left]
@@ -108,32 +108,9 @@ class CsvFiles:
         description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts))})
         return {"": RecordingTables(description, rig.text, tables, [row for row in understood if row[1]])}
 
-    def _rig(self) -> Rig:
-        """The mechanism in a file, or one of unknown masses."""
-        if (self.urdf is None) == (self.robot is None):
-            raise InputError(
-                "source=csv needs either source.urdf=... (of the rig, or its MJCF) or, for one joint without one, "
-                f"source.robot={'|'.join(ROBOTS)}"
-            )
-        rig = self._lever().rig() if self.urdf is None else read_rig(Path(self.urdf))
-        if self.servo is None:
-            return rig
-        constants = read_servo(self.servo).constants(self.gain)
-        stated = {**rig.stated, **{key: dict.fromkeys(rig.joints, value) for key, value in constants.items()}}
-        return replace(rig, stated=stated, stated_by=f"servo {self.servo}", unknown=("kd", "reflected_inertia"))
-
-    def _lever(self) -> Lever:
-        return Lever(str(self.robot), self.mass, self.lever)
-
-    def _sized(self, rig: Rig, trials: Sequence[TrialTable], mode: str) -> Rig:
-        """The mechanism with the masses that the logs show where nobody says them."""
-        if self.robot is None:
-            return rig
-        said = with_stated({"kp": self.controller.get("kp")}, rig.gains, [self.robot]).get("kp")
-        kp = None if said is None else float(per_joint(said, (self.robot,), "source.controller.kp")[0])
-        sized = self._lever().sized(trials, mode, kp, float(np.linalg.norm(list(self.gravity))))
-        unknown = tuple(dict.fromkeys([*sized.unknown, *rig.unknown]))
-        return replace(sized, stated={**sized.stated, **rig.stated}, stated_by=rig.stated_by, unknown=unknown)
+    @property
+    def _mechanism(self) -> Mechanism:
+        return Mechanism(self.urdf, self.robot, self.mass, self.lever, self.servo, self.gain)
 
     def _logs(self, joints: Sequence[str], mode: str) -> list[Log]:
         """All logs, each under a name of its own."""
@@ -332,7 +309,7 @@ def _doubts(
                 open_.setdefault(unit.doubt, []).append(columns.joints[joint][signal])
     for doubt, names in open_.items():
         yield f"{', '.join(names)}: {doubt}"
-    for key in [key for key in description.unknown if key != "mass"]:
+    for key in [key for key in description.unknown if key not in rig.unknown]:
         begins = getattr(description.controller, key, description.nominal.get(key))
         yield f"{key} is not stated: unknown, to be identified from {begins}, a guess"
     if description.controller.mode == "position":

@@ -75,7 +75,7 @@ class Lever:
         size = lever**2 if self.robot == "wheel" else 1e-3 * lever**2
         text = URDF.format(
             robot=self.robot, kind="prismatic" if self.robot == "slide" else "continuous", axis=AXES[self.robot],
-            mass=mass, com=-lever if self.robot == "pendulum" else 0.0, own=mass * size, turned=-hangs_at,
+            mass=mass, com=-lever if self.robot == "pendulum" else 0.0, own=mass * size, turned=-hangs_at or 0.0,
         )  # fmt: skip
         return parse_rig(text, Path(f"{self.robot}.urdf"))
 
@@ -101,7 +101,8 @@ class Lever:
         if mode != "free" and self.robot == "pendulum":
             unknown.append("mass")
         if mode == "position":
-            guessed |= {"kp": kp or UNIT_GAIN, "kd": max(found.damping, 0.01 * (kp or UNIT_GAIN))}
+            guessed |= {"kd": max(found.damping, 0.01 * (kp or UNIT_GAIN))}
+            guessed |= {} if kp else {"kp": UNIT_GAIN}
             unknown.append("kd")
         told = {
             "free": "no torque is known",
@@ -109,7 +110,8 @@ class Lever:
         }
         stated = {key: {self.robot: float(f"{value:.4g}")} for key, value in guessed.items()}
         rig = self.rig(mass * scale, lever, found.hangs_at)
-        return replace(rig, stated=stated, unknown=tuple(unknown), doubts=self._doubts(found, told.get(mode, ""), mode))
+        doubts = self._doubts(found, told.get(mode, ""), mode)
+        return replace(rig, stated=stated, stated_by="the log", unknown=tuple(unknown), doubts=doubts)
 
     def _link(self, found: _Seen, inertia: float, gravity: float) -> tuple[float, float]:
         """Mass [kg] and lever [m] of the link: a part of the inertia, and the weight."""

@@ -23,6 +23,8 @@ Step = tuple[str, str]
 WIDEST = 64  # columns that a list is expanded to; more are pictures
 PERIODS = {"dt": 1.0, "rate": -1.0, "fps": -1.0, "sample_rate": -1.0}
 """Names of a constant that says how far rows are apart, and the power of it that is seconds."""
+LEROBOT = Path("meta", "info.json")
+"""What a LeRobot data set says of its columns, in its folder."""
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
 CLOCK = r"^\s*(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)\s*$"
 DAY, YEAR = 86400.0, 3.15e7  # [s]; dates count from 1970
@@ -277,7 +279,7 @@ def _scalars(row: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 def _lerobot_files(folder: Path) -> list[Path]:
     """The tables of a LeRobot data set (version 2 or 3)."""
-    if not (folder / "meta" / "info.json").is_file():
+    if not (folder / LEROBOT).is_file():
         raise InputError(f"{folder}: a folder, and no LeRobot data set (no meta/info.json); name its files: {folder}/*")
     files = [below(folder, str(one.relative_to(folder)), str(folder)) for one in folder.glob("data/**/*.parquet")]
     if not files:
@@ -288,7 +290,7 @@ def _lerobot_files(folder: Path) -> list[Path]:
 def _lerobot_names(path: Path) -> dict[str, list[str]]:
     """What meta/info.json beside a table calls the numbers of its lists."""
     places = [path.parent, *path.parents[2:3]]
-    info = next((place / "meta" / "info.json" for place in places if (place / "meta" / "info.json").is_file()), None)
+    info = next((place / LEROBOT for place in places if (place / LEROBOT).is_file()), None)
     if info is None or path.suffix.lower() != ".parquet":
         return {}
     try:
