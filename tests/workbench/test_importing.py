@@ -154,6 +154,13 @@ def test_what_is_typed_becomes_a_setting(key: str, text: str, value: object) -> 
     assert (made["controller"]["kp"] if "." in key else made[key]) == value
 
 
+def test_two_gains_of_one_joint_are_refused_and_named(tmp_path: Path) -> None:
+    polars.DataFrame(played("pendulum")).write_csv(tmp_path / "run.csv")
+    given = Waiting((tmp_path / "run.csv",), robot="wheel").settings | settings_of({"controller.kp": "4,5"})
+    with pytest.raises(InputError, match=r"kp.*expected one number for all joints or 1, received \[4.0, 5.0\]"):
+        import_logs(tmp_path / "out", given)
+
+
 def test_what_is_typed_and_no_number_is_named() -> None:
     for text in ("4.O", "1,,x", "${oc.env:HOME}", ""):
         with pytest.raises(InputError, match=r"^kp: .* is no number"):

@@ -52,7 +52,10 @@ class Mechanism:
         if self.robot is None:
             return rig
         said = with_stated({"kp": kp}, rig.gains, [self.robot]).get("kp")
-        gain = None if said is None else float(per_joint(said, (self.robot,), "source.controller.kp")[0])
+        try:
+            gain = None if said is None else float(per_joint(said, (self.robot,), "source.controller.kp")[0])
+        except ValueError as error:
+            raise InputError(str(error)) from None
         sized = self._lever().sized(trials, mode, gain, gravity)
         return replace(
             sized,
