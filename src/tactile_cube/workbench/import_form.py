@@ -20,7 +20,7 @@ from tactile_cube.measurement.sources.units import (
 )
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import Preview
-from tactile_cube.workbench.text import Html, choose, html, listed, show
+from tactile_cube.workbench.text import Html, choose, html, listed, plain, show
 from tactile_cube.workbench.widgets import NONE, YELLOW, button, column_of, row_of, text_of
 
 AUTO, BEFORE = "by name, values", "before its command"
@@ -65,14 +65,20 @@ class ImportForm:
         self.robots = {robot: self._robot(robot) for robot in ROBOTS}
         self.said = text_of()
         self.texts = {
-            key: TextInput(title=title, width=150) for key, title in (ONE_JOINT | CONTROLLER | SERVO | MORE).items()
+            key: TextInput(title=plain(title), width=150)
+            for key, title in (ONE_JOINT | CONTROLLER | SERVO | MORE).items()
         }
-        self.servo = Select(title="servo", options=[NONE, *servos()], value=NONE, width=110)
+        self.servo = Select(title="servo", options=[NONE, *map(plain, servos())], value=NONE, width=110)
         self.mode = Select(title="commands are", options=[*NEEDED], value="position", width=110)
         self.mode.on_change("value", lambda attr, old, new: self._show_motor())
         self.read = Select(title="a position is read", options=[BEFORE, "after"], value=BEFORE, width=170)
         self.units = {
-            key: Select(title=f"{key.removesuffix('_unit')} in", options=[AUTO, *units], value=AUTO, width=150)
+            key: Select(
+                title=plain(f"{key.removesuffix('_unit')} in"),
+                options=[AUTO, *map(plain, units)],
+                value=AUTO,
+                width=150,
+            )
             for key, units in UNITS.items()
         }
         self.before = Select(title="trials of this recording", options=[TOGETHER, ALONE], value=TOGETHER, width=200)
@@ -96,7 +102,7 @@ class ImportForm:
 
     def _robot(self, robot: str) -> Button:
         icon = SVGIcon(svg=ICON.format(ICONS[robot]), size=40)
-        made = Button(label=robot, icon=icon, width=130, height=52)
+        made = Button(label=plain(robot), icon=icon, width=130, height=52)
         made.on_click(lambda: self.desk.choose_robot(robot))
         return made
 
@@ -186,7 +192,7 @@ def _columns_row(label: str, name: str, chosen: dict[str, str], columns: list[st
     """A select of columns for each signal, with the column that is chosen."""
     selects = []
     for signal, value in chosen.items():
-        selects.append(Select(title=signal, width=140))
+        selects.append(Select(title=plain(signal), width=140))
         choose(selects[-1], [NONE, *columns], value)
     name_of = Div(width=80, disable_math=True, styles={"overflow-wrap": "anywhere"})
     show(name_of, label)
