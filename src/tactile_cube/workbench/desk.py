@@ -47,7 +47,7 @@ class Desk:
     def __init__(self, folder: Path, own_effects: Sequence[str] = (), seed: int = 0, model: str | None = None) -> None:
         self.folder, self.own_effects, self.seed, self.model = folder, tuple(own_effects), seed, model
         self.bench: Workbench | None = None
-        self.version = 0
+        self.version, self.ended = 0, False
         self.busy = self.problem = self.commands = ""
         self.notes: list[str] = []
         self.waiting = Waiting()
@@ -87,6 +87,8 @@ class Desk:
             try:
                 work()
             except Exception as error:
+                if self.ended:
+                    return
                 said = usage_error(error)
                 if said is None:
                     traceback.print_exc(file=sys.stderr)
@@ -240,6 +242,11 @@ class Desk:
         self.progress = [*self.progress[1 - PROGRESS :], end]
         self.found, self.diagnosing = running.found, None
         self.changed()
+
+    def end(self) -> None:
+        """Stop the diagnosis that runs; what else is being done ends with the program."""
+        self.ended = True
+        self.stop()
 
     def stop(self) -> None:
         """Stop the diagnosis that runs."""

@@ -92,7 +92,7 @@ def serve(job: Job) -> None:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         with contextlib.suppress(KeyboardInterrupt):
             server.io_loop.start()
-        desk.stop()
+        desk.end()
 
 
 @contextlib.contextmanager
