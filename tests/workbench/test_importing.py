@@ -9,6 +9,8 @@ import polars
 import pytest
 
 import tactile_cube
+from tactile_cube.api.job import worded_job
+from tactile_cube.api.recording import run_recording
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.sources.log_file import READERS
 from tactile_cube.workbench import importing
@@ -82,10 +84,14 @@ def test_page_command_and_program_write_the_same_recording(tmp_path: Path) -> No
         "source.controller.kp=[25, 12]", "source.controller.kd=[0.2, 0.1]", "source.controller.rate_hz=1000",
         "source.nominal.static_friction=0.01", "source.initialisation=[0, 1]", "source.length=2",
     ]  # fmt: skip
-    recording = tactile_cube.record(tmp_path / "command", *words)[""]
+    run_recording(worded_job("record", [*words, f"out={tmp_path}/command"]))
+    values = settings_of(typed) | {"files": [f"{tmp_path}/*.csv"], "urdf": str(tmp_path / "rig.urdf")}
+    given = {f"source.{key}": value for key, value in values.items()}
+    recording = tactile_cube.record(tmp_path / "program", source="csv", values=given)[""]
     assert recording.gains.kp.tolist() == [25.0, 12.0]
     text = (tmp_path / "command" / "recording.yaml").read_text()
-    assert (tmp_path / "page" / "recording.yaml").read_text() == text
+    for other in ("page", "program"):
+        assert (tmp_path / other / "recording.yaml").read_text() == text
     assert "read: before" in text
     for file in sorted((tmp_path / "command" / "trials").iterdir()):
         assert (tmp_path / "page" / "trials" / file.name).read_bytes() == file.read_bytes()
