@@ -31,8 +31,7 @@ from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import write_recordings
-from tactile_cube.measurement.sources.csv_files import CsvFiles
-from tactile_cube.measurement.sources.ros_bag import RosBag
+from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tactile_cube.training.checkpoint import FILE, HEAD, Checkpoints, require_same_settings
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings
 from tactile_cube.transforms import EnvConfig
@@ -89,9 +88,12 @@ def _csv(folder: Path) -> None:
 
 def _import_csv(folder: Path) -> None:
     logs = [str(folder / "log1.csv"), str(folder / "log2.csv")]
-    write_recordings(
-        folder / "out", CsvFiles(files=logs, urdf=str(folder / "rig.urdf"), controller=GAINS).recordings(0)
-    )
+    _import(folder, "csv", files=logs)
+
+
+def _import(folder: Path, option: str, **said: object) -> None:
+    settings = source_settings(option, {"urdf": str(folder / "rig.urdf"), "controller": GAINS, **said})
+    write_recordings(folder / "out", recording_tables(settings, option, 0))
 
 
 def _bag(folder: Path) -> None:
@@ -100,8 +102,7 @@ def _bag(folder: Path) -> None:
 
 
 def _import_bag(folder: Path) -> None:
-    bag = RosBag([str(folder / "bag.mcap")], str(folder / "rig.urdf"), ["a", "b"], GAINS)
-    write_recordings(folder / "out", bag.recordings(0))
+    _import(folder, "mcap", files=[str(folder / "bag.mcap")], joints=["a", "b"])
 
 
 MJCF = """<mujoco><compiler angle="radian"/><default><default class="c"><joint armature="0.02"/></default></default>

@@ -45,7 +45,7 @@ def test_a_csv_import_that_failed_does_not_block_the_corrected_command(tmp_path:
     nothing = run("record", "source=csv", "out=rec", folder=tmp_path)
     assert nothing.returncode == 2
     assert "source.files=... (" in nothing.stderr
-    assert "source.urdf=... (of the rig" in nothing.stderr
+    assert "source.urdf=FILE or source.robot=NAME" in nothing.stderr
     words = ["source=csv", "out=rec", "source.files=[sines_*.csv]", "source.urdf=two.urdf"]
     words += ["source.controller.kp=3", "source.controller.kd=0.2", "source.nominal.static_friction=0.01"]
     wrong = run("record", *words, "source.time_unit=s", folder=tmp_path)

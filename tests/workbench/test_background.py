@@ -1,5 +1,9 @@
 """A diagnosis in a process of its own."""
 
+import os
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -28,6 +32,42 @@ def test_a_diagnosis_is_stopped_at_once(tmp_path: Path) -> None:
     assert running.found is None
     assert len(rest) < 5
     assert time.monotonic() - began < 5.0
+
+
+RUNNING = """
+import sys
+from pathlib import Path
+from tactile_cube.measurement.recordings.reading import read_recording
+from tactile_cube.workbench.background import Diagnosing
+if __name__ == "__main__":
+    running = Diagnosing(read_recording(Path(sys.argv[1])), None, (), 0, Path(sys.argv[1]) / "found")
+    lines = running.lines()
+    print(running._process.pid, next(lines), flush=True)
+    running.wait()
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_a_diagnosis_ends_with_the_workbench_however_it_ends(tmp_path: Path, how: signal.Signals) -> None:
+    (tmp_path / "running.py").write_text(RUNNING)
+    words = [sys.executable, str(tmp_path / "running.py"), str(stribeck_recording(tmp_path).folder)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as workbench:
+        assert workbench.stdout is not None
+        diagnosis = int(workbench.stdout.readline().split()[0])
+        os.kill(diagnosis, 0)
+        workbench.send_signal(how)
+        workbench.wait()
+    for _ in range(100):
+        if not _runs(diagnosis):
+            return
+        time.sleep(0.1)
+    os.kill(diagnosis, signal.SIGKILL)
+    pytest.fail("the diagnosis outlives its workbench")
+
+
+def _runs(process: int) -> bool:
+    state = Path(f"/proc/{process}/stat")
+    return state.exists() and state.read_text().rpartition(")")[2].split()[0] != "Z"
 
 
 def test_what_diagnose_refuses_is_raised_here(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def test_what_came_back_is_added_to_the_recording_that_is_open(measured: Recordi
     def imported(count: int, gains: dict[str, str], together: bool) -> Recording:
         desk.take([one.name for one in files[:count]], [one.read_bytes() for one in files[:count]])
         done(desk)
-        desk.import_waiting({"mode": "position", **gains}, {}, {}, {}, together)
+        desk.import_waiting({f"controller.{key}": text for key, text in gains.items()}, {}, together)
         done(desk)
         assert desk.problem == ""
         assert desk.bench is not None

@@ -154,7 +154,8 @@ def ended(run: subprocess.Popen[str]) -> Iterator[None]:
         run.kill()
 
 
-def test_no_log_file_or_command_line_has_the_token_and_others_read_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+def test_no_log_file_or_command_line_has_the_token_and_others_read_nothing(tmp_path: Path, end: signal.Signals) -> None:
     seen = tmp_path / "browser"
     seen.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/line\ncp "${{1#file://}}" {tmp_path}/copy\n')
     seen.chmod(0o755)
@@ -178,7 +179,7 @@ def test_no_log_file_or_command_line_has_the_token_and_others_read_nothing(tmp_p
         assert token not in line
         modes = {path.name: path.stat().st_mode & 0o077 for path in (tmp_path / "run").glob("*.*") if path.is_file()}
         assert modes == {"workbench.log": 0, "open.html": 0}
-        run.send_signal(signal.SIGINT)
+        run.send_signal(end)
         said = run.stdout.read()
         assert run.wait() in (0, 130)
     assert token not in said

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hydra.utils import instantiate
 from omegaconf import OmegaConf
 
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import require_free, write_recordings
-from tactile_cube.measurement.sources.source import require_settings
+from tactile_cube.measurement.sources.source import recording_tables
 
 
 @as_input_errors
@@ -44,8 +43,7 @@ def run_recording(job: Job) -> dict[str, Recording]:
     """Write what a job's source gives."""
     out = Path(job.config.out)
     require_free(out)
-    require_settings(job.config.source, str(job.choices["source"]))
-    source = instantiate(OmegaConf.to_container(job.config.source, resolve=True))
-    tables = source.recordings(job.config.seed)
+    settings: Any = OmegaConf.to_container(job.config.source, resolve=True)
+    tables = recording_tables(settings, str(job.choices["source"]), job.config.seed)
     write_recordings(out, tables)
     return {name: read_recording(out / name) for name in tables}

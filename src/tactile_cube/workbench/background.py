@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Iterator, Sequence
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from threading import Thread
 from typing import NamedTuple
 
 from tactile_cube.drivetrain.model_file import ModelFile
@@ -82,10 +84,20 @@ class Diagnosing:
         self._process.terminate()
 
 
+def _end_with(parent: int) -> None:
+    """End when the workbench does, however it ends."""
+    wait([parent])
+    os._exit(1)
+
+
 def _diagnose(
     recording: Recording, model: ModelFile | None, effects: list[str], seed: int, folder: Path, sender: Connection
 ) -> None:
     from tactile_cube.api.diagnosis import diagnose
+
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "this is a process of a workbench"
+    Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
 
     def say(line: str) -> None:
         sender.send(line)

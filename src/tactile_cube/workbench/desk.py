@@ -6,6 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from glob import glob
 from pathlib import Path
 from threading import Thread
@@ -20,7 +21,7 @@ from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.usage_error import usage_error
 from tactile_cube.workbench.background import Diagnosing, Found
-from tactile_cube.workbench.importing import RIGS, Preview, import_logs, kept, preview, require_known
+from tactile_cube.workbench.importing import Preview, Waiting, import_logs, kept, settings_of
 from tactile_cube.workbench.state import Workbench
 
 PROGRESS = 12  # lines of a diagnosis that are kept
@@ -35,7 +36,7 @@ class Desk:
         version: grows with every change of the model or the recording.
         busy: what is being done, in words.
         problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
-        logs: files that wait to be imported; `urdf`: of their rig; `preview`: what is in the first.
+        waiting: files that wait to be imported; `preview`: what is in the first.
         scores: a first look at the candidates, joint -> best first, twins together, of this version.
         explainable: joint -> part of the missing torque that any law could explain, of this version.
         signature: the torque that the candidate looked at would supply.
@@ -46,11 +47,10 @@ class Desk:
     def __init__(self, folder: Path, own_effects: Sequence[str] = (), seed: int = 0, model: str | None = None) -> None:
         self.folder, self.own_effects, self.seed, self.model = folder, tuple(own_effects), seed, model
         self.bench: Workbench | None = None
-        self.version = 0
+        self.version, self.ended = 0, False
         self.busy = self.problem = self.commands = ""
         self.notes: list[str] = []
-        self.logs: list[Path] = []
-        self.urdf: Path | None = None
+        self.waiting = Waiting()
         self.preview: Preview | None = None
         self.diagnosing: Diagnosing | None = None
         self.listeners: list[Callable[[], None]] = []
@@ -87,6 +87,8 @@ class Desk:
             try:
                 work()
             except Exception as error:
+                if self.ended:
+                    return
                 said = usage_error(error)
                 if said is None:
                     traceback.print_exc(file=sys.stderr)
@@ -144,47 +146,38 @@ class Desk:
         self.do(f"reading {', '.join(names)}", run)
 
     def _wait_for_import(self, files: Sequence[Path]) -> None:
-        for file in files:
-            require_known(file)
-        rigs = [file for file in files if file.suffix.lower() in RIGS]
-        self.urdf = rigs[-1] if rigs else self.urdf
-        self.logs = [file for file in files if file not in rigs] or self.logs
-        self.preview = preview(self.logs[0], self.urdf) if self.logs and self.urdf else None
+        self._wait(self.waiting.with_files(files))
+
+    def _wait(self, waiting: Waiting) -> None:
+        self.waiting, self.preview = waiting, None
+        self.preview = waiting.preview()
+
+    def choose_robot(self, robot: str) -> None:
+        """Take one joint of unknown lever in the place of a URDF."""
+        self.do(f"a {robot}", lambda: self._wait(replace(self.waiting, urdf=None, robot=robot)))
 
     @property
     def same_rig(self) -> Recording | None:
         """The recording that is loaded, unless another rig's URDF was named since: what came back is added to it."""
-        return self.bench.opened if self.bench is not None and self.bench.opened.rig.path == self.urdf else None
+        same = self.bench is not None and self.bench.opened.rig.path == self.waiting.urdf
+        return self.bench.opened if self.bench is not None and same else None
 
-    def import_waiting(
-        self,
-        controller: dict[str, str],
-        nominal: dict[str, str],
-        columns: dict[str, Any],
-        settings: dict[str, str],
-        together: bool = False,
-    ) -> None:
+    def import_waiting(self, typed: dict[str, str], columns: dict[str, Any], together: bool = False) -> None:
         """Import the logs that wait and load what they make; they wait on where something is wrong.
 
         Args:
-            controller: as typed: kp, kd, torque_limit, mode.
-            nominal: as typed: stiffness, static_friction, reflected_inertia, as far as known.
-            columns: as `source.columns`.
-            settings: others of `record source=csv`, as typed.
+            typed: settings of `record source=csv`, as typed: "controller.kp", "read", ...
+            columns: as `source.columns`; none: as guessed.
             together: with the trials of the recording that is loaded, if the URDF is its own.
         """
-        logs, urdf, before = self.logs, self.urdf, self.same_rig if together else None
+        waiting, before = self.waiting, self.same_rig if together else None
 
         def run() -> None:
-            given = {key: text if key == "mode" else _number(key, text) for key, text in controller.items()}
-            believed = {key: _number(key, text) for key, text in nominal.items()}
-            more = {key: _number(key, text) if key == "length" else text for key, text in settings.items()}
-            if not logs or urdf is None:
-                raise InputError("drop a log and the URDF of its rig first")
+            given = settings_of(typed) | waiting.settings | {"columns": columns or None}
+            if waiting.lacks:
+                raise InputError(f"still needed: {' and '.join(waiting.lacks)}")
             out = self.folder / f"recording_{self.version}_{len(list(self.folder.glob('recording_*')))}"
-            recording, understood = import_logs(
-                out, logs, urdf, given, before, nominal=believed, columns=columns, **more
-            )
+            recording, understood = import_logs(out, given, before)
             self._load(recording.folder)
             self.notes = [*understood, *self.notes]
 
@@ -194,8 +187,9 @@ class Desk:
         self.stop()
         bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
         self._renewed(bench)
-        self.notes = [f"warning: {line}" for line in bench.opened.warnings]
-        self.logs, self.preview, self.urdf = [], None, bench.opened.rig.path
+        warnings = [line.replace(f"{folder / DESCRIPTION}: ", "") for line in bench.opened.warnings]
+        self.notes = [f"warning: {line}" for line in warnings]
+        self.waiting, self.preview = Waiting(urdf=bench.opened.rig.path), None
 
     def look(self, joint: str) -> None:
         """Take a first look at the candidates of a joint, unless it was taken."""
@@ -249,6 +243,11 @@ class Desk:
         self.found, self.diagnosing = running.found, None
         self.changed()
 
+    def end(self) -> None:
+        """Stop the diagnosis that runs; what else is being done ends with the program."""
+        self.ended = True
+        self.stop()
+
     def stop(self) -> None:
         """Stop the diagnosis that runs."""
         if self.diagnosing is not None:
@@ -295,10 +294,3 @@ def _path(text: str) -> Path:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{text[:LABEL]!r}: no name of a file here: {reason}; type another one") from None
     return path
-
-
-def _number(key: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{key}: '{text}' is no number") from None

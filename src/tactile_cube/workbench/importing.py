@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,8 +26,10 @@ from tactile_cube.measurement.recordings.writing import (
     write_recordings,
 )
 from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
-from tactile_cube.measurement.sources.csv_files import CsvFiles, kinds_of
-from tactile_cube.measurement.sources.log_file import read_logs
+from tactile_cube.measurement.sources.csv_files import kinds_of
+from tactile_cube.measurement.sources.lever import Lever
+from tactile_cube.measurement.sources.log_file import LEROBOT, READERS, read_logs
+from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import write_whole
 
@@ -32,9 +37,13 @@ LARGEST = 100_000_000
 """Bytes of one file that a browser hands over; larger ones are named by their path."""
 NAME = 200
 """Bytes of a file's name; the system allows some more."""
-TABLES, RIGS = (".csv", ".txt", ".parquet", ".npz"), (".urdf", ".xml")
+LOGS, RIGS = tuple(READERS), (".urdf", ".xml")
 BAGS = (".mcap", ".bag", ".db3")
 SHOWN = 5  # rows
+FREE = "no column of commands: free swings? If torques are commanded or logged, say which column it is"
+GAINS = tuple(ControllerChange.model_fields)
+WORDS = ("servo", "controller.mode", "read", "time_unit", "angle_unit", "length_unit", "torque_unit")
+"""Settings of `record source=csv` that are no numbers."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +51,12 @@ class Preview:
     """What is in a log.
 
     Attributes:
-        joints: of the URDF, those that may be actuated.
+        joints: of the rig, those that may be actuated.
         columns: their names.
         rows: the first ones.
         guess: which column is what; None where the names leave it open.
         doubt: what they leave open.
+        mode: of the controller, `free` without a column of commands.
     """
 
     joints: list[str]
@@ -54,6 +64,73 @@ class Preview:
     rows: list[list[float]]
     guess: ColumnMap | None
     doubt: str
+    mode: str = "position"
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """What waits to be imported.
+
+    Attributes:
+        logs: files, or folders of LeRobot.
+        urdf: of their rig.
+        robot: pendulum, wheel or slide in its place.
+        calibration: LeRobot's, of the arm.
+    """
+
+    logs: tuple[Path, ...] = ()
+    urdf: Path | None = None
+    robot: str | None = None
+    calibration: Path | None = None
+
+    def with_files(self, files: Sequence[Path]) -> Waiting:
+        """Return it with more files, each by what it is; new logs take the place of old ones.
+
+        Raises:
+            InputError: a file that is none of these.
+        """
+        kinds = {file: kind_of(file) for file in files}
+        logs = tuple(file for file, kind in kinds.items() if kind == "log")
+        rigs = [file for file, kind in kinds.items() if kind == "rig"]
+        known = [file for file, kind in kinds.items() if kind == "calibration"]
+        changed = replace(self, logs=logs or self.logs, calibration=known[-1] if known else self.calibration)
+        return replace(changed, urdf=rigs[-1], robot=None) if rigs else changed
+
+    @property
+    def lacks(self) -> list[str]:
+        """What is still needed, in words."""
+        rig = self.urdf or self.robot
+        needed = {"a log": self.logs, "the URDF of the rig, or a choice of one joint": rig}
+        return [what for what, there in needed.items() if not there]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """As `record source=csv` takes it."""
+        named = {"urdf": self.urdf, "robot": self.robot, "calibration": self.calibration}
+        return {"files": [str(log) for log in self.logs]} | {k: str(v) for k, v in named.items() if v is not None}
+
+    @as_input_errors
+    def preview(self) -> Preview | None:
+        """Return what the first log holds and which column seems to be what; None: something is still needed.
+
+        Raises:
+            InputError: a file that cannot be read.
+        """
+        if self.lacks:
+            return None
+        table = read_logs(self.logs[0])[0].table
+        rig = read_rig(self.urdf) if self.urdf else Lever(str(self.robot)).rig()
+        joints = [name for name, joint in rig.joints.items() if joint.mimics is None]
+        count = min(SHOWN, len(next(iter(table.values()))))
+        rows = [[float(column[k]) for column in table.values()] for k in range(count)]
+        names, guess, mode, doubt = list(table), None, "position", ""
+        try:
+            guess = map_columns(names, joints, {})
+        except InputError as error:
+            doubt = str(error)
+            with contextlib.suppress(InputError):
+                guess, mode, doubt = map_columns(names, joints, {}, "free"), "free", FREE
+        return Preview(joints, names, rows, guess, doubt, mode)
 
 
 def kept(folder: Path, name: str, content: bytes) -> Path:
@@ -65,20 +142,40 @@ def kept(folder: Path, name: str, content: bytes) -> Path:
     name = Path(name.replace("\\", "/")).name
     if not name.isprintable() or len(os.fsencode(name)) > NAME:
         raise InputError(f"{name[:NAME]!r}: no name of a file here; give it one of at most {NAME} printable characters")
-    require_known(Path(name))
+    _require_known(Path(name))
     if len(content) > LARGEST:
         raise InputError(f"{name}: {len(content) / 1e6:.0f} MB, more than {LARGEST / 1e6:.0f}; name its path instead")
-    folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / name, content)
-    return folder / name
+    place = folder / LEROBOT if name == LEROBOT.name and b'"features"' in content else folder / name
+    place.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(place, content)
+    return place
 
 
-def require_known(file: Path) -> None:
-    """Refuse what is no log and no URDF.
+def kind_of(file: Path) -> str:
+    """Return what a file is: log, rig, calibration, or what LeRobot says of its columns (description).
 
     Raises:
-        InputError: it is; for a bag with the command that imports it.
+        InputError: none of these; for a bag with the command that imports it.
     """
+    if (file / LEROBOT).is_file():
+        return "log"
+    _require_known(file)
+    if file.suffix.lower() == ".json":
+        if file.parts[-2:] == LEROBOT.parts:
+            return "description"
+        return "calibration" if _is_calibration(file) else "log"
+    return "rig" if file.suffix.lower() in RIGS else "log"
+
+
+def _is_calibration(file: Path) -> bool:
+    try:
+        read = json.loads(file.read_text(encoding="utf-8"))
+        return bool(read) and all("range_max" in one for one in read.values())
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+        return False  # whoever reads it as a log says why
+
+
+def _require_known(file: Path) -> None:
     ending = file.suffix.lower()
     if ending in BAGS:
         convert = "" if ending == ".mcap" else f" (from {ending} convert it to MCAP first)"
@@ -87,53 +184,63 @@ def require_known(file: Path) -> None:
             f"'source.files=[{file.with_suffix('.mcap').name}]' source.urdf=URDF 'source.joints=[JOINT, ...]' "
             f"source.controller.kp=KP source.controller.kd=KD out=FOLDER{convert}; then open FOLDER here"
         )
-    if ending not in (*TABLES, *RIGS):
-        raise InputError(f"{file.name}: neither a log ({', '.join(TABLES)}) nor a mechanism ({', '.join(RIGS)})")
+    if ending not in (*LOGS, *RIGS):
+        raise InputError(f"{file.name}: neither a log ({', '.join(LOGS)}) nor a mechanism ({', '.join(RIGS)})")
 
 
-@as_input_errors
-def preview(file: Path, urdf: Path) -> Preview:
-    """Return what a log holds and which column seems to be what.
+def settings_of(typed: Mapping[str, str]) -> dict[str, Any]:
+    """Return settings of `record source=csv` from texts of a form; a key with a dot is one of a mapping.
+
+    Example:
+        >>> settings_of({"controller.kp": "25, 12", "read": "after", "initialisation": "0"})
+        {'controller': {'kp': [25.0, 12.0]}, 'read': 'after', 'initialisation': [0]}
 
     Raises:
-        InputError: a file that cannot be read.
+        InputError: a text that is no number, or for a key that needs one several.
     """
-    table = read_logs(file)[0].table
-    joints = [name for name, joint in read_rig(urdf).joints.items() if joint.mimics is None]
-    rows = [[float(column[k]) for column in table.values()] for k in range(min(SHOWN, len(next(iter(table.values())))))]
+    settings: dict[str, Any] = {}
+    for key, text in typed.items():
+        group, _, name = key.rpartition(".")
+        place = settings.setdefault(group, {}) if group else settings
+        place[name] = text if key in WORDS and not text.isdecimal() else _numbers(name, text)
+    return settings
+
+
+def _numbers(key: str, text: str) -> float | int | list[float] | list[int]:
+    """One number, or one for each of several joints or files."""
     try:
-        guess, doubt = map_columns(list(table), joints, {}), ""
-    except InputError as error:
-        guess, doubt = None, str(error)
-    return Preview(joints, list(table), rows, guess, doubt)
+        numbers = [float(part) for part in re.split(r"[\s,;]+", text.strip(" ,;[]\t\n"))]
+    except ValueError:
+        raise InputError(f"{key}: '{text}' is no number") from None
+    whole = [int(one) for one in numbers if one.is_integer()]
+    if key == "initialisation" and len(whole) == len(numbers):
+        return whole
+    if key.endswith("_unit") and whole:
+        return whole[0]
+    return numbers[0] if len(numbers) == 1 else numbers
 
 
 @as_input_errors
-def import_logs(
-    out: Path,
-    files: Sequence[Path],
-    urdf: Path,
-    controller: Mapping[str, Any],
-    before: Recording | None = None,
-    **settings: Any,
-) -> tuple[Recording, list[str]]:
-    """Write logs as a recording, read it back, and return it with what was understood and what is odd, a line each.
+def import_logs(out: Path, given: Mapping[str, Any], before: Recording | None = None) -> tuple[Recording, list[str]]:
+    """Write logs as a recording, as `record source=csv` does, and read it back.
 
     Args:
         out: folder to write.
-        files: one trial each.
-        urdf: of the rig.
-        controller: kp, kd, ...
+        given: settings of `record source=csv`.
         before: a recording of the same rig to whose trials they are added, as trials of one more initialisation. Where
-            `controller` says nothing its gains hold; what its owner believes stays.
-        settings: others of `record source=csv`: columns, angle_unit, length, ...
+            `given` says nothing of the controller its gains hold; what its owner believes stays.
+
+    Returns:
+        The recording, and what was understood and what is odd, a line each.
 
     Raises:
         InputError: what cannot be used: file, column or row, the value, what to do.
     """
     require_free(out)
+    controller = dict(given.get("controller", {}))
     known = {} if before is None else before.description.controller.model_dump(exclude_none=True)
-    made = CsvFiles([str(file) for file in files], str(urdf), {**controller, **known}, **settings).recordings(0)[""]
+    settings = source_settings("csv", {**given, "controller": {**controller, **known}})
+    made = recording_tables(settings, "csv", 0)[""]
     understood = [_in_a_line(*row) for row in made.understood]
     write_recordings(out, {"": made if before is None else _added(before, made, controller)})
     return read_recording(out), understood
@@ -151,7 +258,7 @@ def _added(before: Recording, made: RecordingTables, controller: Mapping[str, An
         old.append(TrialTable(entry, columns.time, columns.command, columns.position, columns.torque, path))
     both = [*old, *made.tables]
     initialisation = 1 + max(entry.initialisation for entry in before.description.trials)
-    gains = ControllerChange(**{key: value for key, value in controller.items() if key != "mode"})
+    gains = ControllerChange(**{key: value for key, value in controller.items() if key in GAINS})
     groups = kinds_of([Path(one.entry.file).stem for one in both], [one.command for one in both], before.step)
     kinds = {group: one.entry.kind for group, one in zip(groups, old, strict=False)}
     new = []

@@ -24,10 +24,11 @@ from tactile_cube.measurement.units import milli
 from tactile_cube.visualization.charts import FLOOR, SIMULATED
 from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, signals
 from tactile_cube.workbench.desk import Desk
-from tactile_cube.workbench.importing import RIGS, TABLES
+from tactile_cube.workbench.import_form import ImportForm
+from tactile_cube.workbench.importing import LOGS, RIGS
 from tactile_cube.workbench.state import ModelStage, Value, Workbench
 from tactile_cube.workbench.text import LABEL, Html, choose, html, listed, plain, show
-from tactile_cube.workbench.widgets import NONE, RED, YELLOW, ImportForm, button, column_of, row_of, text_of
+from tactile_cube.workbench.widgets import NONE, RED, YELLOW, button, column_of, row_of, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
 DOWNLOAD = Html('<a href="next_experiment.csv" download>Download CSV</a>')
@@ -72,7 +73,7 @@ class Page:
 
     def _open_part(self) -> LayoutDOM:
         self.path = TextInput(title="Folder of a recording, logs (*.csv), URDF or model.yaml", width=460)
-        files = FileInput(accept=",".join((*TABLES, *RIGS)), multiple=True, title="or drop files anywhere")
+        files = FileInput(accept=",".join((*LOGS, *RIGS)), multiple=True, title="or drop files anywhere")
         # names come after contents
         take = functools.partial(self._take, files)
         files.on_change("value", lambda attr, old, new: self.document.add_next_tick_callback(take))
@@ -236,7 +237,7 @@ class Page:
         problem = listed([desk.problem] if desk.problem else [], RED)
         doubts = [one for one in desk.notes if one.startswith(("warning: ", "guess: "))]
         notes = html(listed(doubts, YELLOW), listed(one for one in desk.notes if one not in doubts))
-        hint = "" if desk.bench or desk.logs else "Open a recording, or drop logs and the URDF of their rig."
+        hint = "" if desk.bench or desk.waiting.logs else "Open a recording, or drop logs."
         live = Html('<div role="status" aria-live="polite">{}</div>')
         show(self.status, live.format(html(busy, problem, notes, hint)))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import signal
 import sys
 import webbrowser
 from collections.abc import Iterator
@@ -71,7 +72,10 @@ def start(desk: Desk, port: int = 0) -> tuple[BaseServer, str]:
 
 
 def serve(job: Job) -> None:
-    """Serve until Ctrl-C; what it writes is its user's alone, and the token stands in no log and no command line."""
+    """Serve until Ctrl-C or SIGTERM, which end a diagnosis that runs too.
+
+    What it writes is its user's alone, and the token stands in no log and no command line.
+    """
     from tactile_cube.workbench.desk import Desk
 
     logging.getLogger("bokeh").setLevel(logging.ERROR)
@@ -85,10 +89,10 @@ def serve(job: Job) -> None:
         desk.open(str(config.recording))
     print(f"workbench: {address}\nCtrl-C ends it", file=sys.__stdout__, flush=True)  # past the log
     with _opened(job.folder / "open.html", address) if config.open else contextlib.nullcontext():
-        try:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with contextlib.suppress(KeyboardInterrupt):
             server.io_loop.start()
-        except KeyboardInterrupt:
-            desk.stop()
+        desk.end()
 
 
 @contextlib.contextmanager

@@ -23,8 +23,7 @@ from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.description import TrialEntry
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording, write_recordings
-from tactile_cube.measurement.sources.csv_files import CsvFiles
-from tactile_cube.measurement.sources.source import described
+from tactile_cube.measurement.sources.source import described, recording_tables, source_settings
 from tactile_cube.training.checkpoint import Checkpoints
 from tactile_cube.training.settings import TrainingSettings
 from tests.measurement.small_rig import URDF, Table, table, write
@@ -110,8 +109,8 @@ def test_an_imported_log_is_the_motion_that_was_logged(tick: float, degrees: boo
         place = Path(name)
         (place / "rig.urdf").write_text(URDF)
         polars.DataFrame({"time": columns["time"] * tick} | log).write_csv(place / "log.csv")
-        source = CsvFiles(files=[str(place / "log.csv")], urdf=str(place / "rig.urdf"), controller=GAINS)
-        write_recordings(place / "out", source.recordings(0))
+        said = {"files": [str(place / "log.csv")], "urdf": str(place / "rig.urdf"), "controller": GAINS}
+        write_recordings(place / "out", recording_tables(source_settings("csv", said), "csv", 0))
         trial = read_recording(place / "out").trials[0]
     assert np.allclose(trial.position[:, 1], columns["b.position"], atol=1e-6)
 
@@ -176,8 +175,8 @@ def test_no_command_puts_what_lies_outside_of_a_recording_into_its_files(tmp_pat
     nothing_missing = {"criteria.floor": 1e8, "criteria.adequate": 1e9}
     tactile_cube.diagnose(evil, values=nothing_missing, **settings).write(tmp_path / "diagnose")
     polars.read_parquet(evil / "first.parquet").write_csv(tmp_path / "log.csv")
-    source = CsvFiles(files=[str(tmp_path / "log.csv")], urdf=str(evil / "rig.urdf"), controller=GAINS)
-    write_recordings(tmp_path / "record", source.recordings(0))
+    said = {"files": [str(tmp_path / "log.csv")], "urdf": str(evil / "rig.urdf"), "controller": GAINS}
+    write_recordings(tmp_path / "record", recording_tables(source_settings("csv", said), "csv", 0))
     for command in ("compare", "identify", "monitor", "diagnose", "record"):
         written = [file for file in (tmp_path / command).rglob("*") if file.is_file()]
         assert written

@@ -15,8 +15,7 @@ from tactile_cube.measurement.recordings.rig import RigJoint
 from tactile_cube.measurement.recordings.tables import read_table
 from tactile_cube.measurement.recordings.writing import write_recordings
 from tactile_cube.measurement.sources import units
-from tactile_cube.measurement.sources.csv_files import CsvFiles
-from tactile_cube.measurement.sources.source import rate_of
+from tactile_cube.measurement.sources.source import rate_of, recording_tables, source_settings
 from tactile_cube.measurement.sources.units import position_unit, same_unit
 from tests.measurement.small_rig import URDF, table
 
@@ -38,7 +37,7 @@ def imported(folder: Path, logs: dict[str, Frame | str], urdf: str = URDF, **cha
         else:
             polars.DataFrame(log).write_csv(folder / name)
     settings = {"files": [str(folder / name) for name in logs], "urdf": str(folder / "rig.urdf"), "controller": GAINS}
-    write_recordings(folder / "out", CsvFiles(**(settings | changes)).recordings(0))  # type: ignore[arg-type]
+    write_recordings(folder / "out", recording_tables(source_settings("csv", settings | changes), "csv", 0))
     return read_recording(folder / "out")
 
 

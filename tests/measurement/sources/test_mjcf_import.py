@@ -10,7 +10,7 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recordings
 from tactile_cube.measurement.replay.nominal import nominal_model
-from tactile_cube.measurement.sources.csv_files import CsvFiles
+from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tests.measurement.small_rig import table
 
 ARM = """<mujoco><compiler angle="radian"/><worldbody><body name="upper"><joint name="a" axis="0 1 0" armature="0.003"
@@ -25,8 +25,8 @@ MOTORS = '<actuator><motor joint="a"/><motor joint="b"/></actuator>'
 def imported(folder: Path, actuators: str, **said: dict[str, float]) -> Recording:
     (folder / "arm.xml").write_text(ARM.replace("ACTUATORS", actuators))
     polars.DataFrame(table()).write_csv(folder / "log.csv")
-    source = CsvFiles([str(folder / "log.csv")], str(folder / "arm.xml"), said.pop("controller", {}), **said)
-    write_recordings(folder / "out", source.recordings(0))
+    settings = {"files": [str(folder / "log.csv")], "urdf": str(folder / "arm.xml"), **said}
+    write_recordings(folder / "out", recording_tables(source_settings("csv", settings), "csv", 0))
     return read_recording(folder / "out")
 
 

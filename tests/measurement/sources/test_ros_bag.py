@@ -9,6 +9,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.measurement.sources.ros_bag import RosBag
+from tactile_cube.measurement.sources.source import source_settings
 from tests.measurement.small_rig import URDF, table
 from tests.measurement.sources.small_bag import write_bag
 
@@ -34,7 +35,7 @@ def source(bag: Path, **changes: object) -> RosBag:
         "joints": ["a", "b"],
         "controller": {"kp": 3.0, "kd": 0.2, "torque_limit": 1.0},
     }
-    return RosBag(**(settings | changes))  # type: ignore[arg-type]
+    return RosBag(**{k: v for k, v in source_settings("mcap", settings | changes).items() if k != "_target_"})
 
 
 def test_a_bag_becomes_a_recording_by_joint_names(bag: Path, tmp_path: Path) -> None:

@@ -44,7 +44,8 @@ def tolerance(recording: Recording) -> dict[str, tuple[float, float]]:
         wide["kp"] = MEASURED
     if any(trial.clamped for trial in recording.trials):
         wide["stiffness"] = MEASURED
-    return TOLERANCE | wide | dict.fromkeys(recording.description.unknown, UNKNOWN)
+    unknown = [key for key in recording.description.unknown if key != "mass"]  # which is an effect's
+    return TOLERANCE | wide | dict.fromkeys(unknown, UNKNOWN)
 
 
 def base_unknowns(

@@ -137,7 +137,7 @@ class Description(Strict):
     trials: Annotated[list[TrialEntry], Field(min_length=1)]
     source: str = ""  # where the data come from
     # what nobody states; the numbers given for it are guesses, and identification begins with them
-    unknown: list[Literal["kp", "kd", "reflected_inertia"]] = Field(default_factory=list)
+    unknown: list[Literal["kp", "kd", "reflected_inertia", "mass"]] = Field(default_factory=list)
     doubts: list[str] = Field(default_factory=list)  # what the import could not prove, and what it left out
 
     @model_validator(mode="after")

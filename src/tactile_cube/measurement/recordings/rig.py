@@ -56,7 +56,10 @@ class Rig:
     path: Path  # the file it was read from
     joints: dict[str, RigJoint]  # movable joints by name
     stated: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # constant of the drives -> joint -> value
+    stated_by: str = ""  # who states them, if not the file
     left_out: tuple[str, ...] = ()  # what the file says beside the mechanism and is not used
+    unknown: tuple[str, ...] = ()  # of the constants, and `mass`, those that are guesses
+    doubts: tuple[str, ...] = ()  # what is guessed of it, for people
 
     @property
     def gains(self) -> dict[str, Mapping[str, float]]:
@@ -72,7 +75,7 @@ class Rig:
         """What the file states of drives, for people: what, how, and what told it."""
         for key, row in self.stated.items():
             values = [f"{row[joint]:.4g}" for joint in joints if joint in row]
-            yield f"{key}", ", ".join(values), f"{self.path.name}, where you state none"
+            yield f"{key}", ", ".join(values), f"{self.stated_by or self.path.name}, where you state none"
         for line in self.left_out:
             yield "not used", line, self.path.name
 

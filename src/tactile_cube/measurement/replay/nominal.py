@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
 from tactile_cube.errors import InputError
+from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.consistency import DEFAULTS, EFFECTS
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, terms_of
@@ -63,7 +64,7 @@ def _effects(recording: Recording, known: ModelFile | None) -> list[EffectEstima
     """What is known of effects, or stated of them and may be wrong by `STATED`."""
     if known is not None:
         return known.drive_effects
-    return [
+    return _unknown_masses(recording) + [
         EffectEstimate(
             effect=f"{effect}@{joint}",
             parameters={parameter: Estimate(value=v, low=(1.0 - STATED) * v, high=(1.0 + STATED) * v)},
@@ -71,6 +72,22 @@ def _effects(recording: Recording, known: ModelFile | None) -> list[EffectEstima
         for effect, parameter in EFFECTS.items()
         for joint, v in zip(recording.joints, recording.nominal.get(effect, np.zeros(0)), strict=False)
         if v > 0.0
+    ]
+
+
+def _unknown_masses(recording: Recording) -> list[EffectEstimate]:
+    """Masses of links that are guesses: more or less where they are now, by as much as they are or less."""
+    if "mass" not in recording.description.unknown:
+        return []
+    return [
+        EffectEstimate(
+            effect=f"payload@{joint}",
+            parameters={
+                "mass": Estimate(value=0.0, low=-one.mass, high=one.mass),
+                "distance": Estimate.model_validate(one.lever),
+            },
+        )
+        for joint, one in zip(recording.joints, joint_scales(recording), strict=True)
     ]
 
 

@@ -3,10 +3,10 @@
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from glob import glob
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,14 @@ from tactile_cube.errors import InputError
 from tactile_cube.measurement.comparing.noise_floor import lag_between
 from tactile_cube.measurement.recordings.columns import SIGNALS, TrialColumns
 from tactile_cube.measurement.recordings.consistency import gains_of
-from tactile_cube.measurement.recordings.description import Description, TrialEntry
+from tactile_cube.measurement.recordings.description import Description, PerJoint, TrialEntry
 from tactile_cube.measurement.recordings.plausibility import torque_over_law
-from tactile_cube.measurement.recordings.rig import Rig, RigJoint, read_rig
+from tactile_cube.measurement.recordings.rig import Rig, RigJoint
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, cut_trial
 from tactile_cube.measurement.sources.column_map import NEEDED, ColumnMap, map_columns
 from tactile_cube.measurement.sources.gains import estimated_gains, gain_doubts
 from tactile_cube.measurement.sources.log_file import Log, read_logs
+from tactile_cube.measurement.sources.mechanism import Mechanism
 from tactile_cube.measurement.sources.source import described, rate_of, with_stated
 from tactile_cube.measurement.sources.tidy import apart, joined, trials_of, without_equal_rows
 from tactile_cube.measurement.sources.units import (
@@ -52,27 +53,32 @@ class CsvFiles:
     """Imports logs; conf/source/csv.yaml says what each setting means, and its units."""
 
     files: Iterable[str]
-    urdf: str
-    controller: Mapping[str, float | str | None]
-    columns: Mapping[str, str | Mapping[str, str]] | None = None
-    nominal: Mapping[str, float | None] = field(default_factory=dict)
-    gravity: Iterable[float] = (0.0, 0.0, -9.81)
-    rate: float | None = None
-    angle_unit: str | int | None = None
-    length_unit: str | None = None
-    time_unit: str | None = None
-    torque_unit: str | None = None
-    calibration: str | None = None
-    gear: float | None = None
-    read: str = "after"
-    resolution: float = 0.0
-    length: float | None = None
-    initialisation: Iterable[int] | None = None
-    kind: Iterable[str] | None = None
+    urdf: str | None
+    robot: str | None
+    mass: float | None
+    lever: float | None
+    servo: str | None
+    gain: float | None
+    controller: Mapping[str, Any]
+    columns: Mapping[str, str | Mapping[str, str]] | None
+    nominal: Mapping[str, PerJoint | None]
+    gravity: Iterable[float]
+    rate: float | None
+    angle_unit: str | int | None
+    length_unit: str | None
+    time_unit: str | None
+    torque_unit: str | None
+    calibration: str | None
+    gear: float | None
+    read: str
+    resolution: float
+    length: float | None
+    initialisation: Iterable[int] | None
+    kind: Iterable[str] | None
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
-        mode, rig = str(self.controller.get("mode") or "position"), read_rig(Path(self.urdf))
+        mode, rig = str(self.controller.get("mode") or "position"), self._mechanism.rig()
         if mode not in NEEDED:
             raise InputError(f"source.controller.mode={mode}: unknown; choose one of {', '.join(NEEDED)}")
         left: list[str] = []
@@ -88,8 +94,10 @@ class CsvFiles:
         trials = [_trial(piece, columns, units, second, self.rate) for piece in pieces]
         rate = self.rate if self.rate is not None else rate_of(trials[0].time, 3, str(pieces[0].path))
         trials = self._named(trials, pieces, logs, 1 / rate)
+        pull = float(np.linalg.norm(list(self.gravity)))
+        rig = self._mechanism.sized(rig, trials, mode, self.controller.get("kp"), pull)
         description = self._description(trials, list(columns.joints), rig, rate, mode)
-        doubts = [*columns.doubts, *_doubts(units, columns, trials, description, rig)]
+        doubts = [*columns.doubts, *rig.doubts, *_doubts(units, columns, trials, description, rig)]
         doubts += [f"left out: {reason}" for reason in left]
         by = "source.kind" if self.kind is not None else "file names and commands"
         count = Counter(trial.entry.kind for trial in trials)
@@ -99,6 +107,10 @@ class CsvFiles:
         tables = [piece for trial in trials for piece in cut_trial(trial, self.length)]
         description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts))})
         return {"": RecordingTables(description, rig.text, tables, [row for row in understood if row[1]])}
+
+    @property
+    def _mechanism(self) -> Mechanism:
+        return Mechanism(self.urdf, self.robot, self.mass, self.lever, self.servo, self.gain)
 
     def _logs(self, joints: Sequence[str], mode: str) -> list[Log]:
         """All logs, each under a name of its own."""
@@ -192,12 +204,14 @@ class CsvFiles:
         """What recording.yaml is to say; gains that nobody states are unknown, and begin where the log has them."""
         said = with_stated({k: v for k, v in self.controller.items() if k not in ("kt", "R")}, rig.gains, joints)
         nominal = with_stated(self.nominal, rig.nominal, joints)
-        unknown: list[str] = []
+        stated = {key for key, value in [*self.controller.items(), *self.nominal.items()] if value is not None}
+        unknown = [key for key in rig.unknown if key not in stated and (key != "kd" or mode == "position")]
         if mode == "position":
-            unknown = [key for key in ("kp", "kd") if key not in said]
-            unknown += [key for key in ("reflected_inertia",) if unknown and key not in nominal]
-            found = estimated_gains(trials, joints, rig, tuple(self.gravity)) if unknown else {}
-            for key in unknown:
+            lacking = [key for key in ("kp", "kd") if key not in said]
+            lacking += [key for key in ("reflected_inertia",) if lacking and key not in nominal]
+            unknown = list(dict.fromkeys([*unknown, *lacking]))
+            found = estimated_gains(trials, joints, rig, tuple(self.gravity)) if lacking else {}
+            for key in lacking:
                 values = {joint: float(f"{found[key][k]:.4g}") for k, joint in enumerate(joints)}
                 (nominal if key == "reflected_inertia" else said)[key] = values
         elif mode == "voltage":
@@ -295,7 +309,7 @@ def _doubts(
                 open_.setdefault(unit.doubt, []).append(columns.joints[joint][signal])
     for doubt, names in open_.items():
         yield f"{', '.join(names)}: {doubt}"
-    for key in description.unknown:
+    for key in [key for key in description.unknown if key not in rig.unknown]:
         begins = getattr(description.controller, key, description.nominal.get(key))
         yield f"{key} is not stated: unknown, to be identified from {begins}, a guess"
     if description.controller.mode == "position":

@@ -34,28 +34,33 @@ def estimated_gains(
         tree = RigidBodyTree.from_urdf(rig.text, tuple(joints))
     except InputError as error:
         raise InputError(f"{rig.path}: {error}") from None
-    usable = [trial for trial in trials if len(trial.time) > FEWEST and np.abs(trial.position).max() < limits.NUMBER]
-    motion = np.concatenate([_motion(trial) for trial in usable] or [np.zeros((0, 4, len(joints)))])
-    motion = motion[np.isfinite(motion).all(axis=(1, 2))][:: max(1, len(motion) // MOST)]
+    motion = motion_of(trials, len(joints))
     if not len(motion):
         return {key: [float(key != "told")] * len(joints) for key in FOUND}
-    q, v, a, apart = motion.transpose(1, 0, 2)
+    q, v, a, apart, _ = motion.transpose(1, 0, 2)
     links = tree.inverse_dynamics(q, v, a, np.asarray(gravity))
     inertia = tree.actuated_mass_matrix(q.mean(axis=0)).diagonal().tolist()
     rows = [_loop(*columns) for columns in zip(apart.T, links.T, v.T, a.T, inertia, strict=True)]
     return {key: [row[k] for row in rows] for k, key in enumerate(FOUND)}
 
 
+def motion_of(trials: Sequence[TrialTable], joints: int) -> Array:
+    """Position, velocity, acceleration, error of the loop and command (n, 5, joints) of some samples of all trials."""
+    usable = [trial for trial in trials if len(trial.time) > FEWEST and np.abs(trial.position).max() < limits.NUMBER]
+    motion = np.concatenate([_motion(trial) for trial in usable] or [np.zeros((0, 5, joints))])
+    return np.asarray(motion[np.isfinite(motion).all(axis=(1, 2))][:: max(1, len(motion) // MOST)])
+
+
 def _motion(trial: TrialTable) -> Array:
-    """Position, velocity, acceleration and error of the loop (n, 4, joints)."""
     step = float(np.median(np.diff(trial.time)))
     rows = max(1, min(round(WINDOW / max(step, 1e-9)), len(trial.time) // 4))
     smooth = np.stack([np.convolve(column, np.ones(rows) / rows, "valid") for column in trial.position.T], axis=1)
     with np.errstate(all="ignore"):
         velocity = np.gradient(smooth, step, axis=0)
         acceleration = np.gradient(velocity, step, axis=0)
-    error = (trial.command - trial.position)[(rows - 1) // 2 :][: len(smooth)]
-    return np.stack([smooth, velocity, acceleration, error], axis=1)
+    middle = slice((rows - 1) // 2, (rows - 1) // 2 + len(smooth))
+    error = (trial.command - trial.position)[middle]
+    return np.stack([smooth, velocity, acceleration, error, trial.command[middle]], axis=1)
 
 
 @np.errstate(all="ignore")

@@ -23,6 +23,8 @@ Step = tuple[str, str]
 WIDEST = 64  # columns that a list is expanded to; more are pictures
 PERIODS = {"dt": 1.0, "rate": -1.0, "fps": -1.0, "sample_rate": -1.0}
 """Names of a constant that says how far rows are apart, and the power of it that is seconds."""
+LEROBOT = Path("meta", "info.json")
+"""What a LeRobot data set says of its columns, in its folder."""
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
 CLOCK = r"^\s*(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)\s*$"
 DAY, YEAR = 86400.0, 3.15e7  # [s]; dates count from 1970
@@ -67,14 +69,10 @@ def read_logs(path: Path) -> list[Log]:
     """
     if path.is_dir():
         return [read_logs(file)[0] for file in _lerobot_files(path)]
-    readers: dict[str, Callable[[Path], Log]] = {
-        ".parquet": _frame_log, ".npz": lambda file: _arrays_log(file, read_npz(file)), ".mat": _mat, ".json": _json,
-    }  # fmt: skip
-    readers |= dict.fromkeys(CSV, _frame_log)
     suffix = path.suffix.lower()
-    if suffix not in readers:
-        raise unknown_ending(path, f"{', '.join(readers)}, or the folder of a LeRobot data set")
-    return [replace(readers[suffix](regular(path)), name=path.stem)]
+    if suffix not in READERS:
+        raise unknown_ending(path, f"{', '.join(READERS)}, or the folder of a LeRobot data set")
+    return [replace(READERS[suffix](regular(path)), name=path.stem)]
 
 
 def _frame_log(path: Path) -> Log:
@@ -281,7 +279,7 @@ def _scalars(row: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 def _lerobot_files(folder: Path) -> list[Path]:
     """The tables of a LeRobot data set (version 2 or 3)."""
-    if not (folder / "meta" / "info.json").is_file():
+    if not (folder / LEROBOT).is_file():
         raise InputError(f"{folder}: a folder, and no LeRobot data set (no meta/info.json); name its files: {folder}/*")
     files = [below(folder, str(one.relative_to(folder)), str(folder)) for one in folder.glob("data/**/*.parquet")]
     if not files:
@@ -292,7 +290,7 @@ def _lerobot_files(folder: Path) -> list[Path]:
 def _lerobot_names(path: Path) -> dict[str, list[str]]:
     """What meta/info.json beside a table calls the numbers of its lists."""
     places = [path.parent, *path.parents[2:3]]
-    info = next((place / "meta" / "info.json" for place in places if (place / "meta" / "info.json").is_file()), None)
+    info = next((place / LEROBOT for place in places if (place / LEROBOT).is_file()), None)
     if info is None or path.suffix.lower() != ".parquet":
         return {}
     try:
@@ -302,3 +300,13 @@ def _lerobot_names(path: Path) -> dict[str, list[str]]:
         raise InputError(f"{info}: not the description of a LeRobot data set: {error!r}") from None
     lists = {name: next(iter(one.values()), None) if isinstance(one, dict) else one for name, one in named.items()}
     return {name: [str(one) for one in names] for name, names in lists.items() if isinstance(names, list)}
+
+
+READERS: Mapping[str, Callable[[Path], Log]] = {
+    **dict.fromkeys(CSV, _frame_log),
+    ".parquet": _frame_log,
+    ".npz": lambda file: _arrays_log(file, read_npz(file)),
+    ".mat": _mat,
+    ".json": _json,
+}
+"""Ending of a file that may be a log -> what reads it."""

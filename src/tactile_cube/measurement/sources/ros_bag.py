@@ -1,7 +1,7 @@
 """A ROS 2 bag in MCAP (joint states and commands) as a recording; needs the extra `ros`, but no ROS."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.description import TrialEntry
+from tactile_cube.measurement.recordings.description import PerJoint, TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described, rate_of, with_stated
@@ -30,13 +30,13 @@ class RosBag:
     files: Iterable[str]
     urdf: str
     joints: Iterable[str]
-    controller: Mapping[str, float | None]
-    states: str = "/joint_states"
-    commands: str = "/joint_commands"
-    nominal: Mapping[str, float | None] = field(default_factory=dict)
-    gravity: Iterable[float] = (0.0, 0.0, -9.81)
-    rate: float | None = None
-    read: str = "before"
+    controller: Mapping[str, PerJoint | None]
+    states: str
+    commands: str
+    nominal: Mapping[str, PerJoint | None]
+    gravity: Iterable[float]
+    rate: float | None
+    read: str
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all bags."""

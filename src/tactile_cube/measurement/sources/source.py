@@ -2,13 +2,18 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields
+from functools import cache
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
+from hydra.utils import get_class
 from numpy.typing import NDArray
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import OmegaConf
 
 from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import composed
+from tactile_cube.did_you_mean import suggestion
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables
@@ -70,17 +75,51 @@ def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
     return float(np.round(exact, digits))
 
 
-def require_settings(source: DictConfig, option: str) -> None:
-    """Refuse a source without its mandatory settings, naming all of them and what its file says of each.
+def source_settings(option: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of `record source=OPTION` with others in their place, those of mappings key by key.
+
+    For programs: what is given may be the words of strangers' files, and no configuration interprets them.
+    """
+    settings = dict(_shipped(option))
+    for key, value in given.items():
+        old = settings.get(key)
+        settings[key] = {**old, **value} if isinstance(old, dict) and isinstance(value, Mapping) else value
+    return settings
+
+
+@cache
+def _shipped(option: str) -> dict[str, Any]:
+    return dict(OmegaConf.to_container(composed("record", [f"source={option}"]).source))  # type: ignore[arg-type]
+
+
+def recording_tables(settings: Mapping[str, Any], option: str, seed: int) -> dict[str, RecordingTables]:
+    """Make recordings from a source's settings, as the command, the workbench and programs do.
+
+    Args:
+        settings: of conf/source, whole; `_target_` is their source's class.
+        option: its name in conf/source.
+        seed: of simulated ones.
 
     Raises:
-        InputError: some are missing.
+        InputError: settings that are missing or that the source does not have, and what the source itself refuses.
     """
-    missing = sorted(OmegaConf.missing_keys(source))
+    source = get_class(settings["_target_"])
+    given = {key: value for key, value in settings.items() if key != "_target_"}
+    known = {one.name: one.default is MISSING and one.default_factory is MISSING for one in fields(source)}
+    for key in given.keys() - known:
+        raise InputError(f"source.{key}: source={option} has no such setting{suggestion(key, known)}")
+    _require([key for key, needed in known.items() if given.get(key, "???" if needed else None) == "???"], option)
+    made: dict[str, RecordingTables] = source(**given).recordings(seed)
+    return made
+
+
+def _require(missing: Sequence[str], option: str) -> None:
+    """Refuse a source without its mandatory settings, naming all of them and what its file says of each."""
     if missing:
         text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
-        found = [re.search(rf"^ *{key.rpartition('.')[2]}: \?\?\? *# *(.*)$", text, re.MULTILINE) for key in missing]
+        found = [re.search(rf"^ *{key}: \?\?\? *# *(.*)$", text, re.MULTILINE) for key in missing]
         said = [
-            f"{key}=..." + (f" ({meaning[1]})" if meaning else "") for key, meaning in zip(missing, found, strict=True)
+            f"source.{key}=..." + (f" ({meaning[1]})" if meaning else "")
+            for key, meaning in zip(missing, found, strict=True)
         ]
         raise InputError(f"source={option} needs {'; '.join(said)}")
