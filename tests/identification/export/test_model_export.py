@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 import tactile_cube
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.errors import InputError
+from tactile_cube.export import main
 from tactile_cube.hand.mjcf import read_mjcf
 from tactile_cube.identification.export.joint_drive import drives_of
 from tactile_cube.measurement.recordings.recording import Recording
@@ -200,3 +202,12 @@ def test_a_model_names_no_recording_outside_of_the_users_folder(
     with pytest.raises(InputError, match=said):
         tactile_cube.export_model("m.yaml", "mjcf")
     assert not list(Path().glob("*.xml"))
+
+
+def test_a_format_without_a_model_is_no_policys(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["export", "format=mjcf", f"hydra.run.dir={tmp_path}"])
+    with pytest.raises(SystemExit):
+        main()
+    assert "format=mjcf: give model=model.yaml" in capsys.readouterr().err
