@@ -1,4 +1,4 @@
-"""The published friction models M1 to M6 in a simulator like their authors', all runs at once.
+"""Published friction models (M1 to M6) in a simulator like their authors', all runs at once.
 
 Source: Duclusaud et al., Extended friction models for the physics simulation of servo actuators, ICRA 2025, arXiv
 2410.08650; github.com/Rhoban/bam. A model without a term has a zero in its place.
@@ -16,8 +16,8 @@ from benchmarks.servos.servo import Run, Servo
 Array = NDArray[np.float64]
 STEP = 0.005  # [s] of the authors' simulator
 GRAVITY = 9.80665
-UNUSED = {"dtheta_stribeck": 1.0, "alpha": 1.0}
-"""Where a zero would divide by zero."""
+UNUSED = {"dtheta_stribeck": 1.0, "alpha": 1.0, "max_velocity": np.inf}
+"""What a model without them has: a zero would divide by zero, or hold the command."""
 
 
 def published(servo: str) -> dict[str, dict[str, float]]:
@@ -41,10 +41,11 @@ def simulated(servo: Servo, runs: Sequence[Run], parameters: Mapping[str, float]
     gains = servo.duty * np.array([run.gain for run in runs])
     offset = p["q_offset"]
     q, v = np.array([run.position[0] for run in runs]) + offset, np.zeros(len(runs))
-    path = np.empty((len(runs), longest))
+    path, target = np.empty((len(runs), longest)), goal[:, 0]
     for k in range(longest):
         path[:, k] = q - offset
-        duty = np.clip(gains * (goal[:, k] - path[:, k]), -servo.most_duty, servo.most_duty)
+        target = target + np.clip(goal[:, k] - target, -STEP * p["max_velocity"], STEP * p["max_velocity"])
+        duty = np.clip(gains * (target - path[:, k]), -servo.most_duty, servo.most_duty)
         motor = p["kt"] / p["R"] * (volts * duty - back_emf * v)
         load = -(mass + servo.rod / 2) * GRAVITY * length * np.sin(q)
         stop = inertia / STEP * v + motor + load
