@@ -71,6 +71,10 @@ def run_model_export(
     config = job.config
     if config.format not in ENDINGS:
         raise InputError(f"format={config.format}: choose one of {', '.join(ENDINGS)} for model={config.model}")
+    if config.model is None and model is None:
+        raise InputError(
+            f"format={config.format}: give model=model.yaml of identify or diagnose; a policy has no format"
+        )
     known = as_model(config.model if model is None else model)
     output = Path(config.output or f"{Path(known.rig).name or 'model'}.{ENDINGS[config.format]}")
     if config.format == "bam":

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 import tactile_cube
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.errors import InputError
+from tactile_cube.export import main
 from tactile_cube.hand.mjcf import read_mjcf
 from tactile_cube.identification.export.joint_drive import drives_of
 from tactile_cube.measurement.recordings.recording import Recording
@@ -34,6 +36,7 @@ HELD = [
     {"effect": "payload@elbow", "parameters": {"mass": 0.05, "distance": 0.1}},
 ]
 SUPPLY = [{"effect": "back_emf@elbow", "parameters": {"stall": 0.6, "no_load": 5.0}}, HELD[0]]
+RATE = {"effect": "rate_limit@elbow", "parameters": {"speed": 0.8}}
 
 
 def model(*effects: dict[str, object], **values: float) -> ModelFile:
@@ -61,6 +64,7 @@ def played(text: str, trial: Trial, recording: Recording, stiffness: float) -> N
     spec = mujoco.MjModel.from_xml_string(text)
     data, steps = mujoco.MjData(spec), round(recording.step / spec.opt.timestep)
     data.qpos[:] = trial.position[0]
+    data.act[:] = trial.command[0]
     for k in np.flatnonzero(spec.actuator_delay):
         past = np.full((spec.actuator_history[k, 0], 1), trial.command[0, 0])
         mujoco.mj_initCtrlHistory(spec, data, k, None, past)
@@ -74,8 +78,8 @@ def played(text: str, trial: Trial, recording: Recording, stiffness: float) -> N
 
 @pytest.mark.parametrize(
     ("effects", "stiffness"),
-    [(HELD, np.inf), (SUPPLY, np.inf), (HELD[:3], 25.0)],
-    ids=["position", "dcmotor", "elastic"],
+    [(HELD, np.inf), (SUPPLY, np.inf), ([*SUPPLY, HELD[1], RATE], np.inf), ([RATE], np.inf), (HELD[:3], 25.0)],
+    ids=["position", "dcmotor", "servo", "rate", "elastic"],
 )
 def test_mujoco_plays_the_file_as_far_from_the_machine_as_our_simulator(
     effects: list[dict[str, object]], stiffness: float, recording: Recording, tmp_path: Path
@@ -93,6 +97,19 @@ def test_mujoco_plays_the_file_as_far_from_the_machine_as_our_simulator(
     ]
     assert errors[1] == pytest.approx(errors[0], rel=0.1)
     assert np.sqrt(np.mean(np.concatenate([a - b for a, b in zip(ours, theirs, strict=True)]) ** 2)) < 0.1 * errors[0]
+
+
+def test_a_motors_voltage_gets_a_dcmotor_with_its_back_emf(recording: Recording, tmp_path: Path) -> None:
+    controller = recording.description.controller.model_copy(update={"mode": "voltage"})
+    driven = replace(recording, description=recording.description.model_copy(update={"controller": controller}))
+    known = model(HELD[3], torque_limit=np.inf, static_friction=0.0)
+    made = tactile_cube.export_model(known, "mjcf", tmp_path / "arm.xml", recording=driven)
+    spec = mujoco.MjModel.from_xml_path(str(made.output))
+    data = mujoco.MjData(spec)
+    data.ctrl[:], data.qvel[:] = 0.4, 2.0
+    mujoco.mj_forward(spec, data)
+    assert data.qfrc_actuator == pytest.approx(1.1 * 0.4 - 1.1 * 0.25 * 2.0)
+    assert made.not_held == []
 
 
 def test_the_file_read_again_states_the_same_drive(recording: Recording, tmp_path: Path) -> None:
@@ -151,7 +168,7 @@ def test_a_urdf_gets_friction_damping_and_effort(recording: Recording, tmp_path:
 def test_bam_gets_its_own_names_and_the_motor_that_has_these_gains(tmp_path: Path) -> None:
     stribeck = {"effect": "stribeck_friction@elbow", "parameters": {"excess": 0.02, "velocity": 0.2, "exponent": 1.5}}
     bam = {"bam.actuator": "sts3215", "bam.volts": 40}
-    made = tactile_cube.export_model(model(stribeck, *HELD[:2]), "bam", tmp_path / "arm.json", values=bam)
+    made = tactile_cube.export_model(model(stribeck, *HELD[:2], RATE), "bam", tmp_path / "arm.json", values=bam)
     data = json.loads(made.output.read_text())
     assert made.not_held == data.pop("not_held") == ["elbow: torque_limit 0.9 N m"]
     kt, resistance = data.pop("kt"), data.pop("R")
@@ -159,7 +176,7 @@ def test_bam_gets_its_own_names_and_the_motor_that_has_these_gains(tmp_path: Pat
     assert kt**2 / resistance == pytest.approx(0.25)  # back-EMF
     assert data == {
         "model": "m2", "actuator": "sts3215", "armature": 0.004, "friction_base": 0.03, "friction_viscous": 0.05,
-        "command_delay": 0.0137, "friction_stribeck": 0.02, "dtheta_stribeck": 0.2, "alpha": 1.5,
+        "command_delay": 0.0137, "max_velocity": 0.8, "friction_stribeck": 0.02, "dtheta_stribeck": 0.2, "alpha": 1.5,
     }  # fmt: skip
 
 
@@ -185,3 +202,12 @@ def test_a_model_names_no_recording_outside_of_the_users_folder(
     with pytest.raises(InputError, match=said):
         tactile_cube.export_model("m.yaml", "mjcf")
     assert not list(Path().glob("*.xml"))
+
+
+def test_a_format_without_a_model_is_no_policys(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["export", "format=mjcf", f"hydra.run.dir={tmp_path}"])
+    with pytest.raises(SystemExit):
+        main()
+    assert "format=mjcf: give model=model.yaml" in capsys.readouterr().err

@@ -150,6 +150,9 @@ def test_json_of_a_servo_bench_is_read_up_to_where_torque_is_off(timed: bool, tm
     assert not off.command.any()
 
 
+LISTS = ("action", "observation.state")
+
+
 def lerobot(folder: Path, names: object) -> Path:
     """A data set of two episodes with a gripper in ticks of its range."""
     (folder / "data/chunk-000").mkdir(parents=True)
@@ -175,6 +178,27 @@ def test_a_lerobot_data_set_is_in_the_range_of_its_calibration(names: object, tm
     said = {"angle_unit": "range", "calibration": str(tmp_path / "arm.json")}
     trial = imported(tmp_path / "calibrated", {}, ONE_JOINT, files=data, **said).trials[0]
     assert trial.position[:, 0] == pytest.approx(table()["a.position"] / 0.5 * 1000 / 4096 * 2 * np.pi, abs=1e-5)
+
+
+SO101 = Path(__file__).parents[4] / "shared/robots/TheRobotStudio_SO_ARM100_Simulation_SO101_so101_new_calib.urdf"
+
+
+@pytest.mark.skipif(not SO101.is_file(), reason="needs ../shared/robots")
+def test_a_lerobot_data_set_goes_with_the_so101s_official_file(tmp_path: Path) -> None:
+    arm = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
+    folder = lerobot(tmp_path / "set", [f"{joint}.pos" for joint in arm])
+    file = folder / "data/chunk-000/file-000.parquet"
+    frame = polars.read_parquet(file)
+    six = {key: [[*row[:1], *row] + row[1:] * 3 for row in frame[key].to_list()] for key in LISTS}
+    frame.with_columns(**{key: polars.Series(rows) for key, rows in six.items()}).write_parquet(file)
+    said = {"files": [str(folder)], "angle_unit": "deg", "controller": {}}
+    recording = imported(tmp_path, {}, SO101.read_text(), **said)
+    assert set(recording.joints) == set(arm)
+    assert recording.description.unknown == ["kp", "kd", "reflected_inertia"]
+    places = [recording.joints.index(joint) for joint in ("shoulder_lift", "elbow_flex")]
+    lift, elbow = recording.trials[1].position[:, places].T
+    assert lift == pytest.approx(table(1)["a.position"] / 0.5 * 100 / DEGREE, abs=1e-5)
+    assert elbow == pytest.approx(50.0 / DEGREE)
 
 
 def test_a_gripper_of_lerobot_is_in_no_degrees(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ class CommandDeadZone(Effect):
 
 
 RATES = (0.8, 0.4, 0.15)
-"""Limits at which a search starts, as parts of the fastest command."""
+"""Limits at which a search starts, as parts of the fastest motion, or of the fastest command where that is slower."""
 
 
 class RateLimit(Effect):
@@ -97,8 +97,9 @@ class RateLimit(Effect):
 
     @classmethod
     def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
-        """Return limits below the fastest command."""
-        return [{"speed": share * scales.command_speed} for share in RATES]
+        """Return limits below the fastest motion, which follows a limited command; steps are faster than any limit."""
+        fastest = min(scales.speed, scales.command_speed)
+        return [{"speed": share * fastest} for share in RATES]
 
     state_size = 2  # limited command, first-call flag
 

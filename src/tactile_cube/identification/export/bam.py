@@ -6,6 +6,7 @@ Source: Rhoban/bam, model.py (friction models M1 to M6, command_delay) and actua
 from __future__ import annotations
 
 import json
+from math import isfinite
 
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
@@ -35,10 +36,12 @@ def as_bam(model: ModelFile, joint: str | None, actuator: str | None, volts: flo
     if drive.excess:
         data |= {"friction_stribeck": drive.excess, "dtheta_stribeck": drive.velocity, "alpha": drive.exponent}
     held: tuple[str, ...] = HELD
+    if isfinite(drive.rate) and actuator.startswith("sts"):  # others follow any command
+        data["max_velocity"], held = drive.rate, (*HELD, "rate")
     if volts is not None and drive.kp > 0.0 and drive.kd > 0.0:
         constant = drive.kd / drive.kp * volts  # kp = kt volts / R, kd = kt^2 / R
         data |= {"kt": constant, "R": constant * volts / drive.kp}
-        held = (*HELD, "kp", "kd")
+        held = (*held, "kp", "kd")
     left = drive.not_in(held)
     if "kp" not in held:
         left.append("kt and R: give bam.volts, the volts an error of 1 rad makes (vin * kp * error_gain in BAM)")

@@ -24,6 +24,7 @@ class JointDrive:
         damping: viscous friction [N m s/rad].
         bias: torque that nobody commands [N m].
         delay: of commands [s].
+        rate: fastest change of the command that the drive follows [rad/s].
         stall: largest torque at rest of a motor whose supply is limited [N m].
         no_load: speed at which such a motor has no torque left [rad/s].
         excess: dry friction at rest beyond `friction` [N m], which falls by exp(-|v / velocity|^exponent).
@@ -43,6 +44,7 @@ class JointDrive:
     damping: float = 0.0
     bias: float = 0.0
     delay: float = 0.0
+    rate: float = inf
     stall: float = inf
     no_load: float = inf
     excess: float = 0.0
@@ -76,6 +78,7 @@ SILENT = {
     "damping": (0.0, "N m s/rad"),
     "bias": (0.0, "N m"),
     "delay": (0.0, "s"),
+    "rate": (inf, "rad/s"),
     "stall": (inf, "N m"),
     "no_load": (inf, "rad/s"),
     "excess": (0.0, "N m more friction at rest (stribeck_friction)"),
@@ -104,6 +107,7 @@ HELD: dict[str, tuple[tuple[str, ...], Law]] = {
     "torque_gain": (("error",), lambda d, p: _stronger(d, 1.0 + p["error"])),
     "torque_bias": (("bias",), lambda d, p: replace(d, bias=d.bias + p["bias"])),
     "command_delay": (("delay",), lambda d, p: replace(d, delay=d.delay + p["delay"])),
+    "rate_limit": (("speed",), lambda d, p: replace(d, rate=min(d.rate, p["speed"]))),
     "torque_saturation": (("limit",), lambda d, p: replace(d, torque_limit=min(d.torque_limit, p["limit"]))),
     "back_emf": (("stall", "no_load"), lambda d, p: replace(d, stall=p["stall"], no_load=p["no_load"])),
     "stribeck_friction": (("excess", "velocity", "exponent"), lambda d, p: _sticking(d, p)),

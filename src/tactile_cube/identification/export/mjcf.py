@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 from math import ceil, isfinite
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,12 @@ STEP = 1e-4
 """Longest time step [s]: MuJoCo's Euler acts half a step early, 0.15 mrad at 3 rad/s."""
 DRY = 'solreffriction="0.002 1" solimpfriction="0.999 0.9999 0.001 0.5 2"'
 """Dry friction as hard as the time step allows: MuJoCo's own lets a held joint creep."""
+Mode = Literal["position", "torque", "voltage"]
+COMMANDS = {
+    "position": "commands are joint angles [rad]",
+    "torque": "commands are torques [N m]",
+    "voltage": "commands are voltages, as the torque they make at standstill [N m]",
+}
 LIGHTEST = 1e-9
 """Mass [kg] and moment [kg m^2] that MuJoCo wants of a moving body at least."""
 
@@ -35,12 +42,12 @@ def as_mjcf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
     memory, drives = simulator.memory(known), [drive.at_link() for drive in drives_of(model)]
     numbers = {key: simulator.plant.view(memory, key)[0] for key in OF_MECHANISM}
     mechanical = [term.effect.name for term in known.terms if term.effect.stage is Stage.MECHANISM]
-    tree, torque_mode = simulator.tree, recording.torque_controlled
-    left = [line for drive in drives for line in drive.not_in([*_held(drive, torque_mode), *mechanical])]
+    tree, mode = simulator.tree, recording.description.controller.mode
+    left = [line for drive in drives for line in drive.not_in([*_held(drive, mode), *mechanical])]
     step = recording.step / ceil(recording.step / STEP - 1e-6)
     parts = [
         f'<mujoco model="{escape(recording.name)}">',
-        *(f"  <!-- {line} -->" for line in _said(left)),
+        *(f"  <!-- {line} -->" for line in _said(left, drives, mode)),
         '  <compiler angle="radian"/>',
         f'  <option timestep="{step:.12g}" integrator="implicitfast" gravity="{_list(numbers["gravity"])}"/>',
         "  <worldbody>",
@@ -48,23 +55,29 @@ def as_mjcf(model: ModelFile, recording: Recording) -> tuple[str, list[str]]:
         "  </worldbody>",
         *_equalities(tree, numbers),
         "  <actuator>",
-        *(f"    {_actuator(drive, torque_mode, step)}" for drive in drives),
+        *(f"    {_actuator(drive, mode, step)}" for drive in drives),
         "  </actuator>",
         "</mujoco>",
     ]
     return "\n".join([*parts, ""]), left
 
 
-def _held(drive: JointDrive, torque_mode: bool) -> tuple[str, ...]:
+def _held(drive: JointDrive, mode: Mode) -> tuple[str, ...]:
     """What the joint and its actuator hold."""
-    if torque_mode:
+    if mode != "position":
         return OF_JOINT
-    return (*OF_JOINT, "stall", "no_load") if isfinite(drive.stall) else (*OF_JOINT, "bias")
+    return (*OF_JOINT, "stall", "no_load", "rate") if _is_servo(drive) else (*OF_JOINT, "bias")
 
 
-def _said(left: list[str]) -> list[str]:
-    about = "by tactile_cube.export; commands are joint angles [rad], or torques [N m] where actuators are motors"
-    lines = [about, *(f"not held: {one}" for one in left)]
+def _is_servo(drive: JointDrive) -> bool:
+    """Whether only MuJoCo's `dcmotor` has what limits its position controller."""
+    return isfinite(drive.stall) or isfinite(drive.rate)
+
+
+def _said(left: list[str], drives: list[JointDrive], mode: Mode) -> list[str]:
+    lines = [f"by tactile_cube.export; {COMMANDS[mode]}", *(f"not held: {one}" for one in left)]
+    if mode == "position" and any(isfinite(drive.rate) for drive in drives):
+        lines.append("data.act holds commands that are limited in speed: begin with the joints' angles in it")
     if any(": stiffness " in line for line in left):
         lines.append("gains are those that links feel; a motor is ahead of its link by torque / stiffness")
     return [line.replace("--", "- -") for line in lines]
@@ -125,24 +138,32 @@ def _equalities(tree: RigidBodyTree, numbers: dict[str, Array]) -> Iterator[str]
         yield from ("  <equality>", *lines, "  </equality>")
 
 
-def _actuator(drive: JointDrive, torque_mode: bool, step: float) -> str:
-    name, gear = escape(drive.name), drive.gain if torque_mode else 1.0
-    words, most = [f'name="{name}" joint="{name}"'], f"{drive.torque_limit / gear:.12g}"
-    limited, supplied = isfinite(drive.torque_limit), isfinite(drive.stall) and not torque_mode
-    if limited:
-        words.append(f'saturation="{most} 0 0"' if supplied else f'forcerange="-{most} {most}"')
+def _actuator(drive: JointDrive, mode: Mode, step: float) -> str:
+    common = f'name="{escape(drive.name)}" joint="{escape(drive.name)}"'
     if drive.delay > 0.0:
-        words.append(f'delay="{drive.delay:.12g}" nsample="{ceil(drive.delay / step) + 2}" interp="linear"')
-    common, kp, kd = " ".join(words), f"{drive.kp:.12g}", f"{drive.kd:.12g}"
-    if torque_mode:
-        return f'<motor {common} gear="{gear:.12g}"/>'
-    if supplied:  # in units of the supply's voltage
-        constant = 1.0 / drive.no_load
-        motor = f'motorconst="{constant:.12g}" resistance="{constant / drive.stall:.12g}"'
-        return f'<dcmotor {common} input="pos" controller="{kp} 0 {kd} 0 0 1" {motor}/>'
+        common += f' delay="{drive.delay:.12g}" nsample="{ceil(drive.delay / step) + 2}" interp="linear"'
+    most, kp, kd = drive.torque_limit, f"{drive.kp:.12g}", f"{drive.kd:.12g}"
+    limited = f' forcerange="-{most:.12g} {most:.12g}"' if isfinite(most) else ""
+    saturated = f' saturation="{most:.12g} 0 0"' if isfinite(most) else ""
+    if mode == "torque":
+        asked = most / drive.gain
+        limited = f' forcerange="-{asked:.12g} {asked:.12g}"' if isfinite(most) else ""
+        return f'<motor {common}{limited} gear="{drive.gain:.12g}"/>'
+    if mode == "voltage":
+        return f"<dcmotor {common}{saturated} {_motor(drive.kd / drive.gain, drive.gain)}/>"
+    if _is_servo(drive):
+        rate, supplied = drive.rate if isfinite(drive.rate) else 0.0, isfinite(drive.stall)
+        motor = _motor(1.0 / drive.no_load, drive.stall) if supplied else _motor(1.0, 1.0)
+        controller = f"{kp} 0 {kd} {rate:.12g} 0 {supplied:d}"  # a volt is the supply
+        return f'<dcmotor {common}{saturated} input="pos" controller="{controller}" {motor}/>'
     if drive.bias:
-        return f'<general {common} biastype="affine" gainprm="{kp}" biasprm="{drive.bias:.12g} -{kp} -{kd}"/>'
-    return f'<position {common} kp="{kp}" kv="{kd}"/>'
+        return f'<general {common}{limited} biastype="affine" gainprm="{kp}" biasprm="{drive.bias:.12g} -{kp} -{kd}"/>'
+    return f'<position {common}{limited} kp="{kp}" kv="{kd}"/>'
+
+
+def _motor(constant: float, torque: float) -> str:
+    """A motor's constant [V s/rad], and the resistance at which a volt makes so much torque at standstill [N m]."""
+    return f'motorconst="{constant:.12g}" resistance="{constant / torque:.12g}"'
 
 
 def _list(values: Array) -> str:
