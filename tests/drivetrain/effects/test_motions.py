@@ -136,6 +136,20 @@ def hanging(rest: float, weight: float) -> dict:
     return {"drive": SERVO, "command": rest + 0.2 * 9.81 * 0.1 * weight / KP, "q": rest, "gravity": 9.81}
 
 
+BOUND = {"torque_limit": 0.4}
+PRESSING = {"drive": SERVO | BOUND, "held": 1.0}
+PRESSED = np.minimum(KP * RAMP + 0.5 * KD * (1.0 - np.exp(-T / 0.005)), 0.4)
+WOUND = np.minimum(20.0 * 0.1 * T, 0.4)
+
+
+def limited(torque: float, drive: dict[str, float] = ELASTIC) -> tuple:
+    """A held pendulum whose controller asks for a torque in sum, of which it carries most of the weight by itself."""
+    carried, gain = -0.8 * 0.2 * 9.81 * 0.1 * np.sin(0.3), 1.0 + KP / drive["stiffness"]
+    command = -0.3 + (gain * torque - carried) / KP
+    how = {"drive": drive | BOUND, "q": -0.3, "held": 1.0, "gravity": 9.81, "command": command}
+    return "gravity_compensation", {"share": 0.8}, how, TORQUE, settled(np.clip(torque, -0.4, 0.4)), 1e-9
+
+
 def asked(torque: float) -> dict:
     """A free joint whose controller asks for a constant torque."""
     return {"drive": FREE | {"kp": 1.0, "torque_limit": abs(torque)}, "command": 1e6 * np.sign(torque)}
@@ -171,7 +185,10 @@ CLOSED_FORMS = (
     ("integral_action", {"ki": 20.0}, START, POSITION, linear(AS_INTEGRATED, 0.2, 0.0, 0.2 * KP), 2e-4),
     ("integral_action", CASCADE, START, POSITION, linear(AS_CASCADED, 0.2, 0.0, 0.2 * KP), 2e-4),
     ("gravity_compensation", {"share": 0.8}, hanging(0.3, 0.2 * np.sin(0.3)), POSITION, 0.3, 1e-9),
+    limited(0.38), limited(0.42), limited(0.38, SERVO), limited(0.42, SERVO), limited(-0.42),
     ("velocity_feedforward", {"gain": KD}, {"drive": SERVO, "command": RAMP}, POSITION, FED, 1e-4),
+    ("velocity_feedforward", {"gain": KD}, PRESSING | {"command": RAMP}, TORQUE, PRESSED, 1e-9),
+    ("integral_action", {"ki": 20.0}, PRESSING | {"command": 0.1}, TORQUE, WOUND, 1e-9),
     ("back_emf", {"stall": 0.4, "no_load": 9.0}, asked(1.0), VELOCITY, FALLING, 1e-4),
     ("back_emf", {"stall": 0.4, "no_load": 9.0}, asked(-1.0), VELOCITY, -FALLING, 1e-4),
     ("mount_tilt", {"second": 0.3}, hanging(0.1, np.sin(0.1 - 0.3)), POSITION, 0.1, 1e-9),
