@@ -12,6 +12,7 @@ from tactile_cube.drivetrain.signals import (
     FRICTION,
     LOAD,
     MOTOR_POSITION,
+    TORQUE,
     VELOCITY,
     WEIGHT,
 )
@@ -59,7 +60,7 @@ class IntegralAction(Effect):
             s[0] = 1.0
             braked = x[DAMPING, j] * x[VELOCITY, j]
             rubbed = x[FRICTION, j] * braked / (abs(braked) + x[FRICTION, j]) if x[FRICTION, j] > 0.0 else 0.0
-            s[1] += x[LOAD, j] + rubbed - x[CONTROLLER_TORQUE, j]
+            s[1] += x[LOAD, j] + rubbed - x[TORQUE, j]
         elif s[0] == 2.0:
             s[0] = 1.0
         else:

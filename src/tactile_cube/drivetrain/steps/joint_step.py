@@ -149,12 +149,13 @@ def control_torque(x: Array, c: int, dt: float, memory: Array) -> None:
         extra = memory[plant.EXTRA + a] + ahead
         torque = impedance_torque(x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j], kp, kd, compliance, extra)
         memory[plant.EXTRA + a] = -ahead
-        x[TORQUE, j] = torque
+        memory[plant.TRIAL + j] = torque
         x[CONTROLLER_TORQUE, j] = torque
+        x[TORQUE, j] = min(max(torque, -memory[plant.TORQUE_LIMIT + a]), memory[plant.TORQUE_LIMIT + a])
         x[DAMPING, j] = x[DAMPING, j] * kd / (1.0 + kp * compliance)
     plant.effects_controller(x, c, dt, memory)
     for j in range(n):
-        limit, asked, own = memory[plant.TORQUE_LIMIT + c * n + j], x[CONTROLLER_TORQUE, j], x[TORQUE, j]
+        limit, asked, own = memory[plant.TORQUE_LIMIT + c * n + j], x[CONTROLLER_TORQUE, j], memory[plant.TRIAL + j]
         x[TORQUE, j] = min(max(asked, -limit), limit)
         x[CONTROLLER_TORQUE, j] = own if x[TORQUE, j] == asked else x[TORQUE, j] - (asked - own)
         if abs(x[TORQUE, j]) >= limit:
