@@ -50,8 +50,8 @@ class ElasticJoint(Effect):
 
     In data: a resonance at sqrt((1 / rotor + 1 / M_link) / compliance) in what the motor's sensor shows. A rotor that
     sticks hides it while the link swings on; a link that sticks lets the rotor swing alone.
-    Confused with: `elasticity` far below the resonance, `actuator_lag`; `gap` with `backlash`, `motor_damping` with
-    `viscous_friction` and the controller's K_D, `motor_share` in motion that excites no resonance.
+    Confused with: `elasticity` far below the resonance, where the share of friction is unseen too; `actuator_lag`. Its
+    gap with `backlash`, the rotor's damping with `viscous_friction` and the controller's K_D.
     Source: Spong, Modeling and control of elastic joint robots, 1987; friction on both sides: Nordin and Gutman,
     Controlling mechanical systems with backlash, 2002.
     """
