@@ -52,8 +52,8 @@ class ElasticJoint(Effect):
     sticks hides it while the link swings on; a link that sticks lets the rotor swing alone.
     Confused with: `elasticity` far below the resonance, where the share of friction is unseen too; `actuator_lag`. Its
     gap with `backlash`, the rotor's damping with `viscous_friction` and the controller's K_D.
-    Source: Spong, Modeling and control of elastic joint robots, 1987; friction on both sides: Nordin and Gutman,
-    Controlling mechanical systems with backlash, 2002.
+    Source: Spong, Modeling and control of elastic joint robots, 1987; the gap: Nordin and Gutman, Controlling
+    mechanical systems with backlash, 2002.
     """
 
     name = "elastic_joint"
