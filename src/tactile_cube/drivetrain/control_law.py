@@ -35,9 +35,9 @@ def limit_torque(target: float, q_m: float, v: float, kp: float, kd: float, limi
 
 @compiled
 def impedance_torque(
-    command: float, q: float, v: float, kp: float, kd: float, compliance: float, extra: float, limit: float
+    command: float, q: float, v: float, kp: float, kd: float, compliance: float, extra: float
 ) -> float:
-    """Torque tau = K_P (q_d - q_m) - K_D dq with q_m = q + compliance * tau + extra, solved for tau and limited.
+    """Torque tau = K_P (q_d - q_m) - K_D dq [N m] with q_m = q + compliance * tau + extra, solved for tau.
 
     The loop is algebraic: iterating it would add a delay of one step, the closed form does not.
     Source: Sievers, Pitz, Bauml (ICRA 2022), eq. (1) and (2).
@@ -50,7 +50,5 @@ def impedance_torque(
         kd: K_D [N m s/rad].
         compliance: 1 / K_e, negative for the printed sign [rad/(N m)].
         extra: what other effects add to the measured position [rad].
-        limit: largest torque [N m].
     """
-    torque = (kp * (command - q - extra) - kd * v) / (1.0 + kp * compliance)
-    return min(max(torque, -limit), limit)
+    return (kp * (command - q - extra) - kd * v) / (1.0 + kp * compliance)

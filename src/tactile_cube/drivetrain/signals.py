@@ -20,7 +20,7 @@ COMMAND = 6
 MEASURED_VELOCITY = 7
 """Speed that the controller damps with [rad/s]."""
 CONTROLLER_TORQUE = 8
-"""Torque that the controller asks for, within the torque limit [N m]."""
+"""What the impedance law has in the torque that the controller asks for, which is limited as a whole [N m]."""
 TORQUE = 9
 """Torque that the motor gives to the drive [N m]."""
 DEFLECTION = 10
@@ -49,4 +49,8 @@ LOOSE_TORQUE = 21
 """Torque that the motor would carry did no law of the position sensor lead it or hold it back [N m]."""
 SENSOR_VELOCITY = 22
 """Speed of what the position sensor reads: of the joint, or of a rotor behind a spring [rad/s]."""
-ROWS = 23
+MOTOR_SHARE = 23
+"""Part of FRICTION that acts on a rotor behind a spring and not on the link."""
+INERTIA = 24
+"""Inertia of the joint, rotor included, while the others stand [kg m^2]."""
+ROWS = 25

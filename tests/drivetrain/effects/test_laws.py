@@ -10,6 +10,7 @@ from tactile_cube.drivetrain.effects import (
     ACCELERATION,
     ANGLE,
     COMMAND,
+    CONTROLLER_TORQUE,
     DEFLECTION,
     DIRECTION,
     FRICTION,
@@ -30,7 +31,7 @@ from tactile_cube.drivetrain.effects.command import RateLimit
 from tactile_cube.drivetrain.effects.mechanism import Payload
 from tactile_cube.drivetrain.effects.scales import FINGER, Scales, unit_at
 from tactile_cube.drivetrain.effects.transmission import Elasticity, StiffeningElasticity
-from tactile_cube.drivetrain.signals import DAMPING, GAP, LOOP_GAIN, LOOSE_TORQUE, ROWS, SENSOR_VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, GAP, INERTIA, LOOP_GAIN, LOOSE_TORQUE, ROWS, SENSOR_VELOCITY
 
 DT = 0.002
 Signal = float | tuple[float, ...] | list[float]
@@ -108,6 +109,7 @@ SOFT = {"smooth": 0.02, "softness": 0.01}
 PLAY = {POSITION: 0.4, LOOP_GAIN: 3.0, LEAD: nan, GAP: 0.0}
 ROTOR = {"compliance": 0.05, "rotor": 0.002, "damping": 0.01}
 ROLLS = {VELOCITY: 2.0, TORQUE: 0.5, DAMPING: 1.0}
+RUBS = {FRICTION: 0.2, INERTIA: 0.006, LOAD: 0.0, JOINT_TORQUE: 0.0}
 HARDENING = {"compliance": 0.06, "cubic": 2e3}
 ONE_WAY = {"damping": 0.05, "difference": 0.04}
 LINE = {"first": -0.8, "last": 0.8} | {f"torque_{k}": 0.1 * k - 0.3 for k in range(17)}
@@ -119,10 +121,10 @@ STICK = {"excess": 0.08, "velocity": 0.3}
 BRISTLES, DAMPED = {"breakaway": 1e-3}, {"breakaway": 1e-3, "micro_damping": 0.5}
 GONE = 0.05 * 0.04 / DT * (1.0 - exp(-1.0))
 SUPPLY = {"stall": 0.4, "no_load": 10.0}
-AT_REST = {TORQUE: [0.25] * 3, LOAD: 0.3, COMMAND: 0.5, MOTOR_POSITION: 0.38, DEFLECTION: 0.02}
-AT_REST |= {VELOCITY: 0.0, FRICTION: 0.0}
+AT_REST = {CONTROLLER_TORQUE: [0.25] * 3, LOAD: 0.3, COMMAND: 0.5, MOTOR_POSITION: 0.38, DEFLECTION: 0.02}
+AT_REST |= {VELOCITY: 0.0, FRICTION: 0.0, TORQUE: 0.25}
 MOVED = {COMMAND: [0.5, 9.0, 9.0], MOTOR_POSITION: [0.1, 0.3, 0.3]}
-JUMP = {TORQUE: 0.1, COMMAND: [0.3, 0.34, 0.34]}
+JUMP = {CONTROLLER_TORQUE: 0.1, COMMAND: [0.3, 0.34, 0.34]}
 SLIDE = {FRICTION: 0.1, JOINT_TORQUE: 0.5}
 KEPT = exp(-0.2)  # of a bristle's bend, when 0.1 rad/s move it for 2 ms
 # fmt: off
@@ -180,7 +182,7 @@ ROWS_OF_LAWS = (
         # of a cascade's error the joint's way of 0.2 rad counts for 0.05 s
         ({"ki": 1.0, "lag": 0.05}, AT_REST | MOVED, [0.3, 0.3 + 4.53 * DT - 0.05 * 0.2, nan]),
     ),
-    *rows("gravity_compensation", ({"share": 0.8}, {TORQUE: 0.1, WEIGHT: -0.5}, -0.3)),
+    *rows("gravity_compensation", ({"share": 0.8}, {CONTROLLER_TORQUE: 0.1, WEIGHT: -0.5}, -0.3)),
     *rows(
         "velocity_feedforward",
         # of a jump by 40 mrad all comes in the end, as an impulse, the rest of it with a decay of exp(-1) a step
@@ -282,6 +284,9 @@ ROWS_OF_LAWS = (
         "elastic_joint",
         (ROTOR, ROLLS, 0.03 * 0.5 / 3.03, {DAMPING: 0.09 / 3.03 - 2.0}),
         (ROTOR | {"gap": 0.02}, ROLLS, 0.0, {DAMPING: -2.0}),
+        (ROTOR | {"motor_share": 0.5}, RUBS | ROLLS, 0.03 * (0.5 - 0.1) / 3.03, {DAMPING: 0.09 / 3.03 - 2.0}),
+        (ROTOR | {"motor_share": 0.5}, RUBS | {VELOCITY: 0.0, TORQUE: 0.05}, 0.0, {DAMPING: 0.03 - 2.0}),
+        (ROTOR | {"motor_damping": 0.5}, ROLLS, 0.03 * (0.5 - 1.0) / 3.53, {DAMPING: 0.105 / 3.53 - 2.0}),
         law="torque_law",
     ),
     *rows(
@@ -407,7 +412,8 @@ def test_neutral_values_change_nothing_bit_for_bit(row: Row) -> None:
     [
         row
         for row in ROWS_OF_LAWS
-        if row.row in (MEASURED_VELOCITY, TORQUE, JOINT_TORQUE) and row.effect not in ("joint_stop", "elastic_joint")
+        if row.row in (MEASURED_VELOCITY, CONTROLLER_TORQUE, TORQUE, JOINT_TORQUE)
+        and row.effect not in ("joint_stop", "elastic_joint")
     ],
     ids=lambda row: row.effect,
 )

@@ -1,6 +1,7 @@
 """How a joint moves under each effect: as in MuJoCo where it has the law, else by a closed form of the motion."""
 
 from functools import cache
+from math import tanh
 
 import mujoco
 import numpy as np
@@ -67,6 +68,23 @@ def bounce(damping: float) -> np.ndarray:
     return np.where(T < 0.02, T, 0.02 + np.roll(there, 200))
 
 
+def led(width: float, softness: float, command: np.ndarray, fine: int = 10) -> np.ndarray:
+    """Reading (STEPS,) that leads a joint by half a width with the torque, which is found by bisection."""
+    q, v, seen = 0.0, 0.0, np.zeros(STEPS)
+    for k, wanted in enumerate(command.tolist()):
+        for i in range(fine):
+            low, high = -5.0, 5.0
+            while high - low > 1e-9:
+                torque = 0.5 * (low + high)
+                lead = 0.5 * width * tanh(torque / softness)
+                low, high = (torque, high) if KP * (wanted - q - lead) - KD * v > torque else (low, torque)
+            if i == fine // 2:
+                seen[k] = q + lead
+            v += DT / fine * torque / INERTIA
+            q += DT / fine * v
+    return seen
+
+
 def settled(value: float) -> np.ndarray:
     """A value from the hundredth step on."""
     return np.where(T < 100 * DT, np.nan, value)
@@ -110,7 +128,9 @@ STANDS = {"drive": SERVO, "held": 1.0, "command": 0.05}
 AT_REST = np.where(T < 0.2, np.nan, 0.05 * 0.15 / 1.15)
 CUBIC = {"compliance": 0.05, "cubic": 2e3}
 (BENT,) = (root.real for root in np.roots([2e3, 0.0, 10.0 + KP, -KP * 0.3]) if abs(root.imag) < 1e-9)
+WIDE = {"smooth": 0.03, "softness": 0.005}
 PLAY = {"smooth": 0.02, "softness": 0.001}
+MOVED = 0.4 * np.sin(15.0 * T) + 0.2 * np.sin(47.0 * T)
 CROSSED = 0.008 * (1.0 - np.exp(-(T + DT) / 0.05))
 WAVES = 0.003 * np.sin(60.0 * T) - 0.002 * np.cos(60.0 * T)
 WAVE = {"sine": 0.003, "cosine": -0.002, "harmonic": 30.0}
@@ -134,6 +154,20 @@ def zone(form: str, rest: float) -> tuple:
 def hanging(rest: float, weight: float) -> dict:
     """A pendulum that its controller holds at `rest` against a part of its largest weight."""
     return {"drive": SERVO, "command": rest + 0.2 * 9.81 * 0.1 * weight / KP, "q": rest, "gravity": 9.81}
+
+
+BOUND = {"torque_limit": 0.4}
+PRESSING = {"drive": SERVO | BOUND, "held": 1.0}
+PRESSED = np.minimum(KP * RAMP + 0.5 * KD * (1.0 - np.exp(-T / 0.005)), 0.4)
+WOUND = np.minimum(20.0 * 0.1 * T, 0.4)
+
+
+def limited(torque: float, drive: dict[str, float] = ELASTIC) -> tuple:
+    """A held pendulum whose controller asks for a torque in sum, of which it carries most of the weight by itself."""
+    carried, gain = -0.8 * 0.2 * 9.81 * 0.1 * np.sin(0.3), 1.0 + KP / drive["stiffness"]
+    command = -0.3 + (gain * torque - carried) / KP
+    how = {"drive": drive | BOUND, "q": -0.3, "held": 1.0, "gravity": 9.81, "command": command}
+    return "gravity_compensation", {"share": 0.8}, how, TORQUE, settled(np.clip(torque, -0.4, 0.4)), 1e-9
 
 
 def asked(torque: float) -> dict:
@@ -171,7 +205,10 @@ CLOSED_FORMS = (
     ("integral_action", {"ki": 20.0}, START, POSITION, linear(AS_INTEGRATED, 0.2, 0.0, 0.2 * KP), 2e-4),
     ("integral_action", CASCADE, START, POSITION, linear(AS_CASCADED, 0.2, 0.0, 0.2 * KP), 2e-4),
     ("gravity_compensation", {"share": 0.8}, hanging(0.3, 0.2 * np.sin(0.3)), POSITION, 0.3, 1e-9),
+    limited(0.38), limited(0.42), limited(0.38, SERVO), limited(0.42, SERVO), limited(-0.42),
     ("velocity_feedforward", {"gain": KD}, {"drive": SERVO, "command": RAMP}, POSITION, FED, 1e-4),
+    ("velocity_feedforward", {"gain": KD}, PRESSING | {"command": RAMP}, TORQUE, PRESSED, 1e-9),
+    ("integral_action", {"ki": 20.0}, PRESSING | {"command": 0.1}, TORQUE, WOUND, 1e-9),
     ("back_emf", {"stall": 0.4, "no_load": 9.0}, asked(1.0), VELOCITY, FALLING, 1e-4),
     ("back_emf", {"stall": 0.4, "no_load": 9.0}, asked(-1.0), VELOCITY, -FALLING, 1e-4),
     ("mount_tilt", {"second": 0.3}, hanging(0.1, np.sin(0.1 - 0.3)), POSITION, 0.1, 1e-9),
@@ -194,6 +231,7 @@ CLOSED_FORMS = (
     *clamped("backlash", PLAY, 0.05, 0.01),
     *clamped("backlash", PLAY, 0.0005 / SLOPE + 0.01 * np.tanh(0.5), 0.01 * np.tanh(0.5)),
     *clamped("backlash", PLAY, -0.05, -0.01),
+    ("backlash", WIDE, {"drive": SERVO, "command": MOVED}, MOTOR_POSITION, led(0.03, 0.005, MOVED), 1e-4),
     ("backlash", {"play": 0.02}, {"v": 0.1}, MOTOR_POSITION, np.maximum(0.1 * T - 0.01, 0.0), 1e-9),
     ("backlash", {"play": 0.02}, {"v": -0.1}, MOTOR_POSITION, -np.maximum(0.1 * T - 0.01, 0.0), 1e-9),
     ("transmission_error", WAVE, {"v": 2.0}, MOTOR_POSITION, 2.0 * T + WAVES, 1e-9),

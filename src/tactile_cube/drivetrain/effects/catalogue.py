@@ -18,7 +18,16 @@ from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.errors import InputError
 
 EffectClass = type[Effect]
-CATALOGUE_MODULES = ("command", "controller", "motor", "transmission", "joint_torque", "friction", "mechanism")
+CATALOGUE_MODULES = (
+    "command",
+    "controller",
+    "motor",
+    "elastic_joint",
+    "transmission",
+    "joint_torque",
+    "friction",
+    "mechanism",
+)
 """Files of this folder; effects of one stage act in the order in which these define them."""
 
 

@@ -1,4 +1,4 @@
-"""What a controller adds to the torque of its impedance law."""
+"""What a controller adds to the torque of its impedance law, before it limits the sum."""
 
 from math import exp
 
@@ -6,6 +6,7 @@ from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Sta
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import (
     COMMAND,
+    CONTROLLER_TORQUE,
     DAMPING,
     DEFLECTION,
     FRICTION,
@@ -32,7 +33,7 @@ class IntegralAction(Effect):
     """
 
     name = "integral_action"
-    stage = Stage.MOTOR_TORQUE
+    stage = Stage.CONTROLLER
     chosen_starts = 1
     parameters = (
         Parameter("ki", "N m/(rad s)", 0.0, 0.0, 200.0, 5.0, "kp over 0.1 to 2 s"),
@@ -51,9 +52,9 @@ class IntegralAction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]; the error counts as linear over a step."""
+        """Return the torque asked for [N m]; the error counts as linear over a step."""
         if p[0] <= 0.0:
-            return x[TORQUE, j]
+            return x[CONTROLLER_TORQUE, j]
         reading = x[MOTOR_POSITION, j] + x[DEFLECTION, j]
         if s[0] == 0.0:
             s[0] = 1.0
@@ -67,7 +68,7 @@ class IntegralAction(Effect):
         if p[1] > 0.0:
             s[1] = min(max(s[1], -p[1]), p[1])
         s[2], s[3] = x[COMMAND, j], reading
-        return x[TORQUE, j] + s[1]
+        return x[CONTROLLER_TORQUE, j] + s[1]
 
 
 class GravityCompensation(Effect):
@@ -83,14 +84,14 @@ class GravityCompensation(Effect):
     """
 
     name = "gravity_compensation"
-    stage = Stage.MOTOR_TORQUE
+    stage = Stage.CONTROLLER
     weighs = True
     parameters = (Parameter("share", "1", 0.0, -0.5, 1.5, 0.8, "0 none, 1 all of it"),)
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
-        return x[TORQUE, j] + p[0] * x[WEIGHT, j]
+        """Return the torque asked for [N m]."""
+        return x[CONTROLLER_TORQUE, j] + p[0] * x[WEIGHT, j]
 
 
 class VelocityFeedforward(Effect):
@@ -105,7 +106,7 @@ class VelocityFeedforward(Effect):
     """
 
     name = "velocity_feedforward"
-    stage = Stage.MOTOR_TORQUE
+    stage = Stage.CONTROLLER
     parameters = (
         Parameter("gain", "N m s/rad", 0.0, 0.0, 2.0, 0.1, "up to K_D"),
         Parameter("smoothing", "s", 0.005, 1e-4, 0.1, 0.005, "1-20 ms"),
@@ -117,9 +118,9 @@ class VelocityFeedforward(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]: its mean over a step of a command that is held."""
+        """Return the torque asked for [N m]: its mean over a step of a command that is held."""
         if s[0] == 0.0:
             s[0], s[1] = 1.0, x[COMMAND, j]
         followed = (1.0 - exp(-dt / p[1])) * (x[COMMAND, j] - s[1])
         s[1] += followed
-        return x[TORQUE, j] + p[0] * followed / dt
+        return x[CONTROLLER_TORQUE, j] + p[0] * followed / dt

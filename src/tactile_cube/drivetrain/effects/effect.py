@@ -20,10 +20,14 @@ View = Callable[[str], Array]
 
 
 class Stage(Enum):
-    """Where an effect acts; the value is the row of `x` whose new value the law returns (MECHANISM: no law)."""
+    """Where an effect acts; the value is the row of `x` whose new value the law returns (MECHANISM: no law).
+
+    What a CONTROLLER adds counts for its torque limit, what MOTOR_TORQUE adds comes after it.
+    """
 
     COMMAND = signals.COMMAND
     VELOCITY_SENSOR = signals.MEASURED_VELOCITY
+    CONTROLLER = signals.CONTROLLER_TORQUE
     MOTOR_TORQUE = signals.TORQUE
     DEFLECTION = signals.DEFLECTION
     POSITION_SENSOR = signals.MOTOR_POSITION

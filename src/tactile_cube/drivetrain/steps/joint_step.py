@@ -16,6 +16,7 @@ from tactile_cube.drivetrain.signals import (
     DIRECTION,
     FRICTION,
     GAP,
+    INERTIA,
     JOINT_TORQUE,
     LEAD,
     LOAD,
@@ -23,6 +24,7 @@ from tactile_cube.drivetrain.signals import (
     LOOSE_TORQUE,
     MEASURED_VELOCITY,
     MOTOR_POSITION,
+    MOTOR_SHARE,
     POSITION,
     ROWS,
     SENSOR_VELOCITY,
@@ -91,7 +93,7 @@ def find_equations(c: int, q: Array, v: Array, memory: Array) -> None:
 def drive(x: Array, c: int, dt: float, memory: Array) -> None:
     """Command to motor torque, q_m and the further torques on the joint."""
     read_sensors(x, c, dt, memory)
-    control_torque(x, c, memory)
+    control_torque(x, c, dt, memory)
     for j in range(n):
         memory[plant.TRIAL + j] = x[DAMPING, j]
     plant.effects_motor_torque(x, c, dt, memory)
@@ -117,6 +119,8 @@ def read_sensors(x: Array, c: int, dt: float, memory: Array) -> None:
         x[MEASURED_VELOCITY, j] = x[VELOCITY, j]
         x[SENSOR_VELOCITY, j] = x[VELOCITY, j]
         x[DAMPING, j] = 1.0
+        x[MOTOR_SHARE, j] = 0.0
+        x[INERTIA, j] = memory[plant.JOINT_MASS_MATRIX + j * n + j]
         x[MOTOR_POSITION, j] = x[POSITION, j]
         x[ANGLE, j] = x[POSITION, j] + memory[plant.ANGLE_OFFSET + c * n + j]
     plant.effects_velocity_sensor(x, c, dt, memory)
@@ -135,24 +139,27 @@ def read_sensors(x: Array, c: int, dt: float, memory: Array) -> None:
 
 
 @compiled
-def control_torque(x: Array, c: int, memory: Array) -> None:
-    """The impedance law's torque and its slope against the present speed."""
+def control_torque(x: Array, c: int, dt: float, memory: Array) -> None:
+    """The controller's torque within its limit, and its slope against the present speed."""
     for j in range(n):
         a = c * n + j
         kp, kd = memory[plant.KP + a], memory[plant.KD + a]
-        compliance, limit = (
-            memory[plant.COMPLIANCE + a] + memory[plant.EXTRA_COMPLIANCE + a],
-            memory[plant.TORQUE_LIMIT + a],
-        )
+        compliance = memory[plant.COMPLIANCE + a] + memory[plant.EXTRA_COMPLIANCE + a]
         ahead = x[MOTOR_POSITION, j] - x[POSITION, j]  # of sensor laws that need no torque: known now, not a step late
         extra = memory[plant.EXTRA + a] + ahead
-        torque = impedance_torque(
-            x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j], kp, kd, compliance, extra, limit
-        )
+        torque = impedance_torque(x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j], kp, kd, compliance, extra)
         memory[plant.EXTRA + a] = -ahead
+        memory[plant.TRIAL + j] = torque
         x[CONTROLLER_TORQUE, j] = torque
-        x[TORQUE, j] = torque
-        x[DAMPING, j] = 0.0 if abs(torque) >= limit else x[DAMPING, j] * kd / (1.0 + kp * compliance)
+        x[TORQUE, j] = min(max(torque, -memory[plant.TORQUE_LIMIT + a]), memory[plant.TORQUE_LIMIT + a])
+        x[DAMPING, j] = x[DAMPING, j] * kd / (1.0 + kp * compliance)
+    plant.effects_controller(x, c, dt, memory)
+    for j in range(n):
+        limit, asked, own = memory[plant.TORQUE_LIMIT + c * n + j], x[CONTROLLER_TORQUE, j], memory[plant.TRIAL + j]
+        x[TORQUE, j] = min(max(asked, -limit), limit)
+        x[CONTROLLER_TORQUE, j] = own if x[TORQUE, j] == asked else x[TORQUE, j] - (asked - own)
+        if abs(x[TORQUE, j]) >= limit:
+            x[DAMPING, j] = 0.0
 
 
 @compiled
@@ -191,7 +198,9 @@ def next_speeds(x: Array, c: int, dt: float, memory: Array) -> None:
         memory[plant.MOMENTUM + j] = dt * (x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j])
         for k in range(n):
             memory[plant.MOMENTUM + j] += M[j, k] * x[VELOCITY, k]
-        memory[plant.FRICTION_IMPULSE + j] = dt * (max(x[FRICTION, j], 0.0) + memory[plant.BRAKE + c * n + j])
+        memory[plant.FRICTION_IMPULSE + j] = dt * (
+            max(x[FRICTION, j], 0.0) * (1.0 - x[MOTOR_SHARE, j]) + memory[plant.BRAKE + c * n + j]
+        )
         creep = memory[plant.FRICTION_CREEP + c * n + j]
         memory[plant.GRIP + j] = dt / creep if creep > 0.0 else 0.0
     solve_speeds(
