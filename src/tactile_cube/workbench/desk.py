@@ -20,15 +20,9 @@ from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.usage_error import usage_error
-<<<<<<< HEAD
-from tactile_cube.workbench.background import Diagnosing, Found
-from tactile_cube.workbench.importing import Preview, Waiting, import_logs, kept, settings_of
-from tactile_cube.workbench.state import Workbench
-=======
 from tactile_cube.workbench.background import Diagnosing, Found, Progress
-from tactile_cube.workbench.importing import RIGS, Preview, import_logs, kept, preview, require_known
+from tactile_cube.workbench.importing import Preview, Waiting, import_logs, kept, settings_of
 from tactile_cube.workbench.state import Look, Workbench
->>>>>>> 7b2fa279 (Workbench: one error over noise, as diagnose states it, on trials that nothing was fitted to; candidates with their own steps, cards, fixed and bounded numbers)
 
 LABEL = 60  # characters of a wrong name that an error repeats
 
@@ -41,17 +35,12 @@ class Desk:
         version: grows with every change of the model or the recording.
         busy: what is being done, in words.
         problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
-<<<<<<< HEAD
         waiting: files that wait to be imported; `preview`: what is in the first.
-        scores: a first look at the candidates, joint -> best first, twins together, of this version.
-=======
-        logs: files that wait to be imported; `urdf`: of their rig; `preview`: what is in the first.
         looks: a look at the candidates, joint -> best first, those that look alike together, of this version.
->>>>>>> 7b2fa279 (Workbench: one error over noise, as diagnose states it, on trials that nothing was fitted to; candidates with their own steps, cards, fixed and bounded numbers)
         explainable: joint -> part of the missing torque that any law could explain, of this version.
         chosen: the candidate looked at, NAME@JOINT; `signature`: the torque that it would supply; `promised`: the error
             over noise that it would leave.
-        progress: of the diagnosis that runs or ran last; `ended`: how; `found`: its answer.
+        progress: of the diagnosis that runs or ran last; `outcome`: how it ended; `found`: its answer.
         experiment: proposed; `commands`: its file as text.
     """
 
@@ -74,7 +63,7 @@ class Desk:
         self.explainable: dict[str, float] = {}
         self.chosen, self.signature, self.promised = "", None, 0.0
         self.progress: Progress | None = None
-        self.ended = ""
+        self.outcome = ""
         self.found: Found | None = None
         self.experiment: Experiment | None = None
 
@@ -121,11 +110,11 @@ class Desk:
         self.do(words, run)
 
     def _renewed(self, bench: Workbench) -> None:
-        kept = self.found, self.progress, self.ended
+        kept = self.found, self.progress, self.outcome
         self._forget()
         self.notes = []
         if bench is self.bench:
-            self.found, self.progress, self.ended = kept
+            self.found, self.progress, self.outcome = kept
         self.bench, self.version = bench, self.version + 1
 
     def open(self, text: str) -> None:
@@ -185,17 +174,9 @@ class Desk:
         waiting, before = self.waiting, self.same_rig if together else None
 
         def run() -> None:
-<<<<<<< HEAD
             given = settings_of(typed) | waiting.settings | {"columns": columns or None}
             if waiting.lacks:
                 raise InputError(f"still needed: {' and '.join(waiting.lacks)}")
-=======
-            given = {key: text if key == "mode" else number(key, text) for key, text in controller.items()}
-            believed = {key: number(key, text) for key, text in nominal.items()}
-            more = {key: number(key, text) if key == "length" else text for key, text in settings.items()}
-            if not logs or urdf is None:
-                raise InputError("drop a log and the URDF of its rig first")
->>>>>>> 7b2fa279 (Workbench: one error over noise, as diagnose states it, on trials that nothing was fitted to; candidates with their own steps, cards, fixed and bounded numbers)
             out = self.folder / f"recording_{self.version}_{len(list(self.folder.glob('recording_*')))}"
             recording, understood = import_logs(out, given, before)
             self._load(recording.folder)
@@ -243,7 +224,7 @@ class Desk:
         def run() -> None:
             if self.bench is None or self.diagnosing is not None:
                 return
-            self.found, self.ended = None, ""
+            self.found, self.outcome = None, ""
             folder = self.folder / f"diagnosis_{self.version}_{len(list(self.folder.glob('diagnosis_*')))}"
             folder.mkdir(parents=True)
             self.diagnosing = self.bench.diagnose(folder)
@@ -260,7 +241,7 @@ class Desk:
             end = "stopped" if running.found is None else "done"
         except InputError as error:
             end = str(error)
-        self.ended, self.found, self.diagnosing = end, running.found, None
+        self.outcome, self.found, self.diagnosing = end, running.found, None
         self.changed()
 
     def end(self) -> None:
@@ -313,8 +294,6 @@ def _path(text: str) -> Path:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{text[:LABEL]!r}: no name of a file here: {reason}; type another one") from None
     return path
-<<<<<<< HEAD
-=======
 
 
 def _is_hand(joints: Sequence[str]) -> bool:
@@ -334,4 +313,3 @@ def number(key: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(f"{key}: '{text}' is no number") from None
->>>>>>> 7b2fa279 (Workbench: one error over noise, as diagnose states it, on trials that nothing was fitted to; candidates with their own steps, cards, fixed and bounded numbers)

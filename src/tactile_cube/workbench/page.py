@@ -22,24 +22,16 @@ from tornado.ioloop import IOLoop
 from tactile_cube.measurement.comparing.error import FailingInterval
 from tactile_cube.measurement.replay.model import effect_path
 from tactile_cube.measurement.units import milli
-<<<<<<< HEAD
-from tactile_cube.visualization.charts import FLOOR, SIMULATED
-from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, signals
-from tactile_cube.workbench.desk import Desk
-from tactile_cube.workbench.import_form import ImportForm
-from tactile_cube.workbench.importing import LOGS, RIGS
-from tactile_cube.workbench.state import ModelStage, Value, Workbench
-=======
 from tactile_cube.visualization.charts import SIMULATED
 from tactile_cube.workbench.cards import card
 from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart
 from tactile_cube.workbench.desk import Desk, number
-from tactile_cube.workbench.importing import RIGS, TABLES
+from tactile_cube.workbench.import_form import ImportForm
+from tactile_cube.workbench.importing import LOGS, RIGS
 from tactile_cube.workbench.missing_torque import signal_of, signals
 from tactile_cube.workbench.parameters import Value
 from tactile_cube.workbench.state import Look, Workbench
 from tactile_cube.workbench.tables import FOLDED, error_by_stage, over_noise, residual_test
->>>>>>> 7b2fa279 (Workbench: one error over noise, as diagnose states it, on trials that nothing was fitted to; candidates with their own steps, cards, fixed and bounded numbers)
 from tactile_cube.workbench.text import LABEL, Html, choose, html, listed, plain, show
 from tactile_cube.workbench.widgets import NONE, RED, YELLOW, button, column_of, row_of, text_of
 
@@ -97,7 +89,7 @@ class Page:
         self.joint = Select(title="joint", width=90)
         self.other = Select(title="beside", options=[NONE], value=NONE, width=190)
         self.where = Select(title="where it fails", options=[NONE], value=NONE, width=190)
-        self.over = MultiSelect(title="errors over it, of", size=3, width=190)
+        self.over = MultiSelect(title="errors of other trials", size=3, width=190)
         for select in (self.trial, self.joint, self.other, self.over):
             select.on_change("value", lambda attr, old, new: self._again())
         self.where.on_change("value", lambda attr, old, new: self._zoom())
@@ -304,8 +296,8 @@ class Page:
             head = f"Error over noise with {names}: {over_noise(found.over_noise)}{masked}."
             text = Html("\n").join(found.text.splitlines())
             return html(head, Html('<pre style="white-space:pre-wrap">{}</pre>').format(text), log)
-        if self.desk.ended:
-            return html(listed([self.desk.ended]), log)
+        if self.desk.outcome:
+            return html(listed([self.desk.outcome]), log)
         done = f"about {100 * progress.share:.0f} % done"
         left = f", about {progress.left:.0f} s left" if progress.share > 0.0 else ""
         return html(listed([done + left, f"best so far: {progress.best or 'nothing yet'}"]), log)

@@ -52,7 +52,7 @@ from tactile_cube.workbench.parameters import BoundedSearch, Value
 Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
 AT_ONCE = 24  # candidates that are screened between two looks at who waits
-RANKED = 8  # effects that a look shows
+RANKED = 10  # effects that a look shows
 ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
