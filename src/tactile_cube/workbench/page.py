@@ -7,7 +7,7 @@ import functools
 
 from bokeh.document import Document
 from bokeh.models import (
-    Checkbox,
+    CheckboxGroup,
     FileInput,
     LayoutDOM,
     MultiSelect,
@@ -129,7 +129,7 @@ class Page:
         self.number = Select(title="number", width=200)
         self.number.on_change("value", lambda attr, old, new: self._show_number())
         self.typed = [TextInput(title=title, width=90) for title in ("value", "at least", "at most")]
-        self.fixed = Checkbox(label="fixed", align="end")
+        self.fixed = CheckboxGroup(labels=["fixed"], width=70, align="end")
         self.present = Select(title="effects of the model", width=260)
         self.remove = button("Remove and refit", self._remove)
         refit = button("Refit", lambda: self.desk.change("refitting", lambda bench: bench.refit()))
@@ -210,7 +210,7 @@ class Page:
             self.desk.change(f"setting {one.key}", lambda bench: bench.set_parameter(one.key, value))
 
     def _set_typed(self) -> None:
-        key, fixed, texts = self.number.value, self.fixed.active, [one.value for one in self.typed]
+        key, fixed, texts = self.number.value, bool(self.fixed.active), [one.value for one in self.typed]
 
         def work(bench: Workbench) -> None:
             value, low, high = (number(key, text) for text in texts)
@@ -351,7 +351,7 @@ class Page:
         if one is not None:
             for text, value in zip(self.typed, (one.value, one.unknown.low, one.unknown.high), strict=True):
                 text.value = f"{value:.6g}"
-            self.fixed.active = one.fixed
+            self.fixed.active = [0] if one.fixed else []
 
     def _show_experiment(self, bench: Workbench) -> None:
         proposed = self.desk.experiment
