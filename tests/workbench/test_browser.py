@@ -306,7 +306,7 @@ def test_what_a_partial_answer_found_is_added(window: Any, tmp_path: Path) -> No
     window.get_by_text(re.compile(r"about \d+ % done")).wait_for()
     window.get_by_text("best so far: ").first.wait_for()
     picture(window, "9_diagnosing")
-    window.get_by_text("Some effects reduce the error, but more is missing.").wait_for()
+    window.get_by_text("Some effects reduce the error, but more is missing.").wait_for(timeout=4 * PATIENCE)
     picture(window, "9_partial")
     window.get_by_role("button", name="Add what it found").click()
     added = window.get_by_role("cell", name=re.compile("^[+] "))

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 from importlib import resources
 
 from tactile_cube.api.effects import effects
 from tactile_cube.drivetrain.effects import catalogue
-from tactile_cube.workbench.text import Html, html, listed
+from tactile_cube.workbench.text import Html, html, listed, picture
 
-PICTURE = Html(
-    '<img alt="measured less simulated angle without {}" style="max-width:100%" src="data:image/png;base64,{}">'
-)
 CARD = Html('<div style="border:1px solid #d0d7de;border-radius:6px;padding:6px 10px"><b>{}</b>{}{}{}</div>')
 
 
@@ -28,4 +24,4 @@ def _picture(name: str) -> Html:
     file = resources.files("tactile_cube.visualization").joinpath("effects", f"{name}.png")
     if not file.is_file():
         return html()
-    return Html(PICTURE).format(name, Html(base64.b64encode(file.read_bytes()).decode("ascii")))
+    return picture(f"measured less simulated angle without {name}", file.read_bytes())

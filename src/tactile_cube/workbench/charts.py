@@ -99,7 +99,7 @@ class TimeChart:
                     source=ColumnDataSource(NOTHING),
                     color=below,
                     line_dash=dash,
-                    legend_label=name,
+                    legend_label=plain(name),
                     line_width=1.5,
                 ),
                 self.error.line(
@@ -108,7 +108,7 @@ class TimeChart:
                     source=ColumnDataSource(NOTHING),
                     color=above,
                     line_dash=dash,
-                    legend_label=name,
+                    legend_label=plain(name),
                     line_width=1.5,
                 ),
             )

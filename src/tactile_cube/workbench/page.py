@@ -32,7 +32,7 @@ from tactile_cube.workbench.missing_torque import signal_of, signals
 from tactile_cube.workbench.parameters import Value
 from tactile_cube.workbench.state import Look, Workbench
 from tactile_cube.workbench.tables import FOLDED, error_by_stage, over_noise, residual_test
-from tactile_cube.workbench.text import LABEL, Html, choose, html, listed, plain, show
+from tactile_cube.workbench.text import LABEL, Html, choose, choose_several, html, listed, plain, show
 from tactile_cube.workbench.widgets import NONE, RED, YELLOW, button, column_of, row_of, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
@@ -128,7 +128,7 @@ class Page:
         self.sliders = column_of()
         self.number = Select(title="number", width=200)
         self.number.on_change("value", lambda attr, old, new: self._show_number())
-        self.typed = [TextInput(title=title, width=90) for title in ("value", "at least", "at most")]
+        self.typed = [TextInput(title=plain(title), width=90) for title in ("value", "at least", "at most")]
         self.fixed = CheckboxGroup(labels=["fixed"], width=70, align="end")
         self.present = Select(title="effects of the model", width=260)
         self.remove = button("Remove and refit", self._remove)
@@ -277,8 +277,7 @@ class Page:
         others = [t.name for t in recording.trials if t.name not in bench.never_fitted]
         choose(self.trial, [(name, f"{name} (never fitted)") for name in trials] + [(name, name) for name in others])
         choose(self.joint, list(recording.joints), "" if self.joint.value else recording.joints[-1])
-        names = [name for name, *_ in self.trial.options]
-        self.over.options, self.over.value = names, [one for one in self.over.value if one in names]
+        choose_several(self.over, [*trials, *others])
         choose(self.other, [NONE, *(f"{k}: {one.label}" for k, one in enumerate(bench.stages[:-1]))])
         choose(self.present, bench.effects)
         self.remove.disabled = not bench.effects
