@@ -287,7 +287,7 @@ def test_a_diagnosis_is_stopped_in_the_middle_and_another_one_answers(
     window.get_by_text("stopped", exact=True).wait_for()
     assert window.get_by_role("button", name="Add what it found").is_disabled()
     window.get_by_role("button", name="Diagnose").click()
-    window.locator("pre", has_text="stribeck_friction").wait_for()
+    window.locator("pre", has_text="stribeck_friction").wait_for(timeout=4 * PATIENCE)
     picture(window, "8_diagnosis")
     stated = window.get_by_text("Error over noise with stribeck_friction@a: ").inner_text()
     window.get_by_role("button", name="Add what it found").click()
