@@ -1,12 +1,13 @@
 """Write the pages of the documentation that the code knows better: commands, configuration, effects, API.
 
-python docs/generate.py            # docs/commands.md, configuration.md, effects.md, api.md
-python docs/generate.py --pictures # also docs/images/effects/*.png, each effect's signature (some minutes)
+python docs/generate.py            # docs/commands.md, configuration.md, effects.md with its pictures, api.md
+python docs/generate.py --pictures # draws each effect's signature anew, for the workbench too (some minutes)
 """
 
 from __future__ import annotations
 
 import inspect
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +21,7 @@ from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.errors import InputError
 
 DOCS = Path(__file__).parent
-PICTURES = DOCS / "images" / "effects"
+PICTURES = Path(tactile_cube.__file__).parent / "visualization" / "effects"
 JOINT = "q2"
 ELSEWHERE = {"coupling_error": "q3"}
 """Effects whose picture is of another joint: q2 leads none."""
@@ -32,6 +33,7 @@ def main() -> None:
         (DOCS / name).write_text(page(), encoding="utf-8")
     if "--pictures" in sys.argv:
         write_pictures()
+    shutil.copytree(PICTURES, DOCS / "images" / "effects", dirs_exist_ok=True)
 
 
 def effects_page() -> str:

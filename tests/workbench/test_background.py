@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from tactile_cube.errors import InputError
+from tactile_cube.identification.in_words import PARTIAL
 from tactile_cube.workbench.background import Diagnosing
-from tests.workbench.small_bench import STRIBECK, stribeck_recording
+from tests.workbench.small_bench import STRIBECK, partly_known, stribeck_recording
 
 
 def test_a_diagnosis_tells_its_progress_and_its_answer(tmp_path: Path) -> None:
@@ -20,6 +21,18 @@ def test_a_diagnosis_tells_its_progress_and_its_answer(tmp_path: Path) -> None:
     assert running.found is not None
     assert running.found.effects == [STRIBECK]
     assert (tmp_path / "found" / "report.html").is_file()
+
+
+def test_an_answer_that_names_no_effect_for_certain_has_those_of_its_model(tmp_path: Path) -> None:
+    running = Diagnosing(partly_known(tmp_path), None, (), 0, tmp_path / "found")
+    shares = [running.progress.share for _ in running.lines()]
+    assert shares == sorted(shares)
+    assert STRIBECK in running.progress.best.replace("(excess, velocity)", "")
+    found = running.found
+    assert found is not None
+    assert PARTIAL in found.text
+    assert STRIBECK in found.effects
+    assert [term.label for term in found.fitted.model.terms] == found.effects
 
 
 def test_a_diagnosis_is_stopped_at_once(tmp_path: Path) -> None:

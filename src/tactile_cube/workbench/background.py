@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from threading import Thread
 from typing import NamedTuple
 
+import numpy as np
+
 from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.errors import InputError
+from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.measurement.recordings.recording import Recording
+
+BEST = "best so far: "
+PHASES = (
+    ("steps of simulation a sample", 0.05), ("base refitted", 0.15), ("starts of", 0.25), (BEST, 0.5),
+    ("  held-out error", 0.75), ("verdict", 0.9),
+)  # fmt: skip
+"""What lines of a diagnosis begin with or contain, and which share of its time has gone by then, about."""
 
 
 class Found(NamedTuple):
@@ -20,11 +32,48 @@ class Found(NamedTuple):
 
     Attributes:
         text: in plain words.
-        effects: what is missing, NAME@JOINT; of sets that do as well the first.
+        effects: what is missing, NAME@JOINT; of sets that do as well the first; where not all was found, that part.
+        fitted: the model that it recommends.
+        over_noise: error of its segments of untouched trials, in units of the sensor noise.
+        left_out: whether it masked intervals of the trials, so that its errors are of fewer samples than others.
     """
 
     text: str
     effects: list[str]
+    fitted: Fitted
+    over_noise: float
+    left_out: bool
+
+
+@dataclass
+class Progress:
+    """How far a diagnosis is.
+
+    Attributes:
+        lines: everything that it said.
+        share: done, about.
+        best: best answer so far, in its words.
+    """
+
+    lines: list[str] = field(default_factory=list)
+    share: float = 0.0
+    best: str = ""
+    began: float = field(default_factory=time.monotonic)
+
+    def add(self, line: str) -> None:
+        """Take a line."""
+        self.lines = [*self.lines, line]
+        reached = max((share for words, share in PHASES if words in line), default=0.0)
+        self.share = max(self.share, reached)
+        if line.startswith(BEST):
+            self.best = line.removeprefix(BEST)
+        elif line.startswith("base refitted: "):
+            self.best = f"nothing yet; the refitted model leaves {line.rpartition('error ')[2]}"
+
+    @property
+    def left(self) -> float:
+        """Seconds, about."""
+        return (time.monotonic() - self.began) * (1.0 - self.share) / max(self.share, 0.01)
 
 
 class Diagnosing:
@@ -43,6 +92,7 @@ class Diagnosing:
             folder: where its files go.
         """
         self.found: Found | None = None
+        self.progress = Progress()
         self.stopped = False
         context = multiprocessing.get_context("spawn")
         self._receiver, sender = context.Pipe(duplex=False)
@@ -67,6 +117,7 @@ class Diagnosing:
             if isinstance(said, Found):
                 self.found = said
             else:
+                self.progress.add(str(said))
                 yield str(said)
         self._process.join()
         if self.found is None and not self.stopped:
@@ -105,7 +156,11 @@ def _diagnose(
     try:
         found = diagnose(recording, seed=seed, effects=effects, model=model, say=say)
         found.write(folder)
-        chosen = (found.data["sets"] or [found.effects])[0]
-        sender.send(Found(found.text, list(dict.fromkeys(chosen))))
+        assert found.free is not None  # a workbench has free motion
+        fitted, known = found.free.fitted, found.free.known
+        light = replace(fitted.fit, columns=np.zeros(0), residual=np.zeros(0))
+        new = [term.label for term in fitted.model.terms if term.label not in known]
+        over_noise = found.data["error_over_noise"]["with_effects"]
+        sender.send(Found(found.text, new, replace(fitted, fit=light), over_noise, bool(found.data["left_out"])))
     except InputError as error:
         sender.send(error)

@@ -2,27 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from bokeh.events import Tap
-from bokeh.models import BoxAnnotation, ColumnDataSource, Range1d, Span
+from bokeh.models import (
+    BoxAnnotation,
+    ColumnDataSource,
+    CrosshairTool,
+    DataRange1d,
+    GlyphRenderer,
+    HoverTool,
+    Range1d,
+    Span,
+)
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from tactile_cube.identification.next_experiment import Experiment
-from tactile_cube.identification.search.residual_shape import Missing, shapes
+from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.measurement.comparing.comparison import Comparison
 from tactile_cube.measurement.comparing.error import residuals
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.units import THOUSANDTHS, of_joint
 from tactile_cube.visualization.charts import BEFORE, ERROR, FAILING, FLOOR, GRID, MEASURED, PALETTE, SIMULATED
+from tactile_cube.workbench.missing_torque import curve
 from tactile_cube.workbench.text import label, plain
 
 Array = NDArray[np.float64]
 TOOLS = "xpan,xwheel_zoom,box_zoom,reset,save"
-POINTS, DRAWN = 3000, 20_000  # samples of the missing torque, and of a trial, that are drawn at most
+POINTS, DRAWN = 1500, 20_000  # samples of the missing torque, and of a trial, that are drawn at most
 CONTEXT = 0.5  # [s] shown on either side of a failing interval
+NOTHING: Mapping[str, Sequence[float]] = {"t": [], "y": []}
+SHOWN = (0.02, 0.98)  # quantiles of the missing torque between which it is shown
 
 
 def _figure(height: int, x: str, y: str, tools: str = TOOLS, **more: object) -> figure:
@@ -43,79 +55,139 @@ def _legend_above(made: figure) -> None:
     made.legend[0].border_line_color = None
 
 
+def _draw(made: figure, line: GlyphRenderer, data: Mapping[str, object]) -> None:
+    """Give a line its data, and the legend an entry only where something of it is drawn."""
+    line.data_source.data = dict(data)
+    for item in made.legend[0].items if made.legend else []:
+        if line in item.renderers:
+            item.visible = len(next(iter(data.values()))) > 0  # type: ignore[arg-type]
+
+
 class TimeChart:
-    """Measured and simulated over time, and below it the error with the noise band and the failing intervals."""
+    """The error over time with the noise band and the failing intervals; below it positions, and commanded torques."""
 
     def __init__(self) -> None:
         self.x = Range1d(0.0, 1.0)
-        self.angle = _figure(260, "", "position", x_range=self.x)
-        self.error = _figure(190, "time [s]", "error", x_range=self.x)
-        self.simulated, self.beside = (ColumnDataSource({"t": [], "y": [], "e": []}) for _ in range(2))
-        self.command, self.measured = (ColumnDataSource({"t": [], "y": []}) for _ in range(2))
+        # the window of time decides what is shown of the other axis
+        zooming = {"x_range": self.x, "window_axis": "x"}
+        self.error = _figure(240, "", "error", y_range=DataRange1d(), **zooming)
+        self.angle = _figure(220, "time [s]", "position", y_range=DataRange1d(), **zooming)
+        self.command = _figure(140, "time [s]", "command", y_range=DataRange1d(), **zooming)
+        self.figures = (self.error, self.angle, self.command)
         self.failing = ColumnDataSource({"x0": [], "x1": []})
-        for made in (self.angle, self.error):
+        cursor = Span(dimension="height", line_color=FLOOR, line_dash="dotted")
+        for made in self.figures[:2]:
             made.vstrip(x0="x0", x1="x1", source=self.failing, fill_color=FAILING, line_color=None, level="underlay")
-        lines = (
-            (self.command, "command", FLOOR, "dotted"),
-            (self.measured, "measured", MEASURED, "solid"),
-            (self.beside, "other model", BEFORE, "dashed"),
-            (self.simulated, "model", SIMULATED, "solid"),
-        )
-        for source, name, color, dash in lines:
-            self.angle.line(
-                "t", "y", source=source, color=color, line_dash=dash, legend_label=plain(name), line_width=1.5
+        self.played, self.asked = (
+            made.line("t", "y", source=ColumnDataSource(NOTHING), color=FLOOR, line_dash=dash, **more)
+            for made, dash, more in (
+                (self.angle, "dotted", {"legend_label": "command", "line_width": 1.5}),
+                (self.command, "solid", {}),
             )
-        for source, color, dash in ((self.beside, BEFORE, "dashed"), (self.simulated, ERROR, "solid")):
-            self.error.line("t", "e", source=source, color=color, line_dash=dash, line_width=1.5)
+        )
+        self.others = self.error.multi_line(
+            "t", "y", source=ColumnDataSource(NOTHING), color=FLOOR, alpha=0.5, legend_label="other trials"
+        )
+        self.measured = self.angle.line(
+            "t", "y", source=ColumnDataSource(NOTHING), color=MEASURED, legend_label="measured", line_width=1.5
+        )
+        self.models = [
+            (
+                self.angle.line(
+                    "t",
+                    "y",
+                    source=ColumnDataSource(NOTHING),
+                    color=below,
+                    line_dash=dash,
+                    legend_label=plain(name),
+                    line_width=1.5,
+                ),
+                self.error.line(
+                    "t",
+                    "y",
+                    source=ColumnDataSource(NOTHING),
+                    color=above,
+                    line_dash=dash,
+                    legend_label=plain(name),
+                    line_width=1.5,
+                ),
+            )
+            for name, below, above, dash in (
+                ("other model", BEFORE, SIMULATED, "dashed"),
+                ("model", SIMULATED, ERROR, "solid"),
+            )
+        ]
+        for made, lines in (
+            (self.error, [self.models[1][1]]),
+            (self.angle, [self.measured]),
+            (self.command, [self.asked]),
+        ):
+            hover = HoverTool(renderers=lines, mode="vline", tooltips=[("time", "@t{0.000} s"), ("here", "@y{0.0000}")])
+            made.add_tools(CrosshairTool(overlay=cursor, dimensions="height"), hover)
+            made.on_event(Tap, self._zoom_into)
         self.band = BoxAnnotation(fill_color=FLOOR, fill_alpha=0.2, level="underlay")
         self.error.add_layout(self.band)
+        _legend_above(self.error)
         _legend_above(self.angle)
-        for made in (self.angle, self.error):
-            made.on_event(Tap, self._zoom_into)
         self._trial: Trial | None = None
         self._joint = 0
 
-    def show(self, compared: Comparison, joint: int, beside: Array | None) -> None:
-        """Draw one trial of a comparison, and the positions (n, joints) of another model beside it."""
+    def show(
+        self, compared: Comparison, joint: int, beside: Array | None, others: Sequence[tuple[Trial, Array]] = ()
+    ) -> None:
+        """Draw one trial of a comparison.
+
+        Args:
+            compared: the model beside one trial.
+            joint: which.
+            beside: (n, joints) of another model.
+            others: trials whose errors are drawn over it, with their simulated positions.
+        """
         recording, trial = compared.recording, compared.recording.trials[0]
-        unit = recording.units[recording.joints[joint]]
+        name = recording.joints[joint]
+        unit, torque = recording.units[name], recording.torque_controlled
         if self._trial is not trial:
             self.x.update(start=0.0, end=trial.duration, reset_start=0.0, reset_end=trial.duration)
         self._trial, self._joint = trial, joint
         label(self.angle.yaxis[0], f"position [{unit}]")
         label(self.error.yaxis[0], f"error [{THOUSANDTHS[unit]}]")
-        rows = self._rows()
-        command = (
-            trial.command[rows, joint] if not recording.torque_controlled else np.full(len(trial.time[rows]), np.nan)
-        )
-        self.command.data = {"t": trial.time[rows], "y": command}
-        self.measured.data = {"t": trial.time[rows], "y": trial.position[rows, joint]}
-        floor = 1e3 * compared.floor.joints[recording.joints[joint]]
+        label(self.command.yaxis[0], of_joint("command [N m]", unit))
+        rows, nothing = self._rows(), NOTHING
+        command = {"t": trial.time[rows], "y": trial.command[rows, joint]}
+        _draw(self.angle, self.played, nothing if torque else command)
+        _draw(self.command, self.asked, command if torque else nothing)
+        self.command.visible = torque
+        _draw(self.angle, self.measured, {"t": trial.time[rows], "y": trial.position[rows, joint]})
+        floor = 1e3 * compared.floor.joints[name]
         self.band.update(top=2.0 * floor, bottom=-2.0 * floor)
-        failing = [one for one in compared.failing_intervals if one.joint == recording.joints[joint]]
+        failing = [one for one in compared.failing_intervals if one.joint == name]
         self.failing.data = {"x0": [one.start for one in failing], "x1": [one.end for one in failing]}
-        self._draw(self.simulated, compared.simulated[0].position)
-        if beside is None:
-            self.beside.data = {"t": [], "y": [], "e": []}
-        else:
-            self._draw(self.beside, beside)
+        self.move(compared.simulated[0].position)
+        self._draw_model(0, beside)
+        errors = [(one, residuals([one], [position])[0][:, joint]) for one, position in others]
+        thin = {"t": [one.time[self._rows(one)] for one, _ in errors]}
+        _draw(self.error, self.others, thin | {"y": [1e3 * error[self._rows(one)] for one, error in errors]})
 
     def move(self, simulated: Array) -> None:
         """Draw other positions (n, joints) of the model."""
-        self._draw(self.simulated, simulated)
+        self._draw_model(1, simulated)
 
     def zoom(self, start: float, end: float) -> None:
         """Show an interval with what is around it."""
         self.x.update(start=max(0.0, start - CONTEXT), end=min(end + CONTEXT, self.x.reset_end))
 
-    def _draw(self, source: ColumnDataSource, position: Array) -> None:
-        assert self._trial is not None
-        error, rows = residuals([self._trial], [position])[0], self._rows()
-        y, e = position[rows, self._joint], 1e3 * error[rows, self._joint]
-        source.data = {"t": self._trial.time[rows], "y": y, "e": e}
+    def _draw_model(self, which: int, position: Array | None) -> None:
+        angle, error = self.models[which]
+        for made, line in ((self.angle, angle), (self.error, error)):
+            if position is None or self._trial is None:
+                _draw(made, line, NOTHING)
+                continue
+            values = position if made is self.angle else 1e3 * residuals([self._trial], [position])[0]
+            _draw(made, line, {"t": self._trial.time[self._rows()], "y": values[self._rows(), self._joint]})
 
-    def _rows(self) -> slice:
-        return slice(None, None, 1 + (0 if self._trial is None else len(self._trial.time) // DRAWN))
+    def _rows(self, trial: Trial | None = None) -> slice:
+        one = trial or self._trial
+        return slice(None, None, 1 + (0 if one is None else len(one.time) // DRAWN))
 
     def _zoom_into(self, event: Tap) -> None:
         for start, end in zip(self.failing.data["x0"], self.failing.data["x1"], strict=True):
@@ -124,17 +196,21 @@ class TimeChart:
 
 
 class MissingChart:
-    """The torque that the model lacks over a signal: samples, mean over bins, and what a candidate would supply."""
+    """The torque that the model lacks over a signal: its mean with an interval, and what a candidate would supply."""
 
     def __init__(self) -> None:
-        self.figure = _figure(280, "", "missing torque", "pan,wheel_zoom,box_zoom,reset,save")
-        self.points, self.mean, self.law = (ColumnDataSource({"x": [], "y": []}) for _ in range(3))
-        self.figure.scatter("x", "y", source=self.points, size=2, color=FLOOR, alpha=0.3, legend_label="missing")
-        self.figure.line("x", "y", source=self.mean, color=MEASURED, line_width=2.5, legend_label="its mean")
-        self.figure.line(
-            "x", "y", source=self.law, color=BEFORE, line_width=2.5, line_dash="dashed", legend_label="candidate's mean"
+        self.y = Range1d()
+        self.figure = _figure(280, "", "missing torque", "pan,wheel_zoom,box_zoom,reset,save", y_range=self.y)
+        self.points, self.law = (ColumnDataSource({"x": [], "mean": []}) for _ in range(2))
+        self.mean = ColumnDataSource({"x": [], "mean": [], "low": [], "high": []})
+        drawn = self.figure
+        drawn.scatter("x", "mean", source=self.points, size=2, color=FLOOR, alpha=0.25, legend_label="missing")
+        drawn.varea("x", "low", "high", source=self.mean, fill_color=MEASURED, fill_alpha=0.2, legend_label="95 %")
+        drawn.line("x", "mean", source=self.mean, color=MEASURED, line_width=2.5, legend_label="its mean")
+        self.supplied = drawn.line(
+            "x", "mean", source=self.law, color=BEFORE, line_width=2.5, line_dash="dashed", legend_label="candidate"
         )
-        _legend_above(self.figure)
+        _legend_above(drawn)
 
     def show(self, missing: Missing, signal: str, law: Missing | None, unit: str) -> None:
         """Draw it over one of its signals."""
@@ -142,25 +218,14 @@ class MissingChart:
         lacks = of_joint("missing torque [N m]", unit)
         label(self.figure.yaxis[0], lacks.replace("torque", "force") if lacks.endswith("[N]") else lacks)
         some = slice(None, None, max(1, len(missing.torque) // POINTS))
-        self.points.data = {"x": missing.signals[signal][some], "y": missing.torque[some]}
-        self.mean.data = _curves(missing, signal)
-        self.law.data = {"x": [], "y": []} if law is None else _curves(law, signal)
-
-
-def signals(missing: Missing) -> list[str]:
-    """Signals of a missing torque, the one that explains most first."""
-    return list(dict.fromkeys(one.against.partition(", moving")[0] for one in shapes(missing)))
-
-
-def _curves(missing: Missing, signal: str) -> dict[str, Array]:
-    """Means over the bins of a signal, for either direction of motion where they differ; nan parts the curves."""
-    known = [one for one in shapes(missing) if one.against.partition(", moving")[0] == signal]
-    drawn = [one for one in known if one.against != signal] or known
-    gap = np.array([np.nan])
-    return {
-        "x": np.concatenate([part for one in drawn for part in (one.centres, gap)]),
-        "y": np.concatenate([part for one in drawn for part in (one.mean, gap)]),
-    }
+        self.points.data = {"x": missing.signals[signal][some], "mean": missing.torque[some]}
+        found = curve(missing, signal)
+        self.mean.data = {"x": found.x, "mean": found.mean, "low": found.low, "high": found.high}
+        supplied = np.zeros((2, 0)) if law is None else np.stack(curve(law, signal)[:2])
+        _draw(self.figure, self.supplied, {"x": supplied[0], "mean": supplied[1]})
+        inside = [*np.quantile(missing.torque, SHOWN), *found.low, *found.high, *supplied[1]]
+        low, high = np.nanmin(inside), np.nanmax(inside)
+        self.y.update(start=low, end=high, reset_start=low, reset_end=high)
 
 
 class ExperimentChart:

@@ -14,17 +14,16 @@ from typing import Any
 
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
+from tactile_cube.hand import DLR_HAND2
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Missing
-from tactile_cube.identification.search.screening import Score
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.usage_error import usage_error
-from tactile_cube.workbench.background import Diagnosing, Found
+from tactile_cube.workbench.background import Diagnosing, Found, Progress
 from tactile_cube.workbench.importing import Preview, Waiting, import_logs, kept, settings_of
-from tactile_cube.workbench.state import Workbench
+from tactile_cube.workbench.state import Look, Workbench
 
-PROGRESS = 12  # lines of a diagnosis that are kept
 LABEL = 60  # characters of a wrong name that an error repeats
 
 
@@ -37,10 +36,11 @@ class Desk:
         busy: what is being done, in words.
         problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
         waiting: files that wait to be imported; `preview`: what is in the first.
-        scores: a first look at the candidates, joint -> best first, twins together, of this version.
+        looks: a look at the candidates, joint -> best first, those that look alike together, of this version.
         explainable: joint -> part of the missing torque that any law could explain, of this version.
-        signature: the torque that the candidate looked at would supply.
-        progress: of the diagnosis that runs or ran last; `found`: its answer.
+        chosen: the candidate looked at, NAME@JOINT; `signature`: the torque that it would supply; `promised`: the error
+            over noise that it would leave.
+        progress: of the diagnosis that runs or ran last; `outcome`: how it ended; `found`: its answer.
         experiment: proposed; `commands`: its file as text.
     """
 
@@ -55,14 +55,15 @@ class Desk:
         self.diagnosing: Diagnosing | None = None
         self.listeners: list[Callable[[], None]] = []
         self._worker, self._queued = ThreadPoolExecutor(1), 0
+        self.signature: Missing | None
         self._forget()
 
     def _forget(self) -> None:
-        self.scores: dict[str, list[list[Score]]] = {}
+        self.looks: dict[str, list[list[Look]]] = {}
         self.explainable: dict[str, float] = {}
-        self.signature: Missing | None = None
-        self.signature_of: str = ""
-        self.progress: list[str] = []
+        self.chosen, self.signature, self.promised = "", None, 0.0
+        self.progress: Progress | None = None
+        self.outcome = ""
         self.found: Found | None = None
         self.experiment: Experiment | None = None
 
@@ -109,11 +110,11 @@ class Desk:
         self.do(words, run)
 
     def _renewed(self, bench: Workbench) -> None:
-        found, progress = self.found, self.progress
+        kept = self.found, self.progress, self.outcome
         self._forget()
         self.notes = []
         if bench is self.bench:
-            self.found, self.progress = found, progress
+            self.found, self.progress, self.outcome = kept
         self.bench, self.version = bench, self.version + 1
 
     def open(self, text: str) -> None:
@@ -192,27 +193,28 @@ class Desk:
         self.waiting, self.preview = Waiting(urdf=bench.opened.rig.path), None
 
     def look(self, joint: str) -> None:
-        """Take a first look at the candidates of a joint, unless it was taken."""
+        """Look at the candidates of a joint, unless that was done."""
 
         def run() -> None:
-            if self.bench is None or joint not in self.bench.recording.joints or joint in self.scores:
+            if self.bench is None or joint not in self.bench.recording.joints or joint in self.looks:
                 return
             found = self.bench.candidates(joint, stop=lambda: self._queued > 0)
             if found is None:
                 self.look(joint)  # after what somebody is waiting for
             else:
                 self.explainable[joint] = self.bench.explainable(joint)
-                self.scores[joint] = found
+                self.looks[joint] = found
 
-        self.do(f"a first look at what may be missing at {joint}", run, asked=False)
+        self.do(f"looking at what may be missing at {joint}", run, asked=False)
 
-    def draw(self, score: Score, label: str, joint: str) -> None:
-        """Find the torque that a candidate would supply."""
+    def draw(self, look: Look, label: str) -> None:
+        """Find the torque that a candidate would supply, and what it would leave."""
         bench, version = self.bench, self.version
 
         def run() -> None:
             if bench is not None and version == self.version:
-                self.signature, self.signature_of = bench.signature(score, joint), label
+                self.signature, self.promised = bench.signature(look), bench.promised(look)
+                self.chosen = label
 
         self.do(f"what {label} would supply", run)
 
@@ -222,10 +224,11 @@ class Desk:
         def run() -> None:
             if self.bench is None or self.diagnosing is not None:
                 return
-            self.found, self.progress = None, ["starting"]
+            self.found, self.outcome = None, ""
             folder = self.folder / f"diagnosis_{self.version}_{len(list(self.folder.glob('diagnosis_*')))}"
             folder.mkdir(parents=True)
             self.diagnosing = self.bench.diagnose(folder)
+            self.progress = self.diagnosing.progress
             Thread(target=self._watch, args=(self.diagnosing,), daemon=True).start()
 
         self.do("starting a diagnosis", run)
@@ -233,14 +236,12 @@ class Desk:
     def _watch(self, running: Diagnosing) -> None:
         end = "stopped"
         try:
-            for line in running.lines():
-                self.progress = [*self.progress[1 - PROGRESS :], line]
+            for _ in running.lines():
                 self.changed()
             end = "stopped" if running.found is None else "done"
         except InputError as error:
             end = str(error)
-        self.progress = [*self.progress[1 - PROGRESS :], end]
-        self.found, self.diagnosing = running.found, None
+        self.outcome, self.found, self.diagnosing = end, running.found, None
         self.changed()
 
     def end(self) -> None:
@@ -271,10 +272,9 @@ class Desk:
             if self.bench is not None:
                 self.bench.save(_path(folder))
                 model = _path(folder) / "model.yaml"
-                self.notes = [
-                    f"saved {model} and report.html",
-                    f"train in it: python -m tactile_cube.train +experiment=adapt model={model}",
-                ]
+                self.notes = [f"saved {model} and report.html"]
+                if _is_hand(self.bench.recording.joints):
+                    self.notes += [f"train in it: python -m tactile_cube.train +experiment=adapt model={model}"]
 
         self.do("saving", run)
 
@@ -294,3 +294,22 @@ def _path(text: str) -> Path:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{text[:LABEL]!r}: no name of a file here: {reason}; type another one") from None
     return path
+
+
+def _is_hand(joints: Sequence[str]) -> bool:
+    """Whether these are all joints of the hand that is trained, or those of one of its fingers."""
+    hand = DLR_HAND2.joint_names
+    known = [one for joint in joints for one in hand if one == joint or one.endswith(f"_{joint}")]
+    return sorted(known) == sorted(hand)
+
+
+def number(key: str, text: str) -> float:
+    """Return what somebody typed as a number.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{key}: '{text}' is no number") from None

@@ -7,8 +7,10 @@ import functools
 
 from bokeh.document import Document
 from bokeh.models import (
+    CheckboxGroup,
     FileInput,
     LayoutDOM,
+    MultiSelect,
     PrintfTickFormatter,
     RadioGroup,
     Select,
@@ -17,17 +19,20 @@ from bokeh.models import (
 )
 from tornado.ioloop import IOLoop
 
-from tactile_cube.identification.search.screening import Score
 from tactile_cube.measurement.comparing.error import FailingInterval
 from tactile_cube.measurement.replay.model import effect_path
 from tactile_cube.measurement.units import milli
-from tactile_cube.visualization.charts import FLOOR, SIMULATED
-from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, signals
-from tactile_cube.workbench.desk import Desk
+from tactile_cube.visualization.charts import SIMULATED
+from tactile_cube.workbench.cards import card
+from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart
+from tactile_cube.workbench.desk import Desk, number
 from tactile_cube.workbench.import_form import ImportForm
 from tactile_cube.workbench.importing import LOGS, RIGS
-from tactile_cube.workbench.state import ModelStage, Value, Workbench
-from tactile_cube.workbench.text import LABEL, Html, choose, html, listed, plain, show
+from tactile_cube.workbench.missing_torque import signal_of, signals
+from tactile_cube.workbench.parameters import Value
+from tactile_cube.workbench.state import Look, Workbench
+from tactile_cube.workbench.tables import FOLDED, error_by_stage, over_noise, residual_test
+from tactile_cube.workbench.text import LABEL, Html, choose, choose_several, html, listed, plain, show
 from tactile_cube.workbench.widgets import NONE, RED, YELLOW, button, column_of, row_of, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
@@ -59,9 +64,9 @@ class Page:
         return [
             ("compare", "Compare", self._compare_part()),
             ("missing", "Missing torque", self._missing_part()),
-            ("stages", "Error by stage", self._stages_part()),
             ("candidates", "What may be missing", self._candidates_part()),
             ("diagnosis", "Diagnosis", self._diagnosis_part()),
+            ("stages", "Error by stage", self._stages_part()),
             ("values", "Numbers of the model", self._values_part()),
             ("next", "Next experiment", self._next_part()),
             ("save", "Save", self._save_part()),
@@ -84,12 +89,13 @@ class Page:
         self.joint = Select(title="joint", width=90)
         self.other = Select(title="beside", options=[NONE], value=NONE, width=190)
         self.where = Select(title="where it fails", options=[NONE], value=NONE, width=190)
-        for select in (self.trial, self.joint, self.other):
+        self.over = MultiSelect(title="errors of other trials", size=3, width=190)
+        for select in (self.trial, self.joint, self.other, self.over):
             select.on_change("value", lambda attr, old, new: self._again())
         self.where.on_change("value", lambda attr, old, new: self._zoom())
         self.sentences = text_of()
-        choices = row_of(self.trial, self.joint, self.other, self.where)
-        return column_of(choices, self.time.angle, self.time.error, self.sentences)
+        choices = row_of(self.trial, self.joint, self.other, self.where, self.over)
+        return column_of(choices, *self.time.figures, self.sentences)
 
     def _missing_part(self) -> LayoutDOM:
         self.signal = Select(title="over", width=300)
@@ -102,14 +108,14 @@ class Page:
         return column_of(self.stairs, row_of(undo))
 
     def _candidates_part(self) -> LayoutDOM:
-        self.scores: list[Score] = []
+        self.looks: list[Look] = []
         self.ranked = RadioGroup(labels=[], sizing_mode="stretch_width")
         self.ranked.on_change("active", lambda attr, old, new: self._look_closer())
         self.another = Select(title="another effect", width=260)
         self.another.on_change("value", lambda attr, old, new: self._another())
-        self.unseen = text_of()
+        self.card, self.unseen = text_of(), text_of()
         add = button("Add and refit", self._add, "primary")
-        return column_of(self.ranked, row_of(self.another, add), self.unseen)
+        return column_of(self.ranked, row_of(self.another, add), self.card, self.unseen)
 
     def _diagnosis_part(self) -> LayoutDOM:
         self.start = button("Diagnose", self._start_or_stop)
@@ -118,10 +124,20 @@ class Page:
         return column_of(row_of(self.start, self.accept), self.progress)
 
     def _values_part(self) -> LayoutDOM:
+        self.values: list[Value] = []
         self.sliders = column_of()
+        self.number = Select(title="number", width=200)
+        self.number.on_change("value", lambda attr, old, new: self._show_number())
+        self.typed = [TextInput(title=plain(title), width=90) for title in ("value", "at least", "at most")]
+        self.fixed = CheckboxGroup(labels=["fixed"], width=70, align="end")
         self.present = Select(title="effects of the model", width=260)
         self.remove = button("Remove and refit", self._remove)
-        return column_of(self.sliders, row_of(self.present, self.remove))
+        refit = button("Refit", lambda: self.desk.change("refitting", lambda bench: bench.refit()))
+        return column_of(
+            self.sliders,
+            row_of(self.number, *self.typed, self.fixed, button("Set", self._set_typed), refit),
+            row_of(self.present, self.remove),
+        )
 
     def _next_part(self) -> LayoutDOM:
         self.proposal = text_of()
@@ -148,23 +164,28 @@ class Page:
             start, end = self.where.value.split("|")
             self.time.zoom(float(start), float(end))
 
+    @property
+    def candidate(self) -> str:
+        """The effect that is chosen, by its name; empty: none is."""
+        if self.ranked.active is not None:
+            return self.looks[int(self.ranked.active)].name
+        return "" if self.another.value == NONE else str(self.another.value)
+
     def _look_closer(self) -> None:
-        if self.showing or self.ranked.active is None:
-            return
-        score = self.scores[self.ranked.active]
-        self.another.value = NONE
-        self.desk.draw(score, f"{effect_path(score.candidate.effect)}@{self.joint.value}", self.joint.value)
+        if not self.showing and self.ranked.active is not None:
+            self.another.value = NONE
+            look = self.looks[self.ranked.active]
+            self.desk.draw(look, f"{look.name}@{self.joint.value}")
+            self._show_card()
 
     def _another(self) -> None:
         if not self.showing and self.another.value != NONE:
             self.ranked.active = None
+            self._show_card()
 
     def _add(self) -> None:
-        name = self.another.value
-        if self.ranked.active is not None:
-            name = effect_path(self.scores[self.ranked.active].candidate.effect)
-        if name not in (NONE, ""):
-            label = f"{name}@{self.joint.value}"
+        if self.candidate:
+            label = f"{self.candidate}@{self.joint.value}"
             self.desk.change(f"adding {label}", lambda bench: bench.add(label))
 
     def _remove(self) -> None:
@@ -176,8 +197,8 @@ class Page:
 
     def _accept(self) -> None:
         found = self.desk.found
-        if found is not None and found.effects:
-            self.desk.change("adding what was found", lambda bench: bench.add(*found.effects))
+        if found is not None:
+            self.desk.change("adding what was found", lambda bench: bench.adopt(found))
 
     def _move(self, one: Value, value: float) -> None:
         bench = self.desk.bench
@@ -187,6 +208,17 @@ class Page:
     def _set(self, one: Value, value: float) -> None:
         if value != one.value:
             self.desk.change(f"setting {one.key}", lambda bench: bench.set_parameter(one.key, value))
+
+    def _set_typed(self) -> None:
+        key, fixed, texts = self.number.value, bool(self.fixed.active), [one.value for one in self.typed]
+
+        def work(bench: Workbench) -> None:
+            value, low, high = (number(key, text) for text in texts)
+            bench.bound(key, *((value, value) if fixed else (low, high)))
+            bench.set_parameter(key, value)
+
+        if key:
+            self.desk.change(f"setting {key}", work)
 
     # What is shown
 
@@ -216,9 +248,7 @@ class Page:
         self.start.label = "Diagnose" if desk.diagnosing is None else "Stop"
         known = bench.effects if bench else []
         self.accept.disabled = not (desk.found and set(desk.found.effects) - set(known))
-        answer = Html('<pre style="white-space:pre-wrap">{}</pre>')
-        lines = desk.found.text.splitlines() if desk.found else []
-        show(self.progress, answer.format(Html("\n").join(lines)) if lines else listed(desk.progress))
+        show(self.progress, self._progress())
         if bench is None:
             return
         for part in self.parts:
@@ -247,45 +277,80 @@ class Page:
         others = [t.name for t in recording.trials if t.name not in bench.never_fitted]
         choose(self.trial, [(name, f"{name} (never fitted)") for name in trials] + [(name, name) for name in others])
         choose(self.joint, list(recording.joints), "" if self.joint.value else recording.joints[-1])
+        choose_several(self.over, [*trials, *others])
         choose(self.other, [NONE, *(f"{k}: {one.label}" for k, one in enumerate(bench.stages[:-1]))])
         choose(self.present, bench.effects)
         self.remove.disabled = not bench.effects
-        show(self.stairs, _error_by_stage(bench))
+        show(self.stairs, error_by_stage(bench))
+
+    def _progress(self) -> Html:
+        """How far the diagnosis is, or what it answered."""
+        progress, found = self.desk.progress, self.desk.found
+        if progress is None:
+            return html()
+        log = FOLDED.format(f"{len(progress.lines)} steps", listed(progress.lines))
+        if found is not None:
+            masked = " without the intervals that it masked" if found.left_out else ""
+            names = " and ".join(found.effects) or "no effect"
+            head = f"Error over noise with {names}: {over_noise(found.over_noise)}{masked}."
+            text = Html("\n").join(found.text.splitlines())
+            return html(head, Html('<pre style="white-space:pre-wrap">{}</pre>').format(text), log)
+        if self.desk.outcome:
+            return html(listed([self.desk.outcome]), log)
+        done = f"about {100 * progress.share:.0f} % done"
+        left = f", about {progress.left:.0f} s left" if progress.share > 0.0 else ""
+        return html(listed([done + left, f"best so far: {progress.best or 'nothing yet'}"]), log)
 
     def _show_candidates(self, bench: Workbench) -> None:
         joint = self.joint.value
-        groups = self.desk.scores.get(joint)
+        groups = self.desk.looks.get(joint)
         tag = [self.desk.version, joint, groups is not None]
         if self.ranked.tags == tag:
             return
         self.ranked.tags = tag
-        self.scores = [score for group in groups or [] for score in group]
-        names = [effect_path(score.candidate.effect) for score in self.scores]
-        leaders = [effect_path(group[0].candidate.effect) for group in groups or [] for _ in group]
+        self.looks = [look for group in groups or [] for look in group]
+        leaders = [group[0].name for group in groups or [] for _ in group]
         self.ranked.active = None
         self.ranked.labels = [
-            plain(f"{100 * bench.share(score):.0f} %  {name}" + (f" (looks like {leader})" if name != leader else ""))
-            for name, leader, score in zip(names, leaders, self.scores, strict=True)
+            plain(f"{100 * look.share:.0f} %  {look.name}" + (f" (looks like {leader})" if look.name != leader else ""))
+            for leader, look in zip(leaders, self.looks, strict=True)
         ]
         if groups is None:
             self.desk.look(joint)
         unseen = bench.unseen(joint)
-        hidden = {one.effect for one in unseen}
+        names = {one.effect for one in unseen} | {look.name for look in self.looks}
+        names |= {one.removesuffix(f"@{joint}") for one in bench.effects if one.endswith(f"@{joint}")}
         every = sorted(effect_path(effect) for effect in bench.search.effects)
-        choose(self.another, [NONE, *(name for name in every if name not in hidden and name not in names)], NONE)
-        lines = listed(f"{one.effect}: {one.why}" for one in unseen)
+        choose(self.another, [NONE, *(name for name in every if name not in names)], NONE)
         reach = self.desk.explainable.get(joint)
-        bound = (
-            ""
-            if reach is None
-            else f" A black box of the logged signals explains {100 * reach:.0f} % of what is missing."
-        )
-        folded = Html('<details style="color:{}"><summary>{} cannot be seen in these trials</summary>{}</details>')
+        bound = "" if reach is None else f" Any law of the logged signals: {100 * reach:.0f} % of the missing torque."
         show(
             self.unseen,
-            f"First look: the part of the squared error on the fitted trials that each would take away.{bound}",
-            folded.format(FLOOR, len(unseen), lines),
+            f"Part of the squared error on fitted trials that each takes away by itself.{bound}",
+            FOLDED.format(f"{len(unseen)} cannot be seen", listed(f"{one.effect}: {one.why}" for one in unseen)),
         )
+
+    def _show_card(self) -> None:
+        """The chosen candidate's card, and what it would leave once that is known."""
+        bench, label = self.desk.bench, f"{self.candidate}@{self.joint.value}"
+        if bench is None or not self.candidate:
+            show(self.card)
+            return
+        lines = []
+        if self.desk.chosen == label:
+            now, then = bench.stage.over_noise, self.desk.promised
+            verdict = "would not get smaller" if then >= now else "would fall"
+            lines = [
+                f"error over noise {verdict}: {over_noise(now)} to {over_noise(then)}, before the rest is refitted"
+            ]
+        show(self.card, card(self.candidate, *lines))
+
+    def _show_number(self) -> None:
+        one = next((one for one in self.values if one.key == self.number.value), None)
+        if one is not None:
+            for text, value in zip(self.typed, (one.value, one.unknown.low, one.unknown.high), strict=True):
+                text.value = f"{value:.6g}"
+            self.fixed.active = [0] if one.fixed else []
 
     def _show_experiment(self, bench: Workbench) -> None:
         proposed = self.desk.experiment
@@ -312,17 +377,22 @@ class Page:
                 self._show_trial(bench, joint)
                 self._show_sliders(bench, joint)
                 self._show_candidates(bench)
-            tag = [self.desk.version, joint, self.signal.value, self.desk.signature_of]
+            tag = [self.desk.version, joint, self.signal.value, self.desk.chosen]
             if self.signal.tags != tag:
                 self._show_missing(bench, joint)
                 self.signal.tags = [*tag[:2], self.signal.value, tag[3]]
+            self._show_card()
         finally:
             self.showing = before
 
     def _show_missing(self, bench: Workbench, joint: str) -> None:
         missing, law = bench.missing(joint), self.desk.signature
-        choose(self.signal, signals(missing))
         law = law if law is not None and law.joint == joint else None
+        offered, chosen = signals(missing), ""
+        if law is not None and self.signal.tags[3:] != [self.desk.chosen] and self.ranked.active is not None:
+            of = signal_of(self.looks[self.ranked.active].candidate.effect)
+            chosen = next(one for one in offered if one.startswith(("time", f"{of} of {joint} ")[of != "time"]))
+        choose(self.signal, offered, chosen)
         self.missing.show(missing, self.signal.value, law, bench.recording.units[joint])
 
     def _show_trial(self, bench: Workbench, joint: str) -> None:
@@ -332,25 +402,29 @@ class Page:
         if self.other.value != NONE:
             other = bench.stages[int(self.other.value.partition(":")[0])]
             beside = bench.simulate(self.trial.value, other.model).position
-        self.time.show(compared, place, beside)
+        others = [name for name in self.over.value if name != self.trial.value]
+        self.time.show(compared, place, beside, [(bench.trial(one), bench.simulate(one).position) for one in others])
         unit = bench.recording.units[joint]
         failing = [one for one in compared.failing_intervals if one.joint == joint]
         failing.sort(key=lambda one: -one.error)
         self.where.value = NONE
         choose(self.where, [NONE, *(_interval(one, unit) for one in failing[:20])])
-        error = f"{joint} in this trial: {milli(compared.raw[0].joints[joint], unit)} RMS of the free run"
-        show(self.sentences, listed([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))]))
+        error = f"{joint} in this trial: {milli(compared.errors.joints[joint], unit)} RMS of the free run"
+        lines = listed([error, *(one for one in compared.sentences if one.startswith(f"{joint} "))])
+        show(self.sentences, lines, residual_test(compared, joint))
 
     def _show_sliders(self, bench: Workbench, joint: str) -> None:
-        values = bench.values(joint)
         tag = [self.desk.version, joint]
         if self.sliders.tags != tag:
-            self.sliders.tags = tag
-            self.sliders.children = [self._slider(one) for one in values[-SLIDERS:]]
+            self.sliders.tags, self.values = tag, bench.values(joint)
+            self.sliders.children = [self._slider(one) for one in self.values[-SLIDERS:]]
+            choose(self.number, [one.key for one in self.values])
+            self._show_number()
 
     def _slider(self, one: Value) -> Slider:
         name = one.key.replace(f"@{self.joint.value}", "")
         found = "" if one.interval is None else f" in [{one.interval[0]:.4g}, {one.interval[1]:.4g}]"
+        found = " fixed" if one.fixed else found
         low, high = one.unknown.low, one.unknown.high
         slider = Slider(
             start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
@@ -364,28 +438,3 @@ class Page:
 
 def _interval(one: FailingInterval, unit: str) -> tuple[str, str]:
     return f"{one.start}|{one.end}", f"{one.start:.2f} to {one.end:.2f} s: {milli(one.error, unit)}"
-
-
-def _error_by_stage(bench: Workbench) -> Html:
-    """The table of stages: raw error and error over the noise on the trials that were never fitted."""
-    joints, units = bench.recording.joints, bench.recording.units
-    most = max(max(stage.raw.joints.values()) for stage in bench.stages) or 1.0
-
-    cell = Html('<td style="text-align:right;background:linear-gradient(90deg,#cfe3f2 {:.0f}%,transparent 0)">{}</td>')
-    line = Html("<tr><td>{}</td>{}<td style='text-align:right'>{}</td></tr>")
-
-    def row(label: str, errors: dict[str, float], over: str) -> Html:
-        cells = html(*(cell.format(100 * errors[j] / most, milli(errors[j], units[j])) for j in joints))
-        return line.format(label, cells, over)
-
-    def stage_row(stage: ModelStage) -> Html:
-        return row(stage.label, stage.raw.joints, f"{stage.judgement.error:.2f}")
-
-    head = html(*(Html("<th>{}</th>").format(joint) for joint in joints))
-    floor = "noise floor" + ("" if bench.floor.source == "repeats" else " (guess: no repeats)")
-    table = Html('<table cellpadding="4" style="width:100%"><tr><th></th>{}<th>over noise</th></tr>{}{}</table>')
-    return html(
-        table.format(head, html(*map(stage_row, bench.stages)), row(floor, bench.floor.joints, "1")),
-        f"RMS error of free runs on {len(bench.never_fitted)} trials that are never fitted; "
-        "over noise: error in short segments over the sensor's noise.",
-    )

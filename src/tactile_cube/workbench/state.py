@@ -17,35 +17,43 @@ from tactile_cube.api.job import PathLike, as_input_errors
 from tactile_cube.drivetrain.effects import catalogue, find_effect, import_own_effects, resolve
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile, write_model
 from tactile_cube.errors import InputError
-from tactile_cube.identification.diagnosis import Unseen, unseen
-from tactile_cube.identification.fitting.gauss_newton import Fit
-from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, final_fit, standard_errors
+from tactile_cube.identification.diagnosis import Unseen, in_steps, test_errors, unseen
+from tactile_cube.identification.disturbances import in_time
+from tactile_cube.identification.fitting.gauss_newton import Fit, renewed
+from tactile_cube.identification.fitting.intervals import NORMAL_95, Fitted, standard_errors
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.fitting.unknowns import Unknown
-from tactile_cube.identification.identification import divided, with_effect
+from tactile_cube.identification.identification import with_effect
 from tactile_cube.identification.model_files import UNITS, model_file
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.division import BRIEF
+from tactile_cube.identification.search.candidates import Candidate
+from tactile_cube.identification.search.division import some
 from tactile_cube.identification.search.evidence import Judgement
-from tactile_cube.identification.search.proposals import wanted
-from tactile_cube.identification.search.residual_shape import Missing, black_box, missing_torques
-from tactile_cube.identification.search.screening import Score, Screen, resized, screen
+from tactile_cube.identification.search.explanation import Explanation
+from tactile_cube.identification.search.proposals import LOOKED_AT, best_starts, stepped, wanted
+from tactile_cube.identification.search.residual_shape import Missing, black_box
+from tactile_cube.identification.search.screening import Screen, screen
+from tactile_cube.identification.verdict import Simulations
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison
-from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error, raw_residuals, summarise_errors
+from tactile_cube.measurement.comparing.error import ErrorSummary
+from tactile_cube.measurement.comparing.noise_floor import noise_floor, noise_with_links
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial
 from tactile_cube.measurement.replay.model import Model, effect_path
+from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.simulator import Simulated, free_run
+from tactile_cube.measurement.split import held_out_split, with_test_part
 from tactile_cube.measurement.units import of_joint
 from tactile_cube.whole_file import written_together
-from tactile_cube.workbench.background import Diagnosing
+from tactile_cube.workbench.background import Diagnosing, Found
+from tactile_cube.workbench.missing_torque import missing_torque
+from tactile_cube.workbench.parameters import BoundedSearch, Value
 
 Array = NDArray[np.float64]
-BY_HAND = "by hand"
-AT_ONCE = 24  # candidates of a first look
-RANKED = 8  # of them that are shown
-ALIKE = 0.95  # correlation of two signatures, beside all constants, from which on these trials do not tell them apart
+STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
+AT_ONCE = 24  # candidates that are screened between two looks at who waits
+RANKED = 10  # effects that a look shows
+ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
 MOST = 50
 """Changes that can be undone; each keeps a fit and a judgement, some MB."""
 COMMAND = "python -m tactile_cube.workbench recording={}"
@@ -53,44 +61,49 @@ COMMAND = "python -m tactile_cube.workbench recording={}"
 
 @dataclass(frozen=True)
 class ModelStage:
-    """One model on the way, and how it does on the trials that are never fitted.
+    """One model on the way, and how it does on the trials that are untouched.
 
     Attributes:
         label: `stated`, `refitted`, `+ NAME@JOINT`, `- NAME@JOINT` or `by hand`.
         fit: what it was fitted by; of the stated model, and of values set by hand, the fit that came before.
         model: with the joint offsets of every initialisation.
-        judgement: in segments.
-        errors: RMS of the free run, joint offsets removed [rad].
-        raw: the same with nothing removed [rad].
+        judgement: on the held-out trials, in segments; the missing torque comes from its residual.
+        over_noise: the error: of segments of untouched trials, in units of the sensor noise. `diagnose` states it too.
+        errors: RMS of free runs there [rad].
         half_width: (P,) of the fit's unknowns: what noise and misfit leave unsure, 95 %; zero where nothing was fitted.
+        final: the fit of a diagnosis on all windows, as it is saved.
     """
 
     label: str
     fit: Fit
     model: Model
     judgement: Judgement
+    over_noise: float
     errors: ErrorSummary
-    raw: ErrorSummary
     half_width: Array
+    final: Fitted | None = None
 
 
 @dataclass(frozen=True)
-class Value:
-    """A number of the model that a fit may change.
+class Look:
+    """An effect beside the model in force, after a few steps of its own numbers.
 
     Attributes:
-        key: `CONSTANT@JOINT` or `NAME@JOINT.PARAMETER`.
-        value: in the model in force.
-        interval: its 95 % interval within the bounds; None where it was set by hand or not fitted.
-        unit: SI unit.
-        unknown: its bounds; `put` gives a model, which `simulate` takes, with another value.
+        candidate: the effect in the form that does best.
+        model: with it.
+        change: (G, R) that it makes to the weighted prediction of the windows looked at.
+        share: part of the squared error there that it takes away.
     """
 
-    key: str
-    value: float
-    interval: tuple[float, float] | None
-    unit: str
-    unknown: Unknown
+    candidate: Candidate
+    model: Model
+    change: Array
+    share: float
+
+    @property
+    def name(self) -> str:
+        """Of the effect."""
+        return effect_path(self.candidate.effect)
 
 
 class Workbench:
@@ -99,14 +112,15 @@ class Workbench:
     Attributes:
         recording: as it is simulated: free motion, in steps as short as its sensors call for.
         floor: its noise floor [rad].
-        search: the trials fitted and never fitted, with every effect compiled in.
+        search: the trials fitted and held out, with every effect compiled in.
+        untouched: the trials that nothing is fitted to and nothing chosen by; where there are too few, the held-out.
         history: the stages after each change, the last one in force.
 
     Example:
         >>> bench = Workbench("my_recording")
-        >>> print([score.candidate.label for score in bench.candidates("q3")[0]])
+        >>> print([look.name for look in bench.candidates("q3")[0]])
         >>> bench.add("stribeck_friction@q3")
-        >>> print([(stage.label, stage.errors.overall) for stage in bench.stages], bench.floor.overall)
+        >>> print([(stage.label, stage.over_noise) for stage in bench.stages])
         >>> bench.save("outputs/my_model")
     """
 
@@ -119,7 +133,7 @@ class Workbench:
         seed: int = 0,
         say: Callable[[str], None] = lambda line: None,
     ) -> None:
-        """Divide the trials and refit what the model has already.
+        """Divide the trials as `diagnose` does, and refit what the model has already.
 
         Args:
             recording: what was measured, or its folder; two or more trials of free motion.
@@ -134,17 +148,21 @@ class Workbench:
         import_own_effects(list(own_effects))
         self.own_effects, self.seed, self.say, self.known = tuple(own_effects), seed, say, modelled(model)
         self.opened = opened(recording)
-        moving = without_touches(self.opened)
-        effects = dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in own_effects)])
+        effects = tuple(dict.fromkeys([*catalogue().values(), *(find_effect(name) for name in own_effects)]))
         say("dividing the trials")
-        self.search, self.floor = divided(moving, tuple(effects), seed, say, self.known)
-        known = {one.name: one for part in (self.search.fitted, self.search.held_out) for one in part.trials}
-        self.recording = self.search.fitted.with_trials([known[trial.name] for trial in moving.trials])
-        base = self.search.fit_base()
-        stated = replace(base.fit, model=self.search.start)
-        first: tuple[ModelStage, ...] = (self._stage("stated", stated, fitted=False), self._stage("refitted", base.fit))
-        self.history = [first]
+        moving = in_time(without_touches(self.opened), effects, say, self.known)
+        self.recording = in_steps(moving, effects, self.known, say)
+        fitted, held_out = held_out_split(self.recording, seed=seed)
+        fitted, tested = with_test_part(fitted, len(self.recording.trials), seed)
+        self.untouched = held_out if tested is None else tested
+        self.search = BoundedSearch(fitted, held_out, noise_with_links(self.recording), effects, say, self.known)
+        self.floor = noise_floor(self.recording)
         self._kept: tuple[Fit, Fit] | None = None
+        self._looks: dict[str, Look] = {}
+        self.history: list[tuple[ModelStage, ...]] = []
+        self.base = self.search.base
+        stated = self._stage(STATED, replace(self.base.fit, model=self.search.start), fitted=False)
+        self._push((stated, self._stage(REFITTED, self.base.fit)))
 
     @property
     def stages(self) -> tuple[ModelStage, ...]:
@@ -163,8 +181,8 @@ class Workbench:
 
     @property
     def never_fitted(self) -> list[str]:
-        """Names of the trials by which models are judged."""
-        return [trial.name for trial in self.search.held_out.trials]
+        """Names of the held-out and the untouched trials."""
+        return list(dict.fromkeys(t.name for part in (self.search.held_out, self.untouched) for t in part.trials))
 
     def trial(self, name: str) -> Trial:
         """One trial by its name."""
@@ -184,46 +202,45 @@ class Workbench:
         """Return the torque that the model in force lacks at a joint, and the signals it may depend on."""
         return self._as_torque(joint, self.stage.judgement.residual)
 
-    def signature(self, score: Score, joint: str) -> Missing:
-        """Return the torque that a candidate supplies after a brief refit of its own numbers; see `missing`."""
-        search, problem = self.search, self.search.validation
-        _, fitted = search.refit(self._frozen(self.stage.fit), resized(score), BRIEF)
-        added = fitted.model.with_offsets(search.offsets)
+    def signature(self, look: Look) -> Missing:
+        """Return the torque that an effect supplies; see `missing`."""
+        problem = self.search.validation
+        added = look.model.with_offsets(self.stage.model.offsets)
         before, after = problem.predictions([replace(added, terms=added.terms[:-1]), added])
-        return self._as_torque(joint, problem.limited(after - before) * problem.weight)
+        return self._as_torque(look.candidate.joints[0], problem.limited(after - before) * problem.weight)
 
-    def candidates(self, joint: str, stop: Callable[[], bool] = lambda: False) -> list[list[Score]] | None:
-        """Return a first look at what could be missing at a joint: the best form of each effect, best first.
+    def candidates(self, joint: str, stop: Callable[[], bool] = lambda: False) -> list[list[Look]] | None:
+        """Return what could be missing at a joint: the best form of each effect that the model has not, best first.
 
-        Effects whose signatures cannot be told apart in these trials stand together in a list of their own.
-        `share` says what a score takes away. The first look is linear; `diagnose` refits and judges what it promises.
-        None: `stop`, which is called every second or so, said so.
+        Every law is fitted beside the frozen model on few windows, as `diagnose` begins. Effects that change the
+        prediction alike stand together in a list of their own. None: `stop`, which is called often, said so.
         """
-        frozen = self._frozen(self.stage.fit)
-        tried = [one for one in wanted(self.search, self.search.problem, frozen) if one.joints == (joint,)]
-        best: dict[str, Score] = {}
+        search, fitted = self.search, self.stage.fit
+        problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
+        problem.linearise_starts(fitted.model)
+        frozen = renewed(problem, fitted, *problem.columns(fitted.model, fitted.unknowns))
+        here = [one for one in wanted(search, problem, frozen) if one.joints == (joint,)]
+        tried = [one for one in here if f"{effect_path(one.effect)}@{joint}" not in self.effects]
+        scores = []
         for first in range(0, len(tried), AT_ONCE):
             if stop():
                 return None
-            for score in screen(self.search.problem, frozen, tried[first : first + AT_ONCE]):
-                name = effect_path(score.candidate.effect)
-                best[name] = max(score, best.get(name, score), key=lambda one: one.gain)
-        ranked = sorted((one for one in best.values() if one.gain > 0.0), key=lambda one: -one.gain)[:RANKED]
-        return self._together(ranked, Screen(self.search.problem, frozen)) if ranked else []
+            scores += screen(problem, frozen, tried[first : first + AT_ONCE])
+        best: dict[str, Look] = {}
+        for candidate in best_starts(sorted(scores, key=lambda score: -score.gain)):
+            if stop():
+                return None
+            _, found = stepped(problem, frozen, candidate)
+            share = 1.0 - found.cost / max(frozen.cost, 1e-12)
+            look = Look(candidate, found.model, frozen.residual - found.residual, share)
+            best[look.name] = max(look, best.get(look.name, look), key=lambda one: one.share)
+        ranked = sorted((one for one in best.values() if one.share > 0.0), key=lambda one: -one.share)[:RANKED]
+        self._looks |= {f"{one.name}@{joint}": one for one in ranked}
+        return _together(ranked, Screen(problem, frozen)) if ranked else []
 
-    def _together(self, ranked: Sequence[Score], view: Screen) -> list[list[Score]]:
-        columns = [column for _, column in view.columns([score.candidate for score in ranked])]
-        _, products = view.products(np.stack(columns, axis=-1))
-        size = np.sqrt(np.diag(products))
-        alike = np.abs(products) >= ALIKE * np.outer(size, size)
-        leaders: dict[int, list[Score]] = {}
-        for place, score in enumerate(ranked):
-            leaders.setdefault(next((k for k in leaders if alike[k, place]), place), []).append(score)
-        return list(leaders.values())
-
-    def share(self, score: Score) -> float:
-        """Return the part of the squared error on the fitted trials that a candidate would take away."""
-        return score.gain / max(self.stage.fit.cost, 1e-12)
+    def promised(self, look: Look) -> float:
+        """Return the error over noise that an effect leaves on the untouched trials, with all else as it is."""
+        return self._tested(look.model)[1]
 
     def explainable(self, joint: str) -> float:
         """Return the part of the missing torque that a black box of the logged signals explains: what any law could."""
@@ -250,9 +267,21 @@ class Workbench:
                 if effect not in self.search.effects:
                     raise InputError(f"{label}: name it when the workbench starts, own_effects=[{effect_path(effect)}]")
                 self.say(f"refitting with {label}")
-                added = with_effect(self.search, self._frozen(stages[-1].fit), effect, joint)
-                stages = (*stages, self._stage(f"+ {label}", self.search.refitted(added.model)))
+                if stages is self.stages and label in self._looks:
+                    added = self._looks[label].model
+                else:
+                    added = with_effect(self.search, self._frozen(stages[-1].fit), effect, joint).model
+                stages = (*stages, self._refitted(f"+ {label}", added))
         return self._push(stages)
+
+    def adopt(self, found: Found) -> ModelStage:
+        """Take the model that a diagnosis recommends, as it is."""
+        after, before = [term.label for term in found.fitted.model.terms], self.effects
+        changes = [f"+ {one}" for one in after if one not in before] + [
+            f"- {one}" for one in before if one not in after
+        ]
+        stage = self._stage(" ".join(changes) or REFITTED, found.fitted.fit, final=found.fitted)
+        return self._push((*self.stages, stage))
 
     def remove(self, label: str) -> ModelStage:
         """Take an effect out and refit everything that is left.
@@ -264,31 +293,37 @@ class Workbench:
             raise InputError(f"{label}: the model has only {', '.join(self.effects) or 'its constants'}")
         model = self.stage.fit.model
         less = replace(model, terms=tuple(term for term in model.terms if term.label != label))
-        return self._push((*self.stages, self._stage(f"- {label}", self.search.refitted(less))))
+        return self._push((*self.stages, self._refitted(f"- {label}", less)))
+
+    def refit(self) -> ModelStage:
+        """Refit everything that is not fixed, from the values in force."""
+        return self._push((*self.stages, self._refitted(REFITTED, self.stage.fit.model)))
 
     def undo(self) -> bool:
         """Take the last change back; False where there is none."""
         if len(self.history) > 1:
             self.history.pop()
+            self._looks = {}
             return True
         return False
 
     def values(self, joint: str) -> list[Value]:
         """Return the numbers of the model in force at a joint that a fit may change."""
-        stage, found = self.stage, []
-        units = self.recording.units[joint]
-        for unknown, half_width in zip(stage.fit.unknowns, stage.half_width, strict=True):
-            if unknown.kind == "constant" and self.recording.joints[unknown.place] == joint:
-                key, unit = f"{unknown.key}@{joint}", UNITS[unknown.key]
-            elif unknown.kind == "effect" and stage.model.terms[unknown.place].joint == joint:
-                term = stage.model.terms[unknown.place]
-                unit = next(p.unit for p in term.effect.parameters if p.name == unknown.key)
-                key = f"{term.label}.{unknown.key}"
+        search, model, found = self.search, self.stage.model, []
+        fitted = self.stage.fit
+        widths = {search.key(u, model): w for u, w in zip(fitted.unknowns, self.stage.half_width, strict=True)}
+        for key, unknown in search.numbers(model).items():
+            if unknown.kind == "constant":
+                at, unit = self.recording.joints[unknown.place], UNITS[unknown.key]
             else:
-                continue
-            value, low, high = unknown.of(stage.model), unknown.low, unknown.high
-            interval = (max(value - half_width, low), min(value + half_width, high)) if half_width else None
-            found.append(Value(key, value, interval, of_joint(unit, units), unknown))
+                term = model.terms[unknown.place]
+                at, unit = term.joint, next(p.unit for p in term.effect.parameters if p.name == unknown.key)
+            if at == joint:
+                value, low, high = unknown.of(model), unknown.low, unknown.high
+                width = 0.0 if search.fixed(key) else widths.get(key, 0.0)
+                interval = (max(value - width, low), min(value + width, high)) if width else None
+                unit = of_joint(unit, self.recording.units[joint])
+                found.append(Value(key, value, interval, unit, unknown, search.fixed(key)))
         return found
 
     def set_parameter(self, key: str, value: float) -> ModelStage:
@@ -297,7 +332,7 @@ class Workbench:
         Raises:
             InputError: no such number.
         """
-        known = {one.key: one.unknown for joint in self.recording.joints for one in self.values(joint)}
+        known = self.search.numbers(self.stage.model)
         if key not in known:
             raise InputError(f"{key}: no number of the model; it has {', '.join(known)}")
         model = known[key].put(self.stage.fit.model, value)
@@ -305,11 +340,19 @@ class Workbench:
         stages = self.stages[:-1] if self.stage.label == BY_HAND else self.stages
         return self._push((*stages, stage))
 
+    def bound(self, key: str, low: float, high: float) -> None:
+        """Keep a number within bounds at every refit from now on; both alike fix it.
+
+        Raises:
+            InputError: no such number, or bounds that it cannot have.
+        """
+        self.search.bound(self.stage.model, key, low, high)
+
     def propose(self) -> Experiment:
         """Return the commands that would show whether the last effect is there, within the machine's limits.
 
         Raises:
-            InputError: there is no effect to ask about.
+            InputError: no effect was added.
         """
         added = [k for k, stage in enumerate(self.stages) if stage.label.startswith("+")]
         if not added:
@@ -344,18 +387,17 @@ class Workbench:
     def model_file(self) -> ModelFile:
         """Return the model in force as model.yaml has it: values with intervals, provenance, the error by stage."""
         stage = self.stage
-        if stage.half_width.any():
+        fitted = stage.final or Fitted(stage.fit.model, stage.fit, stage.half_width, stage.half_width)
+        if stage.final is None and stage.half_width.any():
             self.say("refitting on all windows, for the intervals")
-            problem = Problem(self.search.shooting, self.search.all_windows)
-            fitted = final_fit(problem, stage.fit.model, self.search.unknowns(stage.fit.model))
-        else:
-            fitted = Fitted(stage.fit.model, stage.fit, stage.half_width, stage.half_width)
-        last = self._errors(fitted.model.with_offsets(stage.judgement.model.offsets))[0]
+            explanation = Explanation((), stage.fit, stage.judgement, 1.0, 0.0)
+            fitted = Simulations(self.search, self.base, self.floor).final(explanation)
+        last, over_noise = self._tested(fitted.model)
         steps = {"nominal": self.stages[0].errors, "refitted": self.stages[1].errors, "with_effects": last}
         errors = ModelErrors(
             **{key: one.overall for key, one in steps.items()},
             noise_floor=self.floor.overall,
-            over_noise=stage.judgement.error,
+            over_noise=over_noise,
             joints={key: one.joints for key, one in steps.items()},
         )
         command = COMMAND.format(self.opened.folder)
@@ -363,34 +405,53 @@ class Workbench:
         kept = self.known.object_effects if self.known else []
         return model.model_copy(update={"effects": model.with_effects(kept)})
 
-    def _stage(self, label: str, fit: Fit, fitted: bool = True) -> ModelStage:
+    def _refitted(self, label: str, model: Model) -> ModelStage:
+        return self._stage(label, self.search.refitted(self.search.within_bounds(model)))
+
+    def _stage(self, label: str, fit: Fit, fitted: bool = True, final: Fitted | None = None) -> ModelStage:
         self.say(f"judging: {label}")
-        scales = np.array([unknown.scale for unknown in fit.unknowns])
-        errors = standard_errors(self.search.problem, fit) if fitted else np.zeros(len(scales))
+        half_width = np.zeros(len(fit.unknowns))
+        if final is not None:
+            half_width = final.half_width
+        elif fitted:
+            half_width = NORMAL_95 * standard_errors(self.search.problem, fit) * [one.scale for one in fit.unknowns]
         judgement = self.search.judged(fit.model)
         model = fit.model.with_offsets(judgement.model.offsets)
+        model = model.with_offsets(nominal_model(self.untouched, self.known).offsets)
         fit = replace(fit, columns=np.zeros(0), residual=np.zeros(0))  # many MB, and taken anew by whoever builds on it
-        return ModelStage(label, fit, model, judgement, *self._errors(model), NORMAL_95 * errors * scales)
+        errors, over_noise = self._tested(fit.model)
+        return ModelStage(label, fit, model, judgement, over_noise, errors, half_width, final)
+
+    def _tested(self, model: Model) -> tuple[ErrorSummary, float]:
+        """Errors of free runs of the untouched trials [rad], and of their segments over the sensor noise."""
+        errors, over_noise = test_errors(self.search, self.untouched, {"": model}, USUAL_STEP)
+        return errors[""], over_noise[""]
 
     def _frozen(self, fit: Fit) -> Fit:
-        """A fit with its derivatives, which the first look, a candidate's torque and a refit take alike."""
+        """A fit with its derivatives, which several refits take alike."""
         if self._kept is not None and self._kept[0] is fit:
             self.search.problem.linearise_starts(fit.model)
         else:
             self._kept = fit, self.search.frozen(fit)
         return self._kept[1]
 
-    def _errors(self, model: Model) -> tuple[ErrorSummary, ErrorSummary]:
-        held_out = self.search.held_out
-        simulated = free_run(held_out, model, USUAL_STEP)
-        raw = raw_residuals(held_out.trials, [one.position for one in simulated])
-        return free_run_error(held_out, simulated), summarise_errors(raw, held_out.joints)
-
     def _as_torque(self, joint: str, residual: Array) -> Missing:
-        search = self.search
-        found = missing_torques(search.validation, search.held_out, self.stage.judgement.model, residual)
-        return found[self.recording.joints.index(joint)]
+        search, model = self.search, self.stage.judgement.model
+        noise = float(search.noise[self.recording.joints.index(joint)])
+        return missing_torque(search.validation, search.held_out, model, residual, joint, noise)
 
     def _push(self, stages: tuple[ModelStage, ...]) -> ModelStage:
         self.history = [*self.history[-MOST:], stages]
+        self._looks = {}
         return self.stage
+
+
+def _together(ranked: Sequence[Look], view: Screen) -> list[list[Look]]:
+    """Those that change the prediction alike, beside all constants, together."""
+    _, products = view.products(np.stack([look.change for look in ranked], axis=-1))
+    size = np.sqrt(np.diag(products))
+    alike = np.abs(products) >= ALIKE * np.outer(size, size)
+    leaders: dict[int, list[Look]] = {}
+    for place, look in enumerate(ranked):
+        leaders.setdefault(next((k for k in leaders if alike[k, place]), place), []).append(look)
+    return list(leaders.values())

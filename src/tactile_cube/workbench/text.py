@@ -6,10 +6,11 @@ escaped, and no TeX is rendered: the page has no MathJax, and labels of charts a
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from bokeh.models import Axis, Div, PlainText, Select
+from bokeh.models import Axis, Div, MultiSelect, PlainText, Select
 from markupsafe import Markup
 
 LABEL, MESSAGE = 60, 2000
@@ -53,14 +54,31 @@ def show(pane: Div, *parts: str) -> None:
 
 def choose(select: Select, options: Options, keep: str = "") -> None:
     """Give a select other options, (value, label) or both in one; it keeps its value where it still has it."""
+    values, wanted = _offer(select, options), keep or select.value
+    select.value = wanted if wanted in values else (values[0] if values else "")
+
+
+def choose_several(select: MultiSelect, options: Options) -> None:
+    """Give a list other options; of those that are chosen it keeps what it still has."""
+    values = _offer(select, options)
+    select.value = [one for one in select.value if one in values]
+
+
+def _offer(select: Select | MultiSelect, options: Options) -> list[str]:
+    """The values of the options, which the browser tells apart by their labels."""
     pairs = [(one, one) if isinstance(one, str) else one for one in options]
     values, labels = [value for value, _ in pairs], [plain(label) for _, label in pairs]
-    # the browser tells options apart by their labels
     shown = [f"{label} ({k})" if label in labels[:k] else label for k, label in enumerate(labels)]
-    offered, wanted = list(zip(values, shown, strict=True)), keep or select.value
+    offered = list(zip(values, shown, strict=True))
     if select.options != offered:
         select.options = offered
-    select.value = wanted if wanted in values else (values[0] if values else "")
+    return values
+
+
+def picture(alternative: str, png: bytes) -> Html:
+    """Return a picture of this package's."""
+    made = Html('<img alt="{}" style="max-width:100%" src="data:image/png;base64,{}">')
+    return made.format(alternative, Html(base64.b64encode(png).decode("ascii")))
 
 
 def label(axis: Axis, text: str) -> None:

@@ -56,7 +56,9 @@ class Missing:
     initialisation: NDArray[np.int64]
 
 
-def missing_torques(problem: Problem, recording: Recording, model: Model, residual: Array) -> list[Missing]:
+def missing_torques(
+    problem: Problem, recording: Recording, model: Model, residual: Array, time: float | None = None
+) -> list[Missing]:
     """The torque that each joint would have to get so that the residual vanished: I r'' + D r' + K r.
 
     Args:
@@ -64,6 +66,7 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
         recording: names the joints.
         model: gives inertia and gains.
         residual: (G, R) weighted measured - predicted.
+        time: half width of the windows in which it is differentiated [s]; None: the usual one of the machine.
     """
     n, segment = len(recording.joints), problem.windows.segment
     weight, measured, left = (
@@ -75,16 +78,17 @@ def missing_torques(problem: Problem, recording: Recording, model: Model, residu
     constants = model.constants
     soft = 1.0 + constants["kp"] / constants["stiffness"]
     inertia = _inertia(problem, model, measured)
-    r, dr, ddr = _derivatives(error, step, problem.shooting.time)
+    r, dr, ddr = _derivatives(error, step, problem.shooting.time if time is None else time / PARABOLA)
     torque = inertia * ddr + constants["kd"] / soft * dr + constants["kp"] / soft * r
     drive = _drive(problem, model, position, velocity)
     first = np.tile(problem.windows.time[:, None], (1, problem.windows.segments)).ravel()
     length = segment * step
-    time = first + np.tile(np.arange(problem.windows.segments), len(problem.windows)) * length
-    inner = slice(segment // 8, -segment // 8)
+    begin = first + np.tile(np.arange(problem.windows.segments), len(problem.windows)) * length
+    edge = min(round((time or 0.0) / step), segment // 4)
+    inner = slice(max(segment // 8, edge), min(-segment // 8, -edge))
     inside = np.all(weight[:, inner] > 0, axis=2)
     number = np.broadcast_to(np.arange(len(weight))[:, None], weight.shape[:2])[:, inner][inside]
-    clock = (time[:, None] + np.arange(segment) * step)[:, inner][inside]
+    clock = (begin[:, None] + np.arange(segment) * step)[:, inner][inside]
     angle = position + np.array([model.offsets[int(k)] for k in problem.segment_initialisation])[:, None]
     found = []
     for j, joint in enumerate(recording.joints):
