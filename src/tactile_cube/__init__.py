@@ -9,6 +9,8 @@ slow is imported before it is used.
 from __future__ import annotations
 
 import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -86,6 +88,16 @@ def __getattr__(name: str) -> Any:
             return globals()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
+
+class _Package(ModuleType):
+    """Keeps its functions: importing a command's module, as `tactile_cube.train`, does not hide `train`."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name not in __all__ or not isinstance(value, ModuleType):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 # Gymnasium 1 loads no entry points of other packages
 gymnasium.register(id="tactile_cube/Rotation-v0", entry_point="tactile_cube.gymnasium_env:make_rotation")

@@ -1,5 +1,6 @@
 """What `import tactile_cube` gives, and what it costs."""
 
+import importlib
 import inspect
 import subprocess
 import sys
@@ -26,6 +27,12 @@ def test_every_name_resolves_is_annotated_and_documented(name: str) -> None:
         signature = inspect.signature(thing)
         assert signature.return_annotation is not inspect.Signature.empty
         assert all(one.annotation is not inspect.Parameter.empty for one in signature.parameters.values())
+
+
+@pytest.mark.parametrize("name", commands())
+def test_a_commands_module_does_not_hide_its_function(name: str) -> None:
+    importlib.import_module(f"tactile_cube.{name}")
+    assert name not in tactile_cube.__all__ or callable(getattr(tactile_cube, name))
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
