@@ -1,6 +1,8 @@
 """Errors of the user in one line, errors of the program as they are."""
 
 import errno
+import os
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -55,6 +57,14 @@ def test_wrong_values_are_told_by_key_value_and_remedy(make: Callable[[], Any], 
     assert message is not None
     assert message.startswith(expected)
     assert "\n" not in message
+
+
+def test_a_command_leaves_the_environment_of_later_programs_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    monkeypatch.setattr(sys, "argv", ["effects", "stribek=1"])
+    with pytest.raises(SystemExit, match="2"):
+        cli.command_line("effects")()
+    assert os.environ["HYDRA_FULL_ERROR"] == "0"
 
 
 def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:

@@ -57,7 +57,8 @@ def _run(name: str) -> None:
 
     from tactile_cube.sweep import Jobs  # imports Hydra
 
-    wants_traceback = os.environ.get("HYDRA_FULL_ERROR", "0") != "0"
+    asked = os.environ.get("HYDRA_FULL_ERROR", "0")
+    wants_traceback = asked != "0"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # else Hydra prints errors in its own way and exits with status 1
     with _errors_in_one_line(wants_traceback):
         jobs = Jobs(functools.partial(_guarded, name, wants_traceback))
@@ -69,6 +70,7 @@ def _run(name: str) -> None:
         try:
             hydra.main(version_base="1.3", config_path=str(CONFIG.resolve()), config_name=name)(task)()
         finally:
+            os.environ["HYDRA_FULL_ERROR"] = asked
             swept = jobs.ended()
         if swept and name in commands.AFTER_SWEEP:
             commands.AFTER_SWEEP[name]([folder for folder, good in swept.items() if good])

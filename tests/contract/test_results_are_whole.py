@@ -224,7 +224,6 @@ def typed(command: str, *words: str) -> None:
     said = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()), redirect_stderr(said):
         patch.setattr(sys, "argv", [command, *words])
-        patch.setenv("HYDRA_FULL_ERROR", "0")
         try:
             command_line(command)()
         except SystemExit as ended:

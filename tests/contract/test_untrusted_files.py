@@ -197,12 +197,9 @@ def typed(
     """Status and stderr of a command."""
     command = name.partition(" ")[0]
     monkeypatch.setattr(sys, "argv", [command, *words])
-    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which a command before this one has set
     status = 0
     try:
-        main = import_module(f"tactile_cube.{command}").main
-        vars(tactile_cube).pop(command, None)  # the function of that name, which the module has covered, is found again
-        main()
+        import_module(f"tactile_cube.{command}").main()
     except SystemExit as end:
         status = int(end.code or 0)
     return status, capfd.readouterr().err
