@@ -63,7 +63,7 @@ BY_DIRECTION: Laws = {
 def spreads(scales: Scales) -> dict[str, float]:
     """How far each number may be from what is stated, as a standard deviation.
 
-    Masses are weighed, torque constants and rotors come from data sheets, friction is a part of the usual torque.
+    Masses come from scales, torque constants and rotors come from data sheets, friction is a part of the usual torque.
     """
     torque, damping = scales.torque, scales.torque / scales.speed
     return {

@@ -186,7 +186,7 @@ def whole_trials(
 ) -> Windows:
     """Each trial as a window of one segment, simulated freely from its measured start.
 
-    Shorter ones stand still at their last command until the longest one has ended. The speed at a start is read from
+    Shorter ones hold their last command until the longest one has ended. The speed at a start is read from
     as few samples as the noise of the sensors (n,) [rad] lets tell it, as well as `speed` (n,) [rad/s].
     """
     longest = max(len(trial.time) for trial in trials)
