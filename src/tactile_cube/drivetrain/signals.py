@@ -14,7 +14,7 @@ CONTACT = 3
 LOAD = 4
 """Gravity, Coriolis and coupling torque less CONTACT: what the drive has to hold [N m]."""
 TIME = 5
-"""Time since the start of the recording or episode [s]."""
+"""Time since the start of the robot's initialisation or of the episode [s]."""
 COMMAND = 6
 """q_d: desired position that reaches the controller [rad]."""
 MEASURED_VELOCITY = 7

@@ -39,6 +39,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
         "error_joints": errors["joints"],
         "noise_floor_source": diagnosis.floor.source,
+        "drift": [asdict(one) for one in diagnosis.floor.drift],
         "standard_model": {
             "otherwise": list(diagnosis.standard.otherwise),
             "error": diagnosis.standard.error,

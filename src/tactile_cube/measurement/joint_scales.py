@@ -60,6 +60,7 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
             torque_limit=float(limits[j]),
             lower=float(tree.lower[own[j]]),
             upper=float(tree.upper[own[j]]),
+            lasts=max(trial.begun + trial.duration for trial in recording.trials),
         )
         for j, joint in enumerate(recording.joints)
     )

@@ -1,8 +1,10 @@
 """Dry friction of a joint."""
 
+from dataclasses import replace
 from math import exp
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DAMPING, DIRECTION, FRICTION, JOINT_TORQUE, TIME, TORQUE, VELOCITY
 
 
@@ -107,9 +109,10 @@ class AsymmetricFriction(Effect):
 class FrictionDrift(Effect):
     """Dry friction that changes while the joint warms up.
 
-    F += friction + change * (1 - exp(-t / time_constant)), t from the start of the trial. The longest time constant
-    stands for a change proportional to time. Trials of seconds cannot separate the two numbers then: only change /
-    time_constant counts, and `change` may be far larger than any change in the recording.
+    F += friction + change * (1 - exp(-t / time_constant)), t from the start of the robot's initialisation where time
+    stamps go on from trial to trial, else of each trial. The longest time constant stands for a change proportional to
+    time. Short recordings cannot separate the two numbers then: only change / time_constant counts, and `change` may be
+    far larger than any change in the recording.
 
     In data: a trend over time in the same repeated motion.
     Confused with: `coulomb_friction` in a single short trial.
@@ -127,6 +130,20 @@ class FrictionDrift(Effect):
 
     forms = ({"change": 0.02, "time_constant": 5.0}, {"change": -0.02, "time_constant": 5.0, "friction": 0.04})
     details = ("friction",)
+
+    @classmethod
+    def parameters_at(cls, scales: Scales) -> dict[str, Parameter]:
+        """Return the parameters; a time constant may be as long as the recording."""
+        known = super().parameters_at(scales)
+        slowest = max(known["time_constant"].high, scales.lasts)
+        return known | {"time_constant": replace(known["time_constant"], high=slowest, neutral=slowest)}
+
+    @classmethod
+    def starts_at(cls, scales: Scales) -> list[dict[str, float]]:
+        """Return the forms, and the same as slow as a recording is long that goes on over several trials."""
+        known = super().starts_at(scales)
+        slow = scales.lasts / 3.0
+        return known + [{**form, "time_constant": slow} for form in known if slow > 2.0 * form["time_constant"]]
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:

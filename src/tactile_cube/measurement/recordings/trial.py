@@ -75,6 +75,7 @@ class Trial:
         load: the object that the hand held, or None.
         link_position: (n, joints) measured on the link side [rad], nan where a joint has no sensor there; or None.
         feedforward: (n, joints) torque that the controller added to its own [N m], acting like `command`; or None.
+        begun: when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Trial:
     load: Load | None = None
     link_position: Array | None = None
     feedforward: Array | None = None
+    begun: float = 0.0
 
     @property
     def linked(self) -> NDArray[np.int64]:

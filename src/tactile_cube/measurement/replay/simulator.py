@@ -298,7 +298,7 @@ class Simulator:
         self.plant.view(memory, "offset")[:, 0] += self.tree.ratio * offsets[:, self.tree.follow]
         self.plant.view(memory, "angle_offset")[:] = offsets
         self.plant.reset(memory, self._links(model, windows), windows.speed[:, 0])
-        self.plant.view(memory, "step")[:, 0] = windows.time / self.plant.dt
+        self.plant.view(memory, "step")[:, 0] = (windows.begun + windows.time) / self.plant.dt
         self.plant.view(memory, "unsure")[:] = SMOOTHING * self.time
         self.plant.view(memory, "reading")[:] = 0  # a row is read as its first step begins
         for k, key in enumerate(("kp", "kd", "torque_limit")):
