@@ -125,8 +125,11 @@ class Effect:
     """
     details: ClassVar[tuple[str, ...]] = ()
     """Parameters that a search frees last, where a form fits the data already."""
-    contains: ClassVar[tuple[str, ...]] = ()
-    """Names of simpler effects that are special cases of this one."""
+    contains: ClassVar[Mapping[str, Mapping[str, float]]] = {}
+    """Simpler effects that are special cases of this one, and the parameters' values at which it becomes each of them.
+
+    Each value alone suffices; an infinite one is the parameter's largest. Empty where no single value does it.
+    """
     state_size: ClassVar[Any] = 0
     """How many numbers the law keeps between steps, zero after a reset; a class method of the step [s] if it counts."""
     bounded_memory: ClassVar[bool] = False

@@ -58,7 +58,7 @@ class ElasticJoint(Effect):
 
     name = "elastic_joint"
     stage = Stage.VELOCITY_SENSOR
-    contains = ("elasticity",)
+    contains = {"elasticity": {"rotor": 0.0}}
     parameters = (
         Parameter("compliance", "rad/(N m)", 0.0, 0.0, 1.0, 0.05, "5-50 N m/rad"),
         Parameter("rotor", "kg m^2", 0.0, 0.0, 0.0049, 0.0025, "gears are chosen for a rotor like the load"),

@@ -88,7 +88,7 @@ class PositionTorque(Effect):
 
     name = "position_torque"
     stage = Stage.JOINT_TORQUE
-    contains = ("torque_bias", "cogging", "joint_stop")
+    contains = {"torque_bias": {"stiffness": 0.0}, "cogging": {}, "joint_stop": {}}
     parameters = (
         Parameter("stiffness", unit="N m/rad", neutral=0.0, low=-3.0, high=3.0, typical=0.05, source=SOURCE),
         Parameter("bias", unit="N m", neutral=0.0, low=-1.0, high=1.0, typical=0.0, source=SOURCE),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
+from tactile_cube.identification.search.candidates import first_term
 from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
@@ -141,16 +143,25 @@ def cheapest(found: Sequence[Proposal], search: Search) -> list[Proposal]:
 def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Explanation]) -> list[Proposal]:
     """Sets with another law in the place of one of the chosen ones that fit as well with everything free.
 
-    The laws that a chosen one becomes at the edge of its numbers come first; what has many more numbers is no twin.
+    The laws that a chosen one becomes at the edge of its numbers come first, and are tried in any case where an
+    interval reaches that edge, as is the set without the effect. What has many more numbers is no twin.
     """
     known = {named_by(one.effects) for one in judged}
     itself, found = Proposal(chosen.effects, chosen.fit), list[Proposal]()
     for place, effect in enumerate(chosen.effects):
-        looks = first
+        looks, simpler = first, simpler_laws(search, chosen, place)
         if len(chosen.effects) > 1:
             looks = look(search, without(search, itself, place), list(effect.joints))
-        laws = [one for one in looks.tried if one[0].size <= effect.size + 1 and explains_most(search, looks, one[1])]
-        laws.sort(key=lambda one: one[0].effect.name not in effect.effect.contains)
+            if (left := named_by(looks.parent.effects)) not in known:
+                known.add(left)
+                found.append(looks.parent)
+        laws = [
+            one
+            for one in looks.tried
+            if one[0].effect.name in simpler
+            or (one[0].size <= effect.size + 1 and explains_most(search, looks, one[1]))
+        ]
+        laws.sort(key=lambda one: (one[0].effect.name not in simpler, one[0].effect.name not in effect.effect.contains))
         for candidate, fitted in laws[: 2 * JUDGED]:
             names = named_by((*looks.parent.effects, candidate))
             if len(found) >= JUDGED or names in known:
@@ -158,9 +169,27 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
             known.add(names)
             if not near(search, looks, fitted, [itself]):
                 fitted = further(looks, fitted)
-            if near(search, looks, fitted, [itself]):
+            if candidate.effect.name in simpler or near(search, looks, fitted, [itself]):
                 found.append(refitted(search, looks, [(candidate, fitted)]))
     return [one for one in found if one.fit.cost <= CLOSE * chosen.fit.cost]
+
+
+def simpler_laws(search: Search, chosen: Explanation, place: int) -> set[str]:
+    """Effects that one of a set may just as well be: at a value that its interval reaches it becomes them."""
+    fitted = search.frozen(chosen.fit)
+    first = first_term(fitted.model, chosen.effects, place)
+    width = NORMAL_95 * standard_errors(search.problem, fitted)
+    reach = [
+        (u.key, u.of(fitted.model), w * u.scale, u.high)
+        for u, w in zip(fitted.unknowns, width, strict=True)
+        if u.kind == "effect" and u.place == first
+    ]
+    return {
+        name
+        for name, values in chosen.effects[place].effect.contains.items()
+        for key, value, half, high in reach
+        if key in values and abs(min(values[key], high) - value) <= half
+    }
 
 
 def parent_label(one: Proposal) -> str:
