@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tactile_cube.drivetrain.effects import Effect, Stage, catalogue
-from tactile_cube.drivetrain.signals import DAMPING, FRICTION, LEAD, LOOP_GAIN, LOOSE_TORQUE, ROWS, VELOCITY
+from tactile_cube.drivetrain.signals import DAMPING, FRICTION, LEAD, LOOP_GAIN, LOOSE_TORQUE, ROWS, TIME, VELOCITY
 
 Law = type[Effect]
 STEPS, STEP = 24, 0.01
 ALIKE = 1e-3  # part of what a law changes
 MOST = 4  # numbers of a form: a profile of more imitates anything on so few steps
-POSITIVE = [LEAD, LOOP_GAIN, LOOSE_TORQUE, DAMPING, FRICTION]
+POSITIVE = [LEAD, LOOP_GAIN, LOOSE_TORQUE, DAMPING, FRICTION, TIME]
 
 
 def changed(law: Law, values: Mapping[str, float]) -> NDArray[np.float64]:
@@ -23,6 +23,7 @@ def changed(law: Law, values: Mapping[str, float]) -> NDArray[np.float64]:
     for signals in 0.3 * rng.standard_normal((STEPS, ROWS, 2)):
         signals[POSITIVE] = np.abs(signals[POSITIVE])
         signals[VELOCITY] *= 0.1
+        signals[TIME] *= 1000.0  # minutes
         before = signals[:, 0].copy()
         own = law.law(signals, 0, p, state, STEP) - before[law.stage.value]
         rows += [own, *(signals[:, 0] - before)]
@@ -42,7 +43,7 @@ def imitates(simple: Law, form: Mapping[str, float], wanted: NDArray[np.float64]
 
 def forms(law: Law) -> list[dict[str, float]]:
     known = law.forms or ({q.name: q.typical for q in law.parameters},)
-    return [dict.fromkeys(law.details, 0.0) | form for form in known if len(form) <= MOST]
+    return [form for form in known if len(form) <= MOST]
 
 
 def edges(law: Law, form: Mapping[str, float]) -> dict[tuple[str, float], dict[str, float]]:

@@ -17,6 +17,7 @@ from tactile_cube.errors import InputError
 
 Array = npt.NDArray[np.float64]
 View = Callable[[str], Array]
+Simpler = Mapping[str, Mapping[str, float]]
 
 
 class Stage(Enum):
@@ -125,7 +126,7 @@ class Effect:
     """
     details: ClassVar[tuple[str, ...]] = ()
     """Parameters that a search frees last, where a form fits the data already."""
-    contains: ClassVar[Mapping[str, Mapping[str, float]]] = {}
+    contains: ClassVar[Simpler] = {}
     """Simpler effects that are special cases of this one, and the parameters' values at which it becomes each of them.
 
     Each value alone suffices; an infinite one is the parameter's largest. Empty where no single value does it.

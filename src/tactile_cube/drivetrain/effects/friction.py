@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 from math import exp, inf
+from typing import ClassVar
 
-from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Simpler, Stage
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.drivetrain.signals import DAMPING, DIRECTION, FRICTION, JOINT_TORQUE, TIME, TORQUE, VELOCITY
 
@@ -40,7 +41,7 @@ class StribeckFriction(Effect):
 
     name = "stribeck_friction"
     stage = Stage.FRICTION
-    contains = {"coulomb_friction": {"velocity": inf}}
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"velocity": inf}}
     parameters = (
         Parameter("excess", "N m", 0.0, 0.0, 0.5, 0.04, "+10-50 % of the Coulomb friction"),
         Parameter("velocity", "rad/s", 0.15, 0.01, 3.0, 0.15, "0.05-0.3 rad/s"),
@@ -92,7 +93,7 @@ class AsymmetricFriction(Effect):
 
     name = "asymmetric_friction"
     stage = Stage.FRICTION
-    contains = {"coulomb_friction": {"difference": 0.0, "ratio": 0.0}}
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"difference": 0.0, "ratio": 0.0}}
     parameters = (
         Parameter("difference", "N m", 0.0, -0.3, 0.3, 0.02, "5-30 % of the dry friction; more with worn gears"),
         Parameter("ratio", unit="1", neutral=0.0, low=-0.9, high=0.9, typical=0.0, source="5-30 %"),
@@ -121,7 +122,7 @@ class FrictionDrift(Effect):
 
     name = "friction_drift"
     stage = Stage.FRICTION
-    contains = {"coulomb_friction": {"change": 0.0}}
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"change": 0.0}}
     parameters = (
         Parameter("change", unit="N m", neutral=0.0, low=-5.0, high=5.0, typical=0.02, source="-20 to -50 % over 20 K"),
         Parameter("time_constant", "s", 200.0, 0.5, 200.0, 5.0, "seconds (lubricant) to minutes (housing)"),
@@ -169,7 +170,7 @@ class PreslidingFriction(Effect):
 
     name = "presliding_friction"
     stage = Stage.FRICTION
-    contains = {"coulomb_friction": {"breakaway": 0.0}}
+    contains: ClassVar[Simpler] = {"coulomb_friction": {"breakaway": 0.0}}
     parameters = (
         Parameter("breakaway", unit="rad", neutral=0.0, low=0.0, high=0.1, typical=0.003, source="0.05 mrad to 1 deg"),
         Parameter("excess", "N m", 0.0, -0.05, 0.5, 0.0, "friction beyond the nominal static friction"),

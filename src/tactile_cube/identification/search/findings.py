@@ -68,7 +68,7 @@ def find(search: Search) -> Findings:
         shared = shared_offset(base, search.fitted, search.effects, search.shooting.sizes)
         return Findings(base, nominal, ((shared,),) if shared else (), ())
     way, first = proposed(search)
-    looked = max(len(first.scores), 1) if first else 1
+    looked = max(len(first.tried), 1) if first else 1  # starts of one law are no other law
     judged = [search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]]
     good = [one for one in judged if proven(one, search.criteria)]
     if good and first:
@@ -103,7 +103,7 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
     parent = Proposal((), search.base.fit)
     found: list[Proposal] = []
     first: Looks | None = None
-    while places := off(search.problem, parent.fit, search.criteria.floor):
+    while places := off(search, parent.fit):
         looks = look(search, parent, [search.fitted.joints[j] for j in places])
         first = first or looks
         if not looks.tried:

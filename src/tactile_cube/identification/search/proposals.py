@@ -48,10 +48,21 @@ class Looks:
     scores: list[Score] = field(repr=False)
 
 
-def off(problem: Problem, one: Fit, most: float) -> list[int]:
-    """Joints whose error on the fitted trials is above so many times the sensor noise, the whole machine's included."""
-    errors = np.sqrt(np.nanmean(segment_errors(problem, one.residual) ** 2, axis=0))
-    return [j for j, error in enumerate(errors) if error > most]
+def off(search: Search, one: Fit) -> list[int]:
+    """Joints whose error on the fitted trials is above the floor, the whole machine's included.
+
+    Of a set that has explained nearly all of a joint's error, above what is tolerated: a law differs in detail from the
+    real thing, and no other law is called for by that.
+    """
+    criteria, before = search.criteria, joint_errors(search.problem, search.base.fit)
+    errors = joint_errors(search.problem, one)
+    detail = errors**2 - 1.0 <= (1.0 - criteria.nearly_whole) * (before**2 - 1.0)
+    return [int(j) for j in np.flatnonzero(errors > np.where(detail, criteria.tolerated, criteria.floor))]
+
+
+def joint_errors(problem: Problem, one: Fit) -> Array:
+    """RMS error (n,) of a fit at each joint, in units of the sensor noise."""
+    return np.asarray(np.sqrt(np.nanmean(segment_errors(problem, one.residual) ** 2, axis=0)))
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
@@ -122,7 +133,7 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
 
 def whole(search: Search, found: Sequence[Proposal]) -> bool:
     """Whether one of the sets leaves no joint off."""
-    return any(not off(search.problem, one.fit, search.criteria.floor) for one in found)
+    return any(not off(search, one.fit) for one in found)
 
 
 def near(search: Search, looks: Looks, fitted: Fit, found: Sequence[Proposal]) -> bool:
