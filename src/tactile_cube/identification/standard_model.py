@@ -179,7 +179,7 @@ class _Fitting:
         """How many rows a window of so long has, of a finger or of what is as slow in proportion."""
         return round(seconds * self.shooting.time / self.recording.step)
 
-    def robust(self, model: Model, rows: int) -> _Tried:
+    def robust(self, model: Model, rows: int, rounds: int = ROUNDS) -> _Tried:
         """A fit in windows of so many rows with a soft-L1 loss, by weights that are taken anew."""
         segments = max(
             1, round(LONGEST_FITTED * self.shooting.time / (len(self.recording.joints) * rows * self.recording.step))
@@ -187,7 +187,7 @@ class _Fitting:
         windows = some(self.shooting.cut(self.recording, self.noise, segment=rows), segments)
         sizes = self.shooting.sizes
         unknowns = (*base_unknowns(self.recording, self.start.constants, sizes), *model_unknowns(model, sizes))
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             problem = self.weighted(windows, model)
             found = fit(problem, model, unknowns, ITERATIONS)
             model = found.model
@@ -218,7 +218,7 @@ class _Fitting:
             return best
         terms = tuple(t for t in best.model.terms if t not in new or t.label not in needless)
         near = self.robust(replace(best.model, terms=terms), min(self.rows_of(WINDOWS[1]), best.rows))
-        fewer = min(near, self.robust(near.model, best.rows), key=lambda one: one.error)
+        fewer = min(near, self.robust(near.model, best.rows, 1), key=lambda one: one.error)
         return self.needed(fewer) if fewer.error**2 <= (1.0 + STANDARD.detail) * best.error**2 else best
 
     def added(self, model: Model) -> tuple[Candidate, ...]:
