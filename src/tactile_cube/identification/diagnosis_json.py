@@ -60,6 +60,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "inseparable": [list(pair) for pair in experiment.inseparable] if experiment else [],
         "held_out": diagnosis.held_out,
         "tested": diagnosis.tested,
+        "stopped_early": diagnosis.findings.stopped,
         "seconds": round(seconds, 2),
     }
 
@@ -97,7 +98,7 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "gain": round(one.gain, 5),
             "p_value": one.p_value,
         }
-        for one in (*(e for level in diagnosis.findings.levels for e in level), *diagnosis.findings.surpassed)
+        for one in diagnosis.findings.proven(diagnosis.criteria)
     ]
     judged = {row["effects"] for row in rows}
     for score in diagnosis.findings.scores[:RANKED]:

@@ -54,6 +54,8 @@ def answer(result: dict[str, Any], experiment: Experiment | None, constants: Seq
     lines += [f"  {common_offset(entry, units)}" for entry in result.get("common_offsets", [])]
     lines += [f"  {line}" for line in (*disturbed(result), *unseen_effects(result))]
     lines += [f"  {Drift(**one).sentence(units.get(one['joint'], TURNS))}." for one in result.get("drift", [])]
+    if left := result.get("stopped_early"):
+        lines.append(f"The search stopped early (criteria.most_simulated); next: {left}.")
     lines += [f"Constants found otherwise than stated: {', '.join(constants)}."] if constants else []
     error, unit = result["error"], common_unit(units.values())
     refitted = f"{milli(error['refitted'], unit)} with constants refitted, " if not grasps else ""

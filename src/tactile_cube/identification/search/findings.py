@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
 from tactile_cube.identification.search.candidates import first_term
 from tactile_cube.identification.search.evidence import Judgement, worse
@@ -44,20 +45,33 @@ class Findings:
     Attributes:
         base: the refitted base model.
         nominal: the model before any fit, judged on the held-out trials.
-        levels: explanations that earn their place by number of effects, best first.
+        judged: sets that the held-out trials judged.
         scores: the first look at every law, best first.
-        unproven: what would explain much and may be chance, best first.
-        surpassed: what was judged and is clearly worse than the best.
-        unclear: what was judged and does not earn its place: to predict with where nothing is claimed.
+        stopped: what was left to try as the search ran out of simulations; empty where it ended by itself.
     """
 
     base: Explanation
     nominal: Judgement
-    levels: tuple[tuple[Explanation, ...], ...]
-    scores: tuple[Score, ...]
-    unproven: tuple[Explanation, ...] = ()
-    surpassed: tuple[Explanation, ...] = ()
-    unclear: tuple[Explanation, ...] = ()
+    judged: tuple[Explanation, ...] = ()
+    scores: tuple[Score, ...] = ()
+    stopped: str = ""
+
+    def proven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
+        """Sets that are no chance, best first; none beside a base model at the floor but a shared offset."""
+        found = [one for one in self.judged if proven(one, criteria)]
+        if self.base.largest_error <= criteria.floor:
+            found = [one for one in found if one.judgement is self.base.judgement]
+        return sorted(found, key=lambda one: one.judgement.costs.sum())
+
+    def kept(self, criteria: Criteria = STANDARD) -> list[Explanation]:
+        """Those of them that are not clearly worse than the best."""
+        found = self.proven(criteria)
+        return [one for one in found if not worse(one.judgement, found[0].judgement, criteria)]
+
+    def unproven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
+        """What would explain much and may be chance, best first; nothing beside what is proven."""
+        doubtful = [] if self.proven(criteria) else [one for one in self.judged if unproven(one, criteria)]
+        return sorted(doubtful, key=lambda one: one.error)
 
 
 def find(search: Search) -> Findings:
@@ -66,36 +80,22 @@ def find(search: Search) -> Findings:
     search.say(f"base refitted: held-out error {base.error:.2f} x sensor noise")
     if base.largest_error <= search.criteria.floor:
         shared = shared_offset(base, search.fitted, search.effects, search.shooting.sizes)
-        return Findings(base, nominal, ((shared,),) if shared else (), ())
+        return Findings(base, nominal, (shared,) if shared else ())
+    search.stand(f"constants refitted ({base.error:.2f} x sensor noise on held-out trials)", "every law by itself")
     way, first = proposed(search)
     looked = max(len(first.tried), 1) if first else 1  # starts of one law are no other law
-    judged = [search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]]
-    good = [one for one in judged if proven(one, search.criteria)]
-    if good and first:
+    found = Findings(
+        base,
+        nominal,
+        tuple(search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]),
+        tuple(first.scores) if first else (),
+    )
+    if first and (good := found.proven(search.criteria)):
         chosen = simplest(good, search.criteria)
-        others = [search.explained(one, looked) for one in twins(search, chosen, first, judged)]
-        judged = [*judged, *others]
-        good = [one for one in judged if proven(one, search.criteria)]
-    return arranged(base, nominal, judged, good, first.scores if first else [], search)
-
-
-def arranged(
-    base: Explanation,
-    nominal: Judgement,
-    judged: Sequence[Explanation],
-    good: Sequence[Explanation],
-    scores: Sequence[Score],
-    search: Search,
-) -> Findings:
-    """What was judged, by what came of it."""
-    ordered = sorted(good, key=lambda one: one.judgement.costs.sum())
-    kept = [one for one in ordered if not worse(one.judgement, ordered[0].judgement, search.criteria)]
-    sizes = sorted({len(one.effects) for one in kept})
-    levels = tuple(tuple(one for one in kept if len(one.effects) == size) for size in sizes)
-    unclear = tuple(one for one in judged if one not in good)
-    doubtful = tuple(sorted((e for e in unclear if unproven(e, search.criteria)), key=lambda e: e.error))
-    surpassed = tuple(one for one in ordered if one not in kept)
-    return Findings(base, nominal, levels, tuple(scores), doubtful if not kept else (), surpassed, unclear)
+        search.stand(f"{chosen.label} ({chosen.error:.2f} x sensor noise on held-out trials)", "its possible twins")
+        others = tuple(search.explained(one, looked) for one in twins(search, chosen, first, found.judged))
+        found = replace(found, judged=(*found.judged, *others))
+    return replace(found, stopped=search.following if search.spent else "")
 
 
 def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
@@ -103,7 +103,7 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
     parent = Proposal((), search.base.fit)
     found: list[Proposal] = []
     first: Looks | None = None
-    while places := off(search, parent.fit):
+    while (places := off(search, parent.fit)) and len(parent.effects) < MOST and not search.spent:
         looks = look(search, parent, [search.fitted.joints[j] for j in places])
         first = first or looks
         if not looks.tried:
@@ -116,16 +116,15 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
             break
         parent = tried[0]
-        search.say(f"best so far: {parent_label(parent)} leaves {search.over_noise(parent.fit):.2f} x sensor noise")
-        if len(parent.effects) >= MOST:
-            break
+        left = f"{parent_label(parent)} ({search.over_noise(parent.fit):.2f} x sensor noise on fitted trials)"
+        search.stand(left, "one effect more, and each one taken out")
     return [*found, *reduced(search, parent)], first
 
 
 def reduced(search: Search, one: Proposal) -> list[Proposal]:
     """Sets that are left when one effect after another is taken out, the one that is missed least."""
     found: list[Proposal] = []
-    while len(one.effects) > 1:
+    while len(one.effects) > 1 and not search.spent:
         less = [without(search, one, place) for place in range(len(one.effects))]
         found += less
         one = min(less, key=lambda e: e.fit.cost)
@@ -164,7 +163,7 @@ def twins(search: Search, chosen: Explanation, first: Looks, judged: Sequence[Ex
         laws.sort(key=lambda one: (one[0].effect.name not in simpler, one[0].effect.name not in effect.effect.contains))
         for candidate, fitted in laws[: 2 * JUDGED]:
             names = named_by((*looks.parent.effects, candidate))
-            if len(found) >= JUDGED or names in known:
+            if len(found) >= JUDGED or names in known or search.spent:
                 continue
             known.add(names)
             if not near(search, looks, fitted, [itself]):

@@ -124,10 +124,12 @@ def grown(search: Search, looks: Looks) -> list[Proposal]:
         by_name.setdefault((candidate.effect.name, candidate.joints), (candidate, fitted))
     found: list[Proposal] = []
     for one in list(by_name.values())[:SINGLES]:
+        if search.spent:
+            break
         if not whole(search, found) or near(search, looks, one[1], found):
             found.append(refitted(search, looks, [one]))
     if not whole(search, found):
-        found += [refitted(search, looks, laws) for laws in sets(looks)[:SETS]]
+        found += [refitted(search, looks, laws) for laws in sets(looks)[:SETS] if not search.spent]
     return sorted(found, key=lambda one: one.price(search.criteria))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
@@ -22,12 +23,29 @@ from tactile_cube.measurement.replay.nominal import nominal_model
 
 ENOUGH = 24  # held-out segments at least
 FEWEST_ROWS = 8
+FIRST_ANSWER = 10.0  # [s] after which the best answer so far is said, then after twice as long each time
 
 
 def enough_rows(held_out: Recording) -> int:
     """Rows of a segment at most, so that the held-out trials have enough of them for a test."""
     rows = sum(np.count_nonzero(trial.valid) for trial in held_out.trials)
     return max(FEWEST_ROWS, int(rows) // ENOUGH)
+
+
+class BestSoFar:
+    """Passes lines of progress on, and from time to time the best answer so far and what is tried next."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        """Begin to count time; `say` takes the lines."""
+        self.pass_on, self.answer, self.following = say, "", ""
+        self.began, self.due = time.monotonic(), FIRST_ANSWER
+
+    def __call__(self, line: str) -> None:
+        """Pass a line on, and the best answer where it is time."""
+        self.pass_on(line)
+        if self.answer and time.monotonic() - self.began > self.due:
+            self.pass_on(f"best answer so far: {self.answer}; next: {self.following}")
+            self.due *= 2.0
 
 
 class Search(Division):
@@ -63,8 +81,23 @@ class Search(Division):
         segment = min(steady_rows(shooting, start, some(usual, segments)), enough_rows(held_out))
         segments = min(segments, segments * usual.segment // segment)
         super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
-        self.say, self.criteria, self.effects = say, criteria, effects
+        self.say = say if isinstance(say, BestSoFar) else BestSoFar(say)
+        self.criteria, self.effects = criteria, effects
         self.candidates = candidates(shooting.sizes, effects)
+
+    def stand(self, answer: str, following: str) -> None:
+        """Note the best answer so far and what is tried next, in words."""
+        self.say.answer, self.say.following = answer, following
+
+    @property
+    def following(self) -> str:
+        """What is tried next, in words."""
+        return self.say.following
+
+    @property
+    def spent(self) -> bool:
+        """Whether the search has simulated as much as it may."""
+        return self.shooting.simulated > self.criteria.most_simulated
 
     @cached_property
     def base(self) -> Explanation:

@@ -62,7 +62,7 @@ def shared_offset(
     model = Model(base.fit.model.constants, (*base.fit.model.terms, *terms), offsets)
     candidate = Candidate(effect, joints, {name: float(np.abs(mean[shared]).max())}, sizes)
     fit = replace(base.fit, model=model)
-    return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=float(by_chance[shared].max()))
+    return replace(base, effects=(*base.effects, candidate), fit=fit, p_value=float(by_chance[shared].max()), gain=1.0)
 
 
 def common_offsets(base: Explanation, sizes: Sizes) -> tuple[CommonOffset, ...]:

@@ -107,6 +107,7 @@ class Simulator:
         # the whole catalogue: one kernel, compiled once, for every model of this rig
         known = tuple(dict.fromkeys([*catalogue().values(), *effects]))
         self.plant = Plant([self.tree], recording.step / self.substeps, known, recording.joints)
+        self.simulated = 0.0  # trial time that models were simulated through [s]; those that follow a path a third
         self.workers = min(4, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(self.workers)
 
@@ -153,6 +154,7 @@ class Simulator:
             What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and torques [N m].
         """
         out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
+        self._count(len(models) / (1 if near is None else 3), windows[0])
         if corrections is None:
             corrections = np.zeros((len(models), 2 * len(self.recording.joints)))
         whole = len(models) - len(models) % self.workers  # a model a core; the last ones' windows go to all cores
@@ -165,10 +167,14 @@ class Simulator:
     def path(self, model: Model, windows: Windows) -> Path:
         """A model's way through windows, which its neighbours may follow."""
         out = np.zeros((1, *windows.measured.shape))
+        self._count(1.0, windows)
         steps = out.shape[2] * windows.substeps * self.plant.kernel.PATH_WIDTH
         path = Path(out[0], self._mechanics(self.memory(model)), np.zeros((len(windows), steps)))
         self._one(model, windows, np.zeros(2 * len(self.recording.joints)), out, self._pool, path, follows=False)
         return path
+
+    def _count(self, models: float, windows: Windows) -> None:
+        self.simulated += models * len(windows) * windows.measured.shape[1] * self.recording.step / self.time
 
     def _mechanics(self, memory: Array) -> Array:
         return np.concatenate([self.plant.view(memory, key).ravel() for key in MECHANICS])
