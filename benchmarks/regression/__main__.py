@@ -18,6 +18,7 @@ import yaml
 
 from benchmarks.blind.generator import write
 from benchmarks.blind.scoring import score
+from benchmarks.regression.evidence import stored
 from tactile_cube.api.comparison import compare
 from tactile_cube.api.diagnosis import diagnose
 from tactile_cube.drivetrain.model_file import write_model
@@ -40,6 +41,7 @@ def judged(draw: dict[str, Any], folder: Path) -> dict[str, Any]:
     began = time.process_time()
     found = diagnose(folder / "recording", say=progress.append)
     seconds = time.process_time() - began
+    assert found.free is not None, "these are recordings of free motion"
     write_model(found.model, folder / "model.yaml")
     unseen = compare(folder / "recording" / "validation", values={"band.simulations": 0}, model=folder / "model.yaml")
     ratio = unseen.error / truth["sensor_floor"]
@@ -56,6 +58,7 @@ def judged(draw: dict[str, Any], folder: Path) -> dict[str, Any]:
         "unseen": round(ratio, 3),
         "seconds": round(seconds, 1),
         "progress": progress,
+        "evidence": stored(found.free.findings),
     }
 
 
