@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import find_effect
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.division import Division
+from tactile_cube.identification.search.search import Division
 from tactile_cube.measurement.comparing.noise_floor import sensor_noise
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Term

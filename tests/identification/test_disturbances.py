@@ -9,7 +9,7 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.identification.disturbances import Disturbance, disturbances, in_time, undisturbed
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.division import Division
+from tactile_cube.identification.search.search import Division
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model

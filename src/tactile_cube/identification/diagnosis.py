@@ -14,17 +14,15 @@ from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.disturbances import Disturbance, in_time
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit
-from tactile_cube.identification.fitting.held_out import HeldOut
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.resolution import resolved
 from tactile_cube.identification.inquiry import NOT_ALL, Inquiry, beside_disturbances
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.evidence import gain, judge
+from tactile_cube.identification.search.evidence import HeldOut, gain, judge
 from tactile_cube.identification.search.explanation import Explanation
-from tactile_cube.identification.search.findings import Findings
+from tactile_cube.identification.search.findings import CommonOffset, Findings, common_offsets
 from tactile_cube.identification.search.search import BestSoFar, Search
-from tactile_cube.identification.search.shared_offset import CommonOffset, common_offsets
 from tactile_cube.identification.standard_model import StandardModel, fit_standard_model
 from tactile_cube.identification.verdict import Simulations, Unexplained, Verdict
 from tactile_cube.measurement.comparing.error import ErrorSummary, free_run_error

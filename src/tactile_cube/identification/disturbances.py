@@ -14,11 +14,10 @@ from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.criteria import STANDARD
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.search.division import Division
 from tactile_cube.identification.search.evidence import judge, segment_errors
 from tactile_cube.identification.search.explanation import Proposal
 from tactile_cube.identification.search.proposals import look
-from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.search.search import Division, Search
 from tactile_cube.measurement.comparing.noise_floor import noise_with_links
 from tactile_cube.measurement.comparing.repeats import repeats_of
 from tactile_cube.measurement.recordings.description import MOST_LATE

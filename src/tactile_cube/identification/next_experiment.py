@@ -17,12 +17,11 @@ from scipy.linalg import block_diag
 
 from tactile_cube.drivetrain.effects.scales import Scales
 from tactile_cube.identification.criteria import STANDARD, Criteria
-from tactile_cube.identification.fitting.base import offset_unknowns
 from tactile_cube.identification.fitting.gauss_newton import Fit, precision
 from tactile_cube.identification.fitting.problem import Problem
+from tactile_cube.identification.fitting.resolution import FINER, finer
 from tactile_cube.identification.fitting.shooting import Shooting
-from tactile_cube.identification.fitting.time_step import FINER, finer
-from tactile_cube.identification.fitting.unknowns import Unknown
+from tactile_cube.identification.fitting.unknowns import Unknown, offset_unknowns
 from tactile_cube.identification.safe_commands import PossibleMotions, Safety, covariance_of_numbers
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Trial

@@ -13,12 +13,11 @@ from tactile_cube.drivetrain.effects.effect import Stage
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.candidates import Candidate, with_details, without_effect
-from tactile_cube.identification.search.division import some
 from tactile_cube.identification.search.evidence import segment_errors
 from tactile_cube.identification.search.explanation import Proposal, named_by
 from tactile_cube.identification.search.residual_starts import PROFILE, residual_candidates, special_candidates
 from tactile_cube.identification.search.screening import Score, resized, screen, start
-from tactile_cube.identification.search.search import Search
+from tactile_cube.identification.search.search import Search, some
 
 Array = NDArray[np.float64]
 LOOKED_AT = 4  # part of the segments to judge by, on which every law gets its own steps
