@@ -13,7 +13,7 @@ from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.fitting.gauss_newton import Fit
 from tactile_cube.identification.fitting.unknowns import Unknown
 from tactile_cube.identification.search.candidates import Candidate
-from tactile_cube.identification.search.evidence import Judgement
+from tactile_cube.identification.search.evidence import Judgement, gain, p_value
 from tactile_cube.identification.search.explanation import Explanation, named
 from tactile_cube.identification.search.findings import Findings
 from tactile_cube.identification.verdict import Verdict, decide
@@ -27,6 +27,7 @@ def stored(findings: Findings) -> dict[str, Any]:
     """The statistics by which a verdict is decided, as plain numbers."""
     base = findings.base.judgement
     return {
+        "looked": findings.looked,
         "samples": base.samples.tolist(),
         "trial": base.trial.tolist(),
         "base": _judged(base),
@@ -38,9 +39,12 @@ def stored(findings: Findings) -> dict[str, Any]:
     }
 
 
-def decided(table: Mapping[str, Any], criteria: Criteria) -> tuple[str, list[list[str]]]:
-    """The verdict's kind by these statistics, and the effects of the chosen set and of its rivals, NAME@JOINT."""
-    return answer(decide(_findings(table), criteria))
+def decided(table: Mapping[str, Any], criteria: Criteria, strength: float = 1.0) -> tuple[str, list[list[str]]]:
+    """The verdict's kind by these statistics, and the effects of the chosen set and of its rivals, NAME@JOINT.
+
+    Had what is hidden been of another `strength`, all that is more than noise would be as many times as large squared.
+    """
+    return answer(decide(_findings(table, strength), criteria))
 
 
 def answer(verdict: Verdict) -> tuple[str, list[list[str]]]:
@@ -70,15 +74,21 @@ def _effects(one: Explanation) -> list[dict[str, Any]]:
     return found
 
 
-def _findings(table: Mapping[str, Any]) -> Findings:
-    base = _explanation(table, table["base"] | {"effects": [], "p_value": 1.0, "gain": 0.0})
-    sets = [_explanation(table, one) for one in table["sets"]]
-    shared = [one["shared"] for one in table["sets"]]
-    kept = [replace(one, judgement=base.judgement) if s else one for one, s in zip(sets, shared, strict=True)]
-    return Findings(base, base.judgement, tuple(kept))
+def _findings(table: Mapping[str, Any], strength: float) -> Findings:
+    base = _explanation(table, table["base"] | {"effects": [], "p_value": 1.0, "gain": 0.0}, strength)
+    sets = []
+    for entry in table["sets"]:
+        one = _explanation(table, entry, strength)
+        if entry["shared"]:
+            one = replace(one, judgement=base.judgement)
+        elif strength != 1.0:
+            chance = min(1.0, p_value(base.judgement, one.judgement) * table["looked"])
+            one = replace(one, p_value=chance, gain=gain(base.judgement, one.judgement))
+        sets.append(one)
+    return Findings(base, base.judgement, tuple(sets), looked=table["looked"])
 
 
-def _explanation(table: Mapping[str, Any], one: Mapping[str, Any]) -> Explanation:
+def _explanation(table: Mapping[str, Any], one: Mapping[str, Any], strength: float) -> Explanation:
     terms: list[Term] = []
     unknowns: list[Unknown] = []
     candidates = []
@@ -94,7 +104,9 @@ def _explanation(table: Mapping[str, Any], one: Mapping[str, Any]) -> Explanatio
             ]
         candidates.append(Candidate(effect, tuple(entry["joints"]), dict.fromkeys(entry["form"], 0.0)))
     model = Model({}, tuple(terms), {})
-    costs, samples = np.array(one["costs"]), np.array(table["samples"])
-    judgement = Judgement(model, costs, samples, NOTHING, np.array(one["joint_errors"]), np.array(table["trial"]))
+    samples, errors = np.array(table["samples"]), np.array(one["joint_errors"])
+    costs = samples + strength**2 * (np.array(one["costs"]) - samples)
+    errors = np.sqrt(1.0 + strength**2 * (errors**2 - 1.0))
+    judgement = Judgement(model, costs, samples, NOTHING, errors, np.array(table["trial"]))
     fit = Fit(model, tuple(unknowns), float(costs.sum()), 0.0, NOTHING, NOTHING, NOTHING)
     return Explanation(tuple(candidates), fit, judgement, one["p_value"], one["gain"])

@@ -53,6 +53,7 @@ class Findings:
         nominal: the model before any fit, judged on the held-out trials.
         judged: sets that the held-out trials judged.
         scores: the first look at every law, best first.
+        looked: laws at joints that were looked at, each of which may seem best by chance.
         stopped: what was left to try as the search ran out of simulations; empty where it ended by itself.
     """
 
@@ -60,6 +61,7 @@ class Findings:
     nominal: Judgement
     judged: tuple[Explanation, ...] = ()
     scores: tuple[Score, ...] = ()
+    looked: int = 1
     stopped: str = ""
 
     def proven(self, criteria: Criteria = STANDARD) -> list[Explanation]:
@@ -95,6 +97,7 @@ def find(search: Search) -> Findings:
         nominal,
         tuple(search.explained(one, looked) for one in cheapest(way, search)[:JUDGED]),
         tuple(first.scores) if first else (),
+        looked,
     )
     if first and (good := found.proven(search.criteria)):
         chosen = simplest(good, search.criteria)
