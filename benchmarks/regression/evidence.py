@@ -60,7 +60,8 @@ def _judged(one: Judgement) -> dict[str, Any]:
 
 def _effects(one: Explanation) -> list[dict[str, Any]]:
     """Each effect with the numbers that were fitted: values, and the edges of what they may be."""
-    first, found = len(one.fit.model.terms) - one.terms, []
+    first = len(one.fit.model.terms) - one.terms
+    found: list[dict[str, Any]] = []
     for candidate in one.effects:
         terms = range(first, first + len(candidate.joints))
         numbers = [
@@ -69,8 +70,9 @@ def _effects(one: Explanation) -> list[dict[str, Any]]:
             for u in one.fit.unknowns
             if u.kind == "effect" and u.place in terms
         ]
-        found.append({"name": candidate.effect.name, "joints": candidate.joints, "form": [*candidate.form]})
-        found[-1]["numbers"], first = numbers, first + len(candidate.joints)
+        entry = {"name": candidate.effect.name, "joints": candidate.joints, "form": [*candidate.form]}
+        found.append(entry | {"numbers": numbers})
+        first += len(candidate.joints)
     return found
 
 
