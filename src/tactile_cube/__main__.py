@@ -1,7 +1,5 @@
 """`tactile-cube COMMAND ...` and `python -m tactile_cube COMMAND ...`: as `python -m tactile_cube.COMMAND ...`."""
 
-from __future__ import annotations
-
 import sys
 
 from tactile_cube.cli import command_line, fail, quiet_when_nobody_reads

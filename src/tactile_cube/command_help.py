@@ -76,6 +76,5 @@ def _groups(path: Path) -> dict[str, str | None]:
 
 
 def _key_lines(path: Path) -> list[str]:
-    """Top-level keys of a command's file with the comments behind them, as written there."""
     lines = [line for line in path.read_text().splitlines() if line and line[0] not in " #-"]
     return [f"  {line}" for line in lines if not line.startswith("defaults:")]

@@ -1,7 +1,5 @@
 """The same environment, transforms included, for learners that speak Gymnasium."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

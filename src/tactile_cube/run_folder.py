@@ -53,7 +53,6 @@ def configuration_in(folder: Path, config: DictConfig, log: str) -> Iterator[Non
 
 
 def _configuration(config: DictConfig) -> dict[str, str]:
-    """The files that Hydra would write, and their content."""
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf
 
@@ -85,7 +84,6 @@ class KeptStream:
         self._stream, self._file, self._begun = stream, file, ""
 
     def __getattr__(self, name: str) -> Any:
-        """All else is the stream's."""
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:

@@ -1,7 +1,5 @@
 """The jobs of a sweep, in this process or wherever a launcher runs them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import secrets
@@ -44,7 +42,6 @@ class Jobs:
         register_sweep_folder()
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Arrive in another process, which knows nothing of this package yet."""
         self.__dict__.update(state)
         register_sweep_folder()
 

@@ -108,7 +108,6 @@ def read_npz(path: Path, most: int = limits.NUMBERS) -> dict[str, NDArray[Any]]:
 
 
 def _sizes(archive: ZipFile) -> Iterator[tuple[str, int]]:
-    """Name and bytes of each array, by its header."""
     for member in archive.namelist():
         with archive.open(member) as stream:
             if np.lib.format.read_magic(stream) != (1, 0):  # others may have gigabytes of header

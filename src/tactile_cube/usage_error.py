@@ -1,7 +1,5 @@
 """What a user did wrong, in one line, from the errors of this package, of pydantic, of Hydra and of the disk."""
 
-from __future__ import annotations
-
 import errno
 import traceback
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Many calls at once, in processes of this machine."""
 
-from __future__ import annotations
-
 import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence

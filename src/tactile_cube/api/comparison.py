@@ -1,7 +1,5 @@
 """Compare a recording with a model from a program."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

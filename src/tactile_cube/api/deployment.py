@@ -1,7 +1,5 @@
 """Export a policy, and run its control loop on a hand, from a program."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -81,10 +79,6 @@ def run_export(job: Job) -> tuple[Path, Path]:
 
 
 def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSetting:
-    """What the policy was trained with, on the hand and with the object that `config` names where its file cannot.
-
-    With `trained`, the hand has to be the policy's; else it is any, as for an excitation in place of a policy.
-    """
     hand: Hand | None = instantiate(config.hand, _convert_="all") if config.get("hand") else None
     if hand is not None and not trained:
         return TrainingSetting.of(hand)

@@ -1,7 +1,5 @@
 """Diagnose a recording from a program: which physical effect does the model lack?"""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

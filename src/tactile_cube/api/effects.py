@@ -1,7 +1,5 @@
 """The catalogue of physical effects in words: for the terminal, for a program and for docs/effects.md."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Training environments and grasps from a program."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Evaluate a policy from a program."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

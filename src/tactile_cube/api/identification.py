@@ -1,7 +1,5 @@
 """Identify effects from a program: fit them, with intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Write an identified model for another simulator, from a program."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

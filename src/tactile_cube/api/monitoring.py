@@ -1,7 +1,5 @@
 """Watch a machine from a program: what has changed since its model was identified?"""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Make recordings from a program: from a simulated rig, from files of other programs, from arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

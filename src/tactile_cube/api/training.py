@@ -1,7 +1,5 @@
 """Train a policy from a program: in one run, or in stages of which each begins with the networks of the one before."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
@@ -189,14 +187,12 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
 
 
 def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
-    """Train through faults of the workers."""
     start = partial(_training_run, job, plain, stage, later)
     run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 
 def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int, **changes: str) -> Run:
-    """The run that a job describes, with changes to how it is trained: new, or where its checkpoint says."""
     config: Any = job.config
     run = build_run(
         folder=job.folder,
@@ -255,7 +251,6 @@ def stages_of(job: Job) -> list[Job]:
 
 
 def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
-    """What is mastered, what is not, and what is to come, in one line."""
     lines = [
         f"{one.folder.name}: {one.reason if one.reason.startswith(MASTERED) else f'not mastered: {one.reason}'}"
         for one in results
@@ -300,7 +295,6 @@ def _own_grasps(job: Job, file: Path) -> str | None:
 
 
 def _sum_up(folder: Path, results: Sequence[TrainingResult]) -> None:
-    """Write costs and curve of all stages so far into the folder of the whole training."""
     costs = [asdict(read_costs(result.folder / LEDGER)) for result in results]
     spent = Costs(**{name: sum(one[name] for one in costs) for name in costs[0]})
     write_costs(folder / LEDGER, sum(result.steps for result in results), spent)

@@ -1,7 +1,5 @@
 """See a run from a program: best and worst episode side by side, and its learning curves."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,7 +89,6 @@ def run_view(job: Job, say: Say) -> ViewResult:
 
 
 def _write_run(job: Job, file: Path, say: Say) -> dict[str, EpisodeResult]:
-    """Run the episodes of a job and write the best and the worst; gives what they were."""
     config = job.config
     # found here, so that an error names the key that the user wrote
     curve = None if config.run in BASELINES else learning_curve(policy_path(config.run, "run").parent)
@@ -122,7 +119,6 @@ def _described(result: EpisodeResult) -> str:
 
 
 def _words(run: str, tried: EvaluationResult) -> str:
-    """About the run, in Markdown."""
     provenance = tried.run.source.provenance
     known = {key: provenance[key] for key in ("steps", "seed", "time_constant", "commit") if key in provenance}
     rows = [f"| {key} | {value} |" for key, value in known.items()]

@@ -1,7 +1,5 @@
 """The last check of every command: finite, and within the limits around the last accepted angles."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from math import nan
@@ -10,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, Reading
 
-Array = NDArray[np.float64]
 AGREEING = 5
 """Readings in a row that must agree before the first command."""
 ROUNDING = 1e-9  # [rad] of angles that add up ticks
@@ -123,7 +120,6 @@ class CommandGuard:
         return self._jump(reading) or self._without_room(self.since_sent(now), q_m)
 
     def _jump(self, reading: Reading) -> str:
-        """Say which joint has moved further than it can since the last accepted reading."""
         if self.state is None:
             return ""
         since, moved = reading.time - self.state.time, np.abs(reading.q_m - self.state.q_m)
@@ -134,7 +130,6 @@ class CommandGuard:
         return f"{self.names[at]} moved by {moved[at]:.4f} rad in {1e3 * since:.1f} ms, {allowed}"
 
     def _without_room(self, dt: float, q_m: Array) -> str:
-        """Say around which joint no command keeps all limits."""
         limits, before, step = self.limits, self._before(q_m), self._step(dt)
         low = np.maximum(np.maximum(limits.lower, q_m - self._reach), before - step)
         high = np.minimum(np.minimum(limits.upper, q_m + self._reach), before + step)

@@ -1,7 +1,5 @@
 """The robot's side in one place: a fast loop that opens, waits for the object, asks the policy and stops by itself."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -9,12 +7,11 @@ from enum import StrEnum
 from math import inf, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController
 from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, Reading
 from tactile_cube.deployment.stop import Stop
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.drivetrain.control_law import low_pass
@@ -22,7 +19,6 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.kinematics import grasp_angles
 
-Array = NDArray[np.float64]
 ROUNDING = 1e-9  # [s] of clocks that add up ticks
 
 
@@ -48,7 +44,6 @@ class Homing:
     clearance: float = 0.015
 
     def __post_init__(self) -> None:
-        """Refuse what never arrives."""
         require_positive({f"homing.{name}": value for name, value in asdict(self).items()})
 
 

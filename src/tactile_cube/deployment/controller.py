@@ -1,7 +1,5 @@
 """The policy as it runs on the hand: at 10 Hz from measured joint angles to desired ones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A policy as files that need none of this package: arrays or an ONNX graph, with the contract beside them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import asdict

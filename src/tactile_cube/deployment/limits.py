@@ -1,7 +1,5 @@
 """What a command to the hand never exceeds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import inf
@@ -41,7 +39,6 @@ class JointLimits:
     kd: Array
 
     def __post_init__(self) -> None:
-        """Refuse limits that bound nothing."""
         require_positive({"rate_limit": self.rate, "torque_limit": self.torque})
         if not (self.lower <= self.upper).all():
             raise InputError(f"joint range {self.lower} to {self.upper} [rad]; a lower limit is above an upper one")
@@ -68,7 +65,6 @@ class StopRules:
     timeout: float = 0.1
 
     def __post_init__(self) -> None:
-        """Refuse bounds that no hand can keep."""
         require_positive({f"stop.{name}": value for name, value in asdict(self).items()})
 
 

@@ -13,13 +13,12 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from tactile_cube.deployment.limits import JointLimits
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, Reading
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.dlr_hand2 import REFLECTED_INERTIA, STATIC_FRICTION, STIFFNESS
 from tactile_cube.measurement.recordings.description import Controller, Coupling, Description, Sensors, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.void]
 """Rows of a log: `time` [s] and `position`, `command` [rad], `torque` [N m] `(joints,)`, nan where not measured."""
 CHUNK = 500
@@ -54,7 +53,6 @@ class LoopLog:
         self._thread.start()
 
     def __enter__(self) -> LoopLog:
-        """The log itself."""
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """What the control loop needs of a hand, be it simulated, reached through ROS 2 or through a program of your own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

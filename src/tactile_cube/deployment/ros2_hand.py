@@ -1,7 +1,5 @@
 """A hand behind ROS 2: joint states come in as sensor_msgs/JointState, desired angles go out as the same."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Run the control loop on a hand until it stops, keep its tick times."""
 
-from __future__ import annotations
-
 import os
 import select
 import sys

@@ -35,7 +35,6 @@ class NotedSignals:
         self._stepped = time.monotonic()
 
     def __enter__(self) -> NotedSignals:
-        """Take the signals over, where this is the main thread."""
         self.alive()
         if threading.current_thread() is threading.main_thread():
             taken = [kind for kind in (*ENDING, *TERMINAL) if signal.getsignal(kind) is not signal.SIG_IGN]
@@ -45,7 +44,6 @@ class NotedSignals:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Give the signals back, and suspend the program if that was asked for."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
         if signal.SIGTSTP.name in self.names:

@@ -1,22 +1,18 @@
 """The simulated hand as the control loop sees a real one: for dry runs."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.deployment.limits import require_positive
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, Reading
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.env import cube_pose
 from tactile_cube.env.cube_pose import frame_along, seen_along
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.simulation import SimulationOptions, Start, World
 
-Array = NDArray[np.float64]
 AWAY = (0.0, 0.0, -0.3)  # [m] where the cube waits
 LONGEST_STOP = 100_000
 """Periods for which the angle of the object is kept: a stop takes some 100, in 5 s of computing 30 000."""

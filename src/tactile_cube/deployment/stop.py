@@ -1,19 +1,15 @@
 """How the commands to a robot end: at the last accepted angles, where the fingers press on nothing."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from enum import StrEnum
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.deployment.command_guard import CommandGuard
-from tactile_cube.deployment.robot import Reading, Robot
+from tactile_cube.deployment.robot import Array, Reading, Robot
 
-Array = NDArray[np.float64]
 REPEATS = 100
 """Commands at the goal that the robot takes before it is let alone, so that a lost message does no harm."""
 LOOKING = 0.2

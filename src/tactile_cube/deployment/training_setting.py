@@ -119,7 +119,6 @@ def _require_reach(setting: TrainingSetting, label: str) -> None:
 
 
 def _values(env: Mapping[str, Any], part: str, known: set[str], label: str) -> dict[str, Any]:
-    """The plain values of a part of the environment; classes and the hand stand elsewhere."""
     values = {key: value for key, value in (env.get(part) or {}).items() if key not in ("_target_", "hand", "joints")}
     for key in values.keys() - known:
         raise InputError(f"{label}: has env.{part}.{key}, which this version does not know")

@@ -1,7 +1,5 @@
 """Turns the steps into machine code for one plant, kept on disk so that the next process starts at once."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import os

@@ -1,19 +1,13 @@
 """Where each number of a plant lies in its one flat memory: a snapshot is a copy, a batch is a stack."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
 
-import numpy as np
-import numpy.typing as npt
-
-from tactile_cube.drivetrain.effects.effect import Effect
+from tactile_cube.drivetrain.effects.effect import Array, Effect
 from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS
 
-Array = npt.NDArray[np.float64]
 Shape = tuple[int, ...]
 
 

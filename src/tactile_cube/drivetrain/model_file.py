@@ -211,7 +211,6 @@ def write_model(model: ModelFile, path: str | Path) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Dicts and lists in place of a configuration's own containers."""
     if isinstance(value, Mapping):
         return {str(key): _plain(part) for key, part in value.items()}
     return [_plain(part) for part in value] if isinstance(value, Sequence) and not isinstance(value, str) else value

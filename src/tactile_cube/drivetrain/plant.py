@@ -1,7 +1,5 @@
 """A drivetrain and the mechanism that it moves, ready to be stepped: one or more equal fingers, any effects."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -11,14 +9,13 @@ import numpy.typing as npt
 
 from tactile_cube.drivetrain.constants import DrivetrainConstants
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
-from tactile_cube.drivetrain.effects.effect import Effect, Place, Stage
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Place, Stage
 from tactile_cube.drivetrain.kernel import load_kernel
 from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology, plan_memory
 from tactile_cube.drivetrain.signals import COMMAND, FRICTION, MOTOR_POSITION, POSITION, VELOCITY
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
 
-Array = npt.NDArray[np.float64]
 EffectClass = type[Effect]
 
 _TREE_KEYS = ("ratio", "offset", "placement_rotation", "placement_translation", "axis", "mass", "com", "inertia")

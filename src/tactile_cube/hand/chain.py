@@ -1,7 +1,5 @@
 """Fingertips from joint angles and back: for any chain of revolute joints, and in closed form for the DLR-Hand II."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

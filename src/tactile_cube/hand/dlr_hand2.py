@@ -5,8 +5,6 @@ ICRA 2022; W = the authors' website for it; scene = static transforms of the han
 page, which agree with the public robot description `rokin` (JustinHand12).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

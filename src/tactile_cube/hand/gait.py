@@ -59,7 +59,6 @@ class Gait:
     phases: tuple[float, ...] = (0.0, 0.5, 0.0, 0.5)
 
     def __post_init__(self) -> None:
-        """Refuse what no clock can follow: the numbers may be a file's."""
         for key, value in vars(self).items():
             for number in value if key == "phases" else (value,):
                 if not (isinstance(number, int | float) and math.isfinite(number)):
@@ -127,7 +126,6 @@ class GaitRanges:
     search: Mapping[str, float | str] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse names that no gait has, and bounds that do not fit."""
         known = {field.name for field in fields(Gait)} - {"phases"}
         for name in {*self.low, *self.high}:
             if name not in known or name not in self.low or name not in self.high:

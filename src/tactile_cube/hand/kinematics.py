@@ -1,7 +1,5 @@
 """Where fingertips are, and joint angles with which they stand around an object."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

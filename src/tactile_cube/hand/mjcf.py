@@ -1,7 +1,5 @@
 """An MJCF file, read by MuJoCo, as a URDF and the constants of the drives that it states."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from html import escape
@@ -140,7 +138,6 @@ class _Reader:
         return str(getattr(self.mujoco, kind)(int(number)).name).partition("_")[2]
 
     def _mimics(self) -> Iterator[tuple[int, str]]:
-        """Joints that an equality ties to another one, and their <mimic>."""
         m = self.model
         for k in range(m.neq):
             name, (a0, a1, *more) = m.eq(k).name or f"equality {k}", m.eq_data[k][:5]

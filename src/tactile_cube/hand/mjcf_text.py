@@ -1,7 +1,5 @@
 """MJCF text that names nothing outside of its folder and says only what a mechanism and its drives need."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path

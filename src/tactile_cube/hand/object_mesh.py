@@ -55,15 +55,12 @@ class ObjectMesh:
     file: str = ""
 
     def __str__(self) -> str:
-        """What it is called: equal for equal meshes."""
         return f"mesh {hashlib.sha256(self.vertices.tobytes()).hexdigest()[:12]}"
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is a mesh with the same corners."""
         return isinstance(other, ObjectMesh) and (self is other or np.array_equal(self.vertices, other.vertices))
 
     def __hash__(self) -> int:
-        """Of the corners."""
         return hash(self.vertices.tobytes())
 
     def arrays(self) -> dict[str, NDArray[Any]]:

@@ -1,7 +1,5 @@
 """Writing URDF text: elements that every mechanism has, shapes, and other masses for the links of one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal

@@ -1,7 +1,5 @@
 """One finger of any URDF, cut out as a chain whose links have their joint's axis along z."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A hand of one's own: any number of fingers with equally many joints, from its URDF and a short description."""
 
-from __future__ import annotations
-
 import hashlib
 import warnings
 from collections.abc import Mapping, Sequence

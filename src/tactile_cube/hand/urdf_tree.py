@@ -3,8 +3,6 @@
 Fixed and locked joints disappear: what hangs on them is merged into the link before them.
 """
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
@@ -230,7 +228,6 @@ def require_mesh(file: Path, where: str) -> None:
 
 
 def _require_parts(file: Path) -> list[Path]:
-    """Files that an OBJ file or a material names, all below its folder."""
     lines = PARTS.findall(file.read_text(encoding="utf-8", errors="replace"))
     return [below(file.parent, word, str(file)) for line in lines for word in line.split()]
 

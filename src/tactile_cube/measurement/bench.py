@@ -9,16 +9,14 @@ Source: Sievers, Pitz, Bauml (ICRA 2022), section II-D.
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.excitation import safe_range
 from tactile_cube.measurement.recordings.description import KnownForce, Touch, TrialEntry
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 
-Array = NDArray[np.float64]
 FORCE = 2.0  # [N] the largest, on the last link
 WEIGHTS = 4  # of which the first is none
 SIDE = 0.1  # [rad] from either side of which a weighed posture is approached, so that friction cancels
@@ -133,7 +131,6 @@ def _clamped(rig: Recording, number: int, rng: np.random.Generator) -> list[Benc
 
 
 def _touch(rig: Recording, number: int, rng: np.random.Generator) -> list[BenchTrial]:
-    """Every joint in turn is moved against an obstacle and pressed there a little."""
     trials = []
     for index, joint in enumerate(rig.joints):
         posture = _posture(rig, rng)

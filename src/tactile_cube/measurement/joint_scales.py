@@ -1,7 +1,5 @@
 """The sizes of a recording's joints: what every bound, usual size and start of a number follows from."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

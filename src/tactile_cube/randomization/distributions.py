@@ -4,8 +4,6 @@ A distribution is known by its quantile function, so one uniform number drawn an
 transform) becomes one draw.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -51,7 +49,6 @@ class Uniform:
     high: float
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
         if not self.low <= self.high:
             raise InputError(f"Uniform: low {self.low} is above high {self.high}; give low <= high")
 
@@ -68,7 +65,6 @@ class UniformPerJoint:
     high: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
         if len(self.low) != len(self.high) or not np.all(np.asarray(self.low) <= np.asarray(self.high)):
             raise InputError(f"UniformPerJoint: low {self.low} and high {self.high}; give low <= high for each joint")
 
@@ -85,7 +81,6 @@ class Choice:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Refuses an empty choice."""
         if not len(self.values):
             raise InputError("Choice: values is empty; give at least one number")
 
@@ -103,7 +98,6 @@ class LogUniform:
     high: float
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
         if not 0.0 < self.low <= self.high:
             raise InputError(f"LogUniform: needs 0 < low <= high, got low {self.low}, high {self.high}")
 

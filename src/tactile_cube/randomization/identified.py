@@ -1,24 +1,27 @@
 """What a model file says about the drive, as nominal constants, ranges and effects of the training world."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect, Stage, resolve
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.randomization.distributions import Constant, Distribution, EffectRange, Uniform, UniformPerJoint
+from tactile_cube.randomization.distributions import (
+    Array,
+    Constant,
+    Distribution,
+    EffectRange,
+    Uniform,
+    UniformPerJoint,
+)
 from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.simulation.contact_effects import contact_catalogue
 
-Array = NDArray[np.float64]
 UNSEEN = 1e-4  # [rad] span of the offsets below which they were not observed: an axis along gravity shows none
 PER_JOINT = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "friction_creep")
 

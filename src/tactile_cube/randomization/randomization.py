@@ -1,7 +1,5 @@
 """What differs from episode to episode: physical constants, the start, and the disturbances of sensing and acting."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.randomization.distributions import Constant, Distribution, EffectRange, sample
+from tactile_cube.randomization.distributions import Array, Constant, Distribution, EffectRange, sample
 from tactile_cube.simulation import EpisodeConstants
 
-Array = NDArray[np.float64]
 PARTS = 8
 """Equally likely parts of the range of each constant."""
 RATE = 0.05
@@ -98,7 +95,6 @@ class Randomization:
     steered: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
         for group in ("values", "factors", "shifts"):
             for key, drawn in getattr(self, group).items():
                 if key not in FIELDS:

@@ -4,26 +4,21 @@ One multibody per finger: the solver couples the rows of everything that hangs o
 several times faster than one hand.
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pybullet
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, ObjectShape, straight_half, unit_inertia
-from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import OBJECT_STATE, SimulationOptions
-
-Array = NDArray[np.float64]
 
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
 TILTED = 0.05
@@ -87,7 +82,6 @@ class BulletEngine:
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Builds the fingers; cube and table come with each episode."""
         self._hand, self._drive = hand, drive
         self.client = connect(options)
         half = (0.5 * _TABLE_SIZE).tolist()
@@ -290,7 +284,6 @@ class BulletEngine:
         return self._cube_shape
 
     def _set_spin_inertia(self) -> None:
-        """Adds inertia about the joint axis to each link, for numerical stability."""
         for body, inertias, spins in zip(self.fingers, self._inertias, self._drive.view("spin_inertia"), strict=True):
             for link, (diagonal, spin) in enumerate(zip(inertias, spins, strict=True)):
                 spinning = list(diagonal)
@@ -337,7 +330,6 @@ def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
 
 
 def _geometry(kind: NamedShape, size: Array) -> dict[str, Any]:
-    """Bullet's words for an object of a kind with a bounding box (3,) [m]."""
     half = 0.5 * size
     if kind == "box":
         return {"shapeType": pybullet.GEOM_BOX, "halfExtents": half.tolist()}

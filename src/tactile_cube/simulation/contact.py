@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from tactile_cube.simulation.constants import EpisodeConstants
-
-Array = NDArray[np.float64]
+from tactile_cube.simulation.constants import Array, EpisodeConstants
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,17 @@
 """The drivetrain of all fingers in the world: constants of an episode into the memory of the compiled control step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant, check_damping_stability
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.hand import Hand
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import with_inertias
-from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.engine import SimulationOptions
-
-Array = NDArray[np.float64]
 
 
 class HandDrive:
@@ -28,7 +23,6 @@ class HandDrive:
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, effects: Sequence[Effect]) -> None:
-        """Compiles the control step, or finds it in the cache."""
         self._hand, self._engine = hand, options.single_engine
         self._effects = list(effects)
         self._urdfs = [hand.finger_urdf(k) for k in range(len(hand.fingers))]

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tactile_cube.errors import InputError
-from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 
 EngineName = Literal["bullet", "mujoco", "mixed"]
@@ -40,7 +37,6 @@ class SimulationOptions:
     trace: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse values that no world can run with."""
         if self.engine not in ENGINES:
             raise InputError(f"simulation.engine is {self.engine!r}; choose one of {', '.join(ENGINES)}")
         if not 0.0 < self.dt <= 0.01:
@@ -76,8 +72,6 @@ class SimulationOptions:
         """For final numbers: 0.5 ms and 150 iterations, close to convergence, at a tenth of the speed."""
         return cls(engine, dt=5e-4, substeps=200, solver_iterations=150)
 
-
-Array = NDArray[np.float64]
 
 OBJECT_STATE = 13
 """Position (3), quaternion xyzw (4), linear and angular velocity (3 + 3) of the object."""

@@ -3,8 +3,6 @@
 In ordinary episodes joints stay below 3 rad/s, contact forces below 12 N and overlaps below 1 mm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import inf, isfinite
 

@@ -1,27 +1,21 @@
 """Hand and cube in MuJoCo."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand import Hand
-from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact, named_contact
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import OBJECT_STATE, SimulationOptions
 from tactile_cube.simulation.mujoco_model import HandSpec
-
-Array = NDArray[np.float64]
 
 
 class MujocoEngine:
     """See `Engine`. Newton's method on soft contacts; rotors are native, tendons are equality constraints."""
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Describes the bodies; the model comes with each episode."""
         self._spec = HandSpec(hand, options, drive)
         self._hand = hand
         self._dofs = hand.links_per_finger * len(hand.fingers)

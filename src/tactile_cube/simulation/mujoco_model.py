@@ -1,24 +1,19 @@
 """The bodies in MuJoCo: four fingers on their bases, a cube and perhaps a table, compiled anew for each episode."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, straight_half, unit_inertia
 from tactile_cube.hand.urdf import CollisionShape
-from tactile_cube.simulation.constants import EpisodeConstants
+from tactile_cube.simulation.constants import Array, EpisodeConstants
 from tactile_cube.simulation.contact import SKIN_RELAXATION, Surface, surfaces
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import SimulationOptions
-
-Array = NDArray[np.float64]
 
 TABLE_HALF_SIZE = (0.25, 0.25, 0.02)
 """[m]."""
@@ -36,7 +31,6 @@ class HandSpec:
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Describes the fingers; their masses are the drive's."""
         self._hand, self._drive = hand, drive
         self.spec = mujoco.MjSpec()
         self.spec.compiler.degree = False
@@ -75,7 +69,6 @@ class HandSpec:
         return model
 
     def _add_finger(self, k: int) -> list[tuple[Any, Any]]:
-        """Links and joints of a finger, as bodies below its base."""
         view, finger = self._drive.view, self._hand.fingers[k]
         position, rotation = self._hand.base_in_world(k)
         parent = self.spec.worldbody.add_body(name=f"{finger.name} base", pos=position, quat=_wxyz(rotation))
@@ -160,7 +153,6 @@ class HandSpec:
         self._table.pos = [0.0, 0.0, height - TABLE_HALF_SIZE[2]]
 
     def _set_mesh(self, mesh: ObjectMesh, size: Array) -> None:
-        """Gives the object the shape of a mesh."""
         if self._mesh is None:
             self._mesh = self.spec.add_mesh(name="object")
         self._mesh.uservert = (mesh.vertices * size).ravel().tolist()
@@ -170,7 +162,6 @@ class HandSpec:
 
 
 def _geometry(kind: NamedShape, half: Array) -> tuple[Any, Array]:
-    """MuJoCo's type and size of an object with half edges (3,) [m]."""
     kinds = mujoco.mjtGeom
     if kind == "box":
         return kinds.mjGEOM_BOX, half

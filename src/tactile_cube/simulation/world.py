@@ -1,23 +1,19 @@
 """The world in which the hand turns the cube: 500 Hz physics under a 10 Hz policy."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, POSITION, TORQUE, VELOCITY
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
-from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.contact import Contact
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import OBJECT_STATE, Engine, SimulationOptions
 from tactile_cube.simulation.health import find_fault
 
-Array = NDArray[np.float64]
 _JOINT_SIGNALS = {"q": POSITION, "dq": VELOCITY, "q_m": MOTOR_POSITION, "q_d": COMMAND, "torque": TORQUE}
 
 
@@ -208,7 +204,6 @@ class World:
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
     def _run(self) -> None:
-        """The physics steps of one policy step, with a trace where wanted."""
         filtered = self._drive.view("filtered").copy()
         states = self._engine.run(self.options.substeps, self._wrench(), self.options.trace)
         if states is not None:
@@ -236,14 +231,12 @@ class World:
         return trace
 
     def _wrench(self) -> Array | None:
-        """Everything that pushes the cube in this policy step, or None."""
         random = random_wrench(self.constants, self.time)
         if random is None:
             return self._push if self._push.any() else None
         return random + self._push
 
     def _tip_jacobian(self, finger: int) -> Array:
-        """Velocity of a fingertip's centre per velocity of its finger's joints (3, n), by central differences."""
         columns, q, width = [], self.q, 1e-6
         for joint in range(q.size)[self.hand.of_finger(finger)]:
             delta = np.where(np.arange(q.size) == joint, width, 0.0)
@@ -277,6 +270,5 @@ def random_wrench(constants: EpisodeConstants, time: float) -> Array | None:
 
 
 def _direction(rng: np.random.Generator) -> Array:
-    """A unit vector, uniform on the sphere (3,)."""
     vector = rng.normal(size=3)
     return np.asarray(vector / np.linalg.norm(vector))

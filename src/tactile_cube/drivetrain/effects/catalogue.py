@@ -1,7 +1,5 @@
 """Which effects exist, and how a user names them: `stribeck_friction@q3`, `my_rig.CableDrag@q2`, `cogging`."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -114,11 +112,6 @@ def import_own_effects(names: Iterable[str]) -> None:
 
 
 def _try_laws(effect: EffectClass, path: str) -> None:
-    """Ask each law of a user's class once, as Python and compiled; with neutral values it changes nothing.
-
-    Raises:
-        InputError: it fails, or changes its signal.
-    """
     from tactile_cube.compiled import compiled  # Numba takes half a second; most commands have no such class
 
     x = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS, 3))

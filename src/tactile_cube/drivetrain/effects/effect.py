@@ -268,6 +268,6 @@ class Effect:
             p: (..., parameters) with the same leading dimensions.
         """
 
-    def __repr__(self) -> str:  # noqa: D105
+    def __repr__(self) -> str:
         values = ", ".join(f"{key}={value:g}" for key, value in self.values.items())
         return f"{type(self).__name__}('{self.joint}', {values})"

@@ -1,7 +1,5 @@
 """Sizes of a joint, from which bounds, typical values and starts of an effect's parameters follow."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from math import inf

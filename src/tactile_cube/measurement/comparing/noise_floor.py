@@ -1,7 +1,5 @@
 """The error that no model can undercut: the scatter of repeats, or the sensor's noise where nothing was repeated."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -10,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 
-Array = NDArray[np.float64]
 LONGEST_LAG = 0.3  # [s] two starts of one command are not further apart
 SAME = 0.02  # share of a command's spread by which a repeat may differ
 LEFT_START = 0.1  # [rad] of motion after which a joint no longer knows where friction held it at the start

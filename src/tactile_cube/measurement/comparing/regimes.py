@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.units import milli, short
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 SPEEDS = {"standstill": 0.02, "low speed": 0.3, "medium speed": 1.5, "high speed": np.inf}  # [rad/s] upper ends
 MOVING = 0.02  # [rad/s]
@@ -151,7 +150,6 @@ def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor, u
 
 
 def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime]:
-    """The worst regime of each dimension, the worst first."""
     chosen: dict[str, Regime] = {}
     for row in sorted(rows, key=lambda row: -row.error):
         if row.dimension in dimensions:

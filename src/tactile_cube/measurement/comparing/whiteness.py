@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal, stats
 
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 
-Array = NDArray[np.float64]
 LAGS = 20
 LONGEST_DELAY = 0.1  # [s] between a cause and its trace in the residual
 
@@ -118,7 +116,6 @@ def _autocorrelation(values: Array) -> Array:
 
 
 def _filled(values: Array) -> Array:
-    """Bridge the samples that count in no error."""
     good = np.isfinite(values)
     if good.all():
         return values

@@ -1,7 +1,5 @@
 """A recording out of arrays, for programs that have measured signals in memory."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -143,7 +141,6 @@ def _table(trial: TrialArrays, number: int, joints: int, rate: float) -> TrialTa
 
 
 def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[np.float64]:
-    """The signal as (n, joints); a flat array will do for one joint."""
     try:
         signal = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -1,7 +1,5 @@
 """The columns of a trial's table, found, complete and free of holes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -89,7 +89,6 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
 
 
 def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
-    """One trial, checked and on the uniform grid of the recording's rate."""
     joints, rate = tuple(description.joints), description.rate_hz
     gains = gains_of(description, entry, key)
     columns, warnings = pick_columns(read_table(path, most), joints, path)

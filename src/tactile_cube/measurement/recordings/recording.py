@@ -14,10 +14,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body
 from tactile_cube.measurement.recordings.description import Coupling, Description
 from tactile_cube.measurement.recordings.rig import Rig
-from tactile_cube.measurement.recordings.trial import Gains, Trial
+from tactile_cube.measurement.recordings.trial import Array, Gains, Trial
 from tactile_cube.measurement.units import SLIDES, TURNS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

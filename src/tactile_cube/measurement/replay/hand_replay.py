@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.model_file import ModelFile
@@ -14,14 +13,13 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Load, Trial
+from tactile_cube.measurement.recordings.trial import Array, Load, Trial
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 from tactile_cube.simulation.contact_effects import contact_catalogue
 from tactile_cube.simulation.engine import EngineName
 
-Array = NDArray[np.float64]
 NO_FILTER = 1e-6  # [s] a recording's commands are what reaches the controller, already filtered
 RIGID = 1e6  # [N m/rad] of a drive without a stated elasticity
 LEAST_INERTIA = 5e-4  # [kg m^2] below which the torque loop is unstable; the world's own value is taken instead
@@ -126,7 +124,6 @@ class HandReplay:
         return Simulated(position[:, self._back], torque[:, self._back])
 
     def _constants(self) -> EpisodeConstants:
-        """What is known of the drivetrain, as the world names it."""
         own = {key: value[self._order] for key, value in self._model.constants.items()}
         inertia, default = own["reflected_inertia"], EpisodeConstants().reflected_inertia
         gravity = self.hand.rotation @ self.recording.gravity

@@ -1,7 +1,5 @@
 """Integrals of a controller where a window begins: they have grown by errors that are logged, whatever a model says."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

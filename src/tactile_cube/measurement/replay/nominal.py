@@ -61,7 +61,6 @@ def draw_model(
 
 
 def _effects(recording: Recording, known: ModelFile | None) -> list[EffectEstimate]:
-    """What is known of effects, or stated of them and may be wrong by `STATED`."""
     if known is not None:
         return known.drive_effects
     return _unknown_masses(recording) + [

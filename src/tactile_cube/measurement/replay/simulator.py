@@ -1,7 +1,5 @@
 """A recorded rig in simulation: many models at once, in segments started anew or freely, on all cores."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -21,14 +19,13 @@ from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSI
 from tactile_cube.measurement.comparing.noise_floor import LEAST, sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.integrals import integrating_joints, wind_up
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
-Array = NDArray[np.float64]
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
 MECHANICS = (
     "ratio",
@@ -236,7 +233,6 @@ class Simulator:
             _zero_links(out[0], windows, joints)
 
     def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
-        """Positions (S, K segment, M) as old as the log reads them, within each segment."""
         delay = model.constants.get("reading_delay", np.zeros(1))
         if not delay.any():
             return position

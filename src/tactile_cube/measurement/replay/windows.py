@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.nominal import TORQUE_MODE_GAIN
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 SEGMENT = (
     0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
@@ -115,7 +114,6 @@ class Windows:
         return int(self.position.shape[1])
 
     def __len__(self) -> int:
-        """S."""
         return len(self.commands)
 
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
@@ -414,7 +412,6 @@ def _unsteady(starts: Rows, kinks: Rows, rows: int) -> NDArray[np.bool_]:
 
 
 def _terms(half: int) -> int:
-    """Coefficients of the polynomial through so many rows on either side."""
     return 5 if 2 * half >= MANY else 3
 
 
