@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tactile_cube.drivetrain.control_law import impedance_torque, limit_rate, limit_torque, low_pass
+from tactile_cube.drivetrain.laws import impedance_torque, limit_rate, limit_torque, low_pass
 
 
 @pytest.mark.parametrize("dt", [0.002, 0.05])

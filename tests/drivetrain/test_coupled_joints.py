@@ -1,6 +1,6 @@
 import numpy as np
 
-from tactile_cube.drivetrain.coupled_joints import (
+from tactile_cube.drivetrain.laws import (
     add_tendons,
     estimate_contact,
     link_torques,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tactile_cube.drivetrain.dry_friction import solve_speeds
+from tactile_cube.drivetrain.laws import solve_speeds
 
 
 def solve(M, b, limit, grip, v):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.excitation import KINDS, excitation, safe_range
+from tactile_cube.measurement.bench import KINDS, excitation, safe_range
 from tactile_cube.measurement.recordings.rig import RigJoint
 
 

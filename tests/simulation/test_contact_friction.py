@@ -8,7 +8,7 @@ import pytest
 
 from tactile_cube.hand import DLR_HAND2, grasp_angles
 from tactile_cube.simulation import Contact, EpisodeConstants, SimulationOptions, Start, World
-from tactile_cube.simulation.contact import Surface
+from tactile_cube.simulation.engine import Surface
 
 ALL, OPPOSING = (0, 1, 2, 3), (0, 2)
 SETTLED, WEIGHT = 15, 0.05 * 9.81

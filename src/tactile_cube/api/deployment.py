@@ -84,7 +84,7 @@ def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSet
         return TrainingSetting.of(hand)
     object_: Any = OmegaConf.to_container(config.object, resolve=True) if config.get("object") else None
     setting = training_setting(network.info, hand, object_, network.label)
-    if hand is None and setting.hand.drive and not _simulated(config):
+    if hand is None and setting.hand.drive and config.get("robot", {}).get("_target_") != SIMULATED:
         name = setting.hand.name
         raise InputError(
             f"{network.label}: what the drives of hand '{name}' bear, and so the limits of every command, would come "
@@ -93,8 +93,7 @@ def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSet
     return setting
 
 
-def _simulated(config: Any) -> bool:
-    return str(config.get("robot", {}).get("_target_")) == f"{SimulatedHand.__module__}.{SimulatedHand.__qualname__}"
+SIMULATED = f"{SimulatedHand.__module__}.{SimulatedHand.__qualname__}"
 
 
 @dataclass(frozen=True)
@@ -194,7 +193,7 @@ def _run_all(job: Job, say: Say, folder: Path) -> DeploymentResult:
     config, network = job.config, load_policy(job.config.policy)
     setting = _setting(config, network, config.motion == "policy")
     limits = robot_limits(setting, config.rate_limit)
-    target, simulated = str(config.robot._target_), _simulated(config)
+    target, simulated = str(config.robot._target_), config.robot._target_ == SIMULATED
     own = {"setting": setting} if simulated else {"hand": setting.hand} if target.startswith("tactile_cube.") else {}
     runs, logs, turned = [], [], []
     for number in range(config.runs):

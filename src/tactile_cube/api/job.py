@@ -135,7 +135,8 @@ def _in_words(value: Any) -> str:
         return "null" if value is None else str(value).lower()
     if isinstance(value, numbers.Real):
         return str(value)
-    text = _name(value)
+    model = hasattr(value, "rig") and not hasattr(value, "folder")
+    text = f"model of {value.rig}" if model else str(getattr(value, "folder", value))
     if re.fullmatch(r"[A-Za-z_/][\w./@-]*", text) and text.lower() not in ("null", "true", "false", "nan", "inf"):
         return text
     from hydra.core.override_parser.types import Quote, QuotedString
@@ -151,12 +152,6 @@ def _refuse_setting(command: str, key: str, value: Any, known: Container[str]) -
             f"{command}: {key}={value!r} is a setting where the value of {key} is due; give settings as "
             f"keywords, e.g. seed=1; a file of that name is pathlib.Path({value!r})"
         )
-
-
-def _name(thing: Any) -> str:
-    if hasattr(thing, "rig") and not hasattr(thing, "folder"):
-        return f"model of {thing.rig}"
-    return str(getattr(thing, "folder", thing))
 
 
 def _job(config: DictConfig, hydra: Any, command: str, words: Sequence[str], folder: PathLike) -> Job:

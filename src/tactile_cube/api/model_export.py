@@ -1,9 +1,8 @@
 """Write an identified model for another simulator, from a program."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
@@ -21,8 +20,7 @@ Format = Literal["mjcf", "urdf", "bam"]
 ENDINGS = {"mjcf": "xml", "urdf": "urdf", "bam": "json"}
 
 
-@dataclass(frozen=True)
-class ModelExport:
+class ModelExport(NamedTuple):
     """A file for another simulator, and what its format cannot hold of the model, a line each."""
 
     output: Path
@@ -31,8 +29,8 @@ class ModelExport:
     @property
     def text(self) -> str:
         """What was written, and what is missing in it."""
-        left = [f"  {line}" for line in self.not_held]
-        return "\n".join([str(self.output), *(["the format cannot hold:", *left] if left else [])])
+        left = ["the format cannot hold:", *(f"  {line}" for line in self.not_held)] if self.not_held else []
+        return "\n".join([str(self.output), *left])
 
 
 @as_input_errors

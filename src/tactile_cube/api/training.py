@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
@@ -138,8 +138,7 @@ def train(
     return run_training(called_job("train", locals()))
 
 
-@dataclass(frozen=True)
-class AveragedPolicy:
+class AveragedPolicy(NamedTuple):
     """A policy whose weights are the mean of several, and after how many steps each of these was kept."""
 
     policy: Path
@@ -173,10 +172,8 @@ def run_averaging(job: Job) -> AveragedPolicy:
 def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
     """Train what a job says, in one run or in stages, and say how it went.
 
-    Args:
-        job: what to train.
-        stage: what lines of progress begin with where the run is a stage of several.
-        later: environment steps that the stages after it usually take.
+    Of a stage of several, `stage` is what lines of progress begin with, and the stages after it usually take `later`
+    environment steps.
     """
     plain = plain_settings(job)
     before = Finished.of(job.folder, plain)
@@ -276,8 +273,7 @@ def judged(job: Job, last: Path) -> str:
 
 
 def _key(word: str) -> str:
-    found = KEY.match(word)
-    return found[1] if found else word
+    return found[1] if (found := KEY.match(word)) else word
 
 
 def _own_grasps(job: Job, file: Path) -> str | None:

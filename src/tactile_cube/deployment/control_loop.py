@@ -14,7 +14,7 @@ from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, req
 from tactile_cube.deployment.robot import Array, Reading
 from tactile_cube.deployment.stop import Stop
 from tactile_cube.deployment.training_setting import TrainingSetting
-from tactile_cube.drivetrain.control_law import low_pass
+from tactile_cube.drivetrain.laws import low_pass
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.kinematics import grasp_angles
@@ -169,7 +169,11 @@ class ControlLoop:
             now: time of this tick on a monotonic clock [s].
             reading: what has been measured since the tick before; None: nothing.
         """
-        dt = self._clock(now)
+        dt = now - self.time if now > self.time and isfinite(now) else 0.0
+        if dt == 0.0:
+            self.stop(f"the clock went from {self.time:g} s to {now:g} s")
+        else:
+            self.time = now
         doubt = "" if reading is None else self._guard.accept(now, reading)
         if doubt:
             self.doubted, self.doubt = self.doubted + 1, doubt
@@ -205,14 +209,6 @@ class ControlLoop:
             self.mode, self.reason = Mode.STOPPED, reason + doubts
             self._stopping = Stop(self._guard)
         return self._stopping
-
-    def _clock(self, now: float) -> float:
-        """Time since the tick before [s]; a clock that does not go forward stops the loop."""
-        if not (now > self.time and isfinite(now)):
-            self.stop(f"the clock went from {self.time:g} s to {now:g} s")
-            return 0.0
-        dt, self.time = now - self.time, now
-        return dt
 
     def _go_on(self, now: float, dt: float, q_m: Array) -> None:
         if self.mode in (Mode.HOMING, Mode.CLOSING):

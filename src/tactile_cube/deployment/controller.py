@@ -11,7 +11,7 @@ from tactile_cube.agent.policy_file import read_policy
 from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.measurement.excitation import excitation
+from tactile_cube.measurement.bench import excitation
 
 Weights = NDArray[np.float32]
 Array = NDArray[np.float64]

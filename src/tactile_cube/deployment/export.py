@@ -167,9 +167,6 @@ def _alike(values: Any) -> float | list[float]:
     return numbers[0] if len(set(numbers)) == 1 else numbers
 
 
-Contract = dict[str, Any]
-
-
 def export_policy(network: Network, path: Path, setting: TrainingSetting | None = None) -> Path:
     """Write the network, `.npz` or `.onnx`, and `<path>.contract.json` beside it; return the contract's path.
 
@@ -189,7 +186,7 @@ def export_policy(network: Network, path: Path, setting: TrainingSetting | None 
     return beside
 
 
-def _write_npz(network: Network, contract: Contract, path: Path) -> None:
+def _write_npz(network: Network, contract: dict[str, Any], path: Path) -> None:
     """Write `weight<k>` (out, in) and `bias<k>` (out,), ReLU between layers, tanh after the last, and `contract`."""
     arrays: dict[str, Any] = {"contract": np.array(json.dumps(contract))}
     for index, (weight, bias) in enumerate(network.deterministic_layers()):
@@ -197,7 +194,7 @@ def _write_npz(network: Network, contract: Contract, path: Path) -> None:
     write_npz(path, arrays, compressed=False)
 
 
-def _write_onnx(network: Network, contract: Contract, path: Path) -> None:
+def _write_onnx(network: Network, contract: dict[str, Any], path: Path) -> None:
     """Write a graph "observation" (batch, 120) -> "action" (batch, 12), the contract in its metadata."""
     try:
         import onnx

@@ -138,13 +138,11 @@ def write_runs(
         trials=[TrialEntry(file="none")],
         source="log of the control loop",
     )
-    tables = [_table(number, run) for number, run in enumerate(runs)]
+    tables = []
+    for number, run in enumerate(runs):  # their signals stay on the disk
+        entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
+        measured = not np.isnan(run["torque"].min())  # a copy of them all would not fit into the memory
+        signals = (run["time"], run["command"], run["position"], run["torque"] if measured else None)
+        tables.append(TrialTable(entry, *signals))
     write_recording(folder, RecordingTables(description, hand.urdf(), tables))
     return folder
-
-
-def _table(number: int, run: Rows) -> TrialTable:
-    """A run as a trial of kind `policy`; its signals stay on the disk."""
-    entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
-    measured = not np.isnan(run["torque"].min())  # a copy of them all would not fit into the memory
-    return TrialTable(entry, run["time"], run["command"], run["position"], run["torque"] if measured else None)

@@ -75,7 +75,8 @@ class SimulatedHand:
                 self._q_d = np.array(self._world.q_m)
             self._world.step(self._q_d)
             self._ticks += 1
-            self._follow_object()
+            seen = seen_along(self._frame, self._world.cube_quaternion.tolist())
+            self._theta.append(cube_pose(self._world.cube_position.tolist(), seen, self._theta[-1]).theta)
         return self._ticks / self._rate
 
     def read(self) -> Reading | None:
@@ -106,7 +107,3 @@ class SimulatedHand:
     def close(self) -> None:
         """End the physics server."""
         self._world.close()
-
-    def _follow_object(self) -> None:
-        seen = seen_along(self._frame, self._world.cube_quaternion.tolist())
-        self._theta.append(cube_pose(self._world.cube_position.tolist(), seen, self._theta[-1]).theta)

@@ -117,7 +117,12 @@ def let_go(stop: Stop, robot: Robot, alive: Callable[[], None]) -> None:
         alive()
         began = stop.clock()
         try:
-            _give(stop, robot, now)
+            command = stop.command()
+            if command is not None:
+                robot.send(command)
+                stop.sent()
+            elif stop.phase is Phase.LOOKING:
+                stop.look(now, robot.read())
         except BaseException as error:  # the next message may get through
             lost = error
         try:
@@ -129,12 +134,3 @@ def let_go(stop: Stop, robot: Robot, alive: Callable[[], None]) -> None:
         raise StopError(stop.failure) from lost or broken
     if broken:
         raise broken
-
-
-def _give(stop: Stop, robot: Robot, now: float) -> None:
-    command = stop.command()
-    if command is not None:
-        robot.send(command)
-        stop.sent()
-    elif stop.phase is Phase.LOOKING:
-        stop.look(now, robot.read())

@@ -70,7 +70,10 @@ def _finger(
         mass=np.array([mass for _, mass, _ in LINKS.values()]),
         com=np.array([[0.0, 0.0, along] for _, _, along in LINKS.values()]),
         inertia=np.array([_moments(link) for link in LINKS]),
-        shapes=tuple((_capsule(*_CAPSULES[link]),) if link in _CAPSULES else () for link in LINKS),
+        shapes=tuple(
+            tuple(CollisionShape("capsule", (r, b - a), np.array([0.0, 0.0, 0.5 * (a + b)])) for r, a, b in capsule)
+            for capsule in ([_CAPSULES[link]] if link in _CAPSULES else [] for link in LINKS)
+        ),
         chain=PlanarChain((proximal, middle, _CAPSULES["distal"][2])),
         prefix=f"{name}_",
     )
@@ -84,10 +87,6 @@ def _moments(link: str) -> tuple[float, float, float]:
     return across, across, 0.5 * mass * radius**2
 
 
-def _capsule(radius: float, start: float, end: float) -> CollisionShape:
-    return CollisionShape("capsule", (radius, end - start), np.array([0.0, 0.0, 0.5 * (start + end)]))
-
-
 _LIKE_RING = (-1.63850239, -0.74407776, -1.79289304)
 _LIKE_MIDDLE = (-1.90822554, 0.04794712, -2.36863463)
 _FINGERS = (
@@ -98,12 +97,11 @@ _FINGERS = (
 )
 
 
-def _palm() -> CollisionShape:
-    """A slab under the finger bases, for pictures only: nothing ever reaches it."""
-    bases = np.array([finger.position for finger in _FINGERS])
-    low, high = bases.min(axis=0), bases.max(axis=0)
-    size = (high[0] - low[0], high[1] - low[1] + 0.03, 0.10)
-    return CollisionShape("box", size, np.array([*(0.5 * (low + high))[:2], low[2] - 0.05]))
+_BASES = np.array([finger.position for finger in _FINGERS])
+_LOW, _HIGH = _BASES.min(axis=0), _BASES.max(axis=0)
+_SLAB = (_HIGH[0] - _LOW[0], _HIGH[1] - _LOW[1] + 0.03, 0.10)
+_PALM = CollisionShape("box", _SLAB, np.array([*(0.5 * (_LOW + _HIGH))[:2], _LOW[2] - 0.05]))
+"""A slab under the finger bases, for pictures only: nothing ever reaches it."""
 
 
 def _every_finger(*degrees: float) -> Array:
@@ -125,7 +123,7 @@ DLR_HAND2 = Hand(
     position=np.array([-0.0576, 0.0136, 0.2559]),
     rotation=Rotation.from_euler("ZYX", [191.98, 17.82, 184.69], degrees=True).as_matrix(),
     start_angles=np.radians([14.4, -1.6, 28.0, -3.9, 16.7, 7.1, -16.0, 21.1, 25.9, 9.9, 7.8, 14.2]),
-    palm=(_palm(),),
+    palm=(_PALM,),
 )
 """The hand of the paper, palm down over a cube at the origin."""
 

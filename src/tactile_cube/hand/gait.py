@@ -78,10 +78,7 @@ class Gait:
     def tips(self, step: int, direction: int = -1, around: Array = PLACES) -> Array:
         """Return the targets of the fingertips `(fingers, 3)` [m] at a policy step; direction +1 turns about +z.
 
-        Args:
-            step: policy steps since the start.
-            direction: of the turn.
-            around: where the fingers stand, see `places` (fingers,) [rad].
+        `around` (fingers,) [rad] is where the fingers stand, see `places`.
         """
         holding = 1.0 - self.air_share
         cycle = ((step - self.closing) / self.period + np.array(self.phases)) % 1.0
@@ -89,9 +86,7 @@ class Gait:
         on_cube = phase < holding
         forth = 1.0 - 2.0 * phase / holding
         back = -1.0 + 2.0 * (phase - holding) / self.air_share
-        walk = (
-            -direction * self.swing * np.where(on_cube, forth, back) if step >= self.closing else np.zeros(len(around))
-        )
+        walk = -direction * self.swing * np.where(on_cube, forth, back) * (step >= self.closing)
         angle, radius = around - direction * self.shift + walk, np.where(on_cube, self.pressed, self.lifted)
         return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(len(around), self.height)], axis=1)
 

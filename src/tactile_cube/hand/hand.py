@@ -94,12 +94,12 @@ class Hand:
     columns: tuple[int, ...]
     axes: tuple[int, ...]
     tip_radius: float
-    action_lower: Array
-    action_upper: Array
     position: Array
     rotation: Array
-    start_angles: Array
     palm: tuple[CollisionShape, ...]
+    action_lower: Array = field(default_factory=lambda: np.zeros(0))
+    action_upper: Array = field(default_factory=lambda: np.zeros(0))
+    start_angles: Array = field(default_factory=lambda: np.zeros(0))
     drive: Mapping[str, float | Array] = field(default_factory=dict)
     file: str = ""
     sha256: str = ""

@@ -79,7 +79,8 @@ class _Reader:
         if not np.allclose(gravity, USUAL_GRAVITY, atol=0.01):
             self.left_out.append(f"gravity of {number_list(gravity)} m/s^2; state it in source.gravity")
         for joint in range(self.model.njnt):
-            self._joint_constants(joint)
+            if self._kind(joint) in ("HINGE", "SLIDE"):
+                self._joint_constants(joint)
         for actuator in range(self.model.nu):
             self._actuator(actuator)
         limits_of = self.stated.get("torque_limit", {})
@@ -155,8 +156,6 @@ class _Reader:
 
     def _joint_constants(self, joint: int) -> None:
         m, name = self.model, self.joints[joint]
-        if self._kind(joint) not in ("HINGE", "SLIDE"):
-            return
         for theirs, ours in OF_JOINTS.items():
             self.stated.setdefault(ours, {})[name] = float(getattr(m, f"dof_{theirs}")[m.jnt_dofadr[joint]])
         if m.jnt_stiffness[joint]:
@@ -184,10 +183,6 @@ class _Reader:
             self.stated.setdefault("kd", {})[joint] = float(gear**2 * -bias[2])
         elif law != ("FIXED", "NONE"):
             self.left_out.append(f"actuator '{name}': it is neither a motor nor a position actuator")
-        self._details(k, name, gear)
-
-    def _details(self, k: int, name: str, gear: float) -> None:
-        m = self.model
         if self._named("mjtDyn", m.actuator_dyntype[k]) != "NONE":
             self.left_out.append(f"actuator '{name}': its activation dynamics")
         if m.actuator_delay[k]:

@@ -1,7 +1,6 @@
 """MJCF text that names nothing outside of its folder and says only what a mechanism and its drives need."""
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from pathlib import Path
 
 from tactile_cube import limits
@@ -10,18 +9,8 @@ from tactile_cube.hand.urdf_tree import require_mesh
 from tactile_cube.untrusted_file import below, read_text, regular
 
 SECTIONS = ("compiler", "option", "default", "asset", "worldbody", "equality", "actuator")
-ACTUATORS = (
-    "motor",
-    "position",
-    "velocity",
-    "intvelocity",
-    "damper",
-    "general",
-    "dcmotor",
-    "pid",
-    "cylinder",
-    "muscle",
-)
+ACTUATORS = ("motor", "position", "velocity", "intvelocity", "damper", "general", "dcmotor", "pid", "cylinder",
+             "muscle")  # fmt: skip
 PARTS = (*SECTIONS, *ACTUATORS, "mesh", "body", "frame", "joint", "freejoint", "inertial", "geom")
 GENERATED = ("attach", "composite", "flexcomp", "replicate")
 """Elements that MuJoCo turns into bodies, from files or by rules."""
@@ -110,7 +99,7 @@ def _keep_needed_meshes(root: ElementTree.Element, file: Path, folder: Path, com
     for one in root.iter("compiler"):
         for key in ("meshdir", "assetdir", "texturedir", "strippath"):
             one.attrib.pop(key, None)
-    for asset, mesh in list(_meshes(root)):
+    for asset, mesh in [(one, mesh) for one in root.iter("asset") for mesh in one.findall("mesh")]:
         name = mesh.get("file", "")
         if mesh.get("name", Path(name).stem) not in needed:
             asset.remove(mesh)
@@ -119,8 +108,3 @@ def _keep_needed_meshes(root: ElementTree.Element, file: Path, folder: Path, com
             found = below(folder / place, Path(name).name if flat else name, where, folder)
             require_mesh(regular(found, limits.MESH), where)
             mesh.set("file", str(found.resolve()))
-
-
-def _meshes(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, ElementTree.Element]]:
-    for asset in root.iter("asset"):
-        yield from ((asset, mesh) for mesh in asset.findall("mesh"))

@@ -16,8 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand, grasp_angles
-from tactile_cube.randomization.distributions import Array, sample
-from tactile_cube.randomization.randomization import Randomization
+from tactile_cube.randomization.randomization import Array, Randomization, sample
 from tactile_cube.simulation import EpisodeConstants, Start
 from tactile_cube.untrusted_file import read_npz
 from tactile_cube.whole_file import write_npz

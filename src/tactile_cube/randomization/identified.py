@@ -10,15 +10,15 @@ from tactile_cube.drivetrain.effects import Effect, Stage, resolve
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.randomization.distributions import (
+from tactile_cube.randomization.randomization import (
     Array,
     Constant,
     Distribution,
     EffectRange,
+    Randomization,
     Uniform,
     UniformPerJoint,
 )
-from tactile_cube.randomization.randomization import Randomization
 from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.simulation.contact_effects import contact_catalogue
 
@@ -58,6 +58,10 @@ def identified(
     if len(limits) > 1:
         raise InputError(f"model of {model.rig}: torque limits {sorted(limits)} N m differ; the hand has one for all")
     limit = min(limits, default=constants.torque_limit)
+
+    def drawn(estimate: Estimate) -> Distribution:
+        return Uniform(estimate.low, estimate.high) if estimate.high > estimate.low else Constant(estimate.value)
+
     placed = [(one, *place) for one in model.drive_effects for place in resolve([one.effect], joints)]
     changed = dataclasses.replace(
         randomization,
@@ -65,7 +69,7 @@ def identified(
         factors=factors,
         shifts=shifts,
         effects=[
-            EffectRange(effect, joint, {key: _interval(estimate) for key, estimate in one.parameters.items()})
+            EffectRange(effect, joint, {key: drawn(estimate) for key, estimate in one.parameters.items()})
             for one, effect, joint in placed
             if effect.stage is not Stage.MECHANISM
         ],
@@ -108,10 +112,6 @@ def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequen
             index = list(joints).index(joint)
             low[index], value[index], high[index] = estimate.low, estimate.value, estimate.high
     return low, value, high
-
-
-def _interval(estimate: Estimate) -> Distribution:
-    return Uniform(estimate.low, estimate.high) if estimate.high > estimate.low else Constant(estimate.value)
 
 
 def _offsets(model: ModelFile, default: Distribution, joints: Sequence[str]) -> Distribution:

@@ -187,9 +187,9 @@ def constants_of(hand: Hand | None = None, object: Mapping[str, Any] | None = No
         InputError: a value without a physical meaning, a drive or an object that has what no constant names.
     """
     given, hand = _without_mesh(dict(object or {})), hand or DLR_HAND2
+    known = {field.name for field in fields(EpisodeConstants)}
     for key in given.keys() - _OBJECT_KEYS.keys():
         raise InputError(f"object.{key}: no such setting; give {', '.join(_OBJECT_KEYS)}")
-    known = {field.name for field in fields(EpisodeConstants)}
     for key in hand.drive.keys() - known:
         raise InputError(f"hand.drive.{key}: no such constant; choose from {', '.join(sorted(known))}")
     named = {_OBJECT_KEYS[key]: value for key, value in given.items() if value is not None}

@@ -7,6 +7,7 @@ import numpy as np
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant, check_damping_stability
 from tactile_cube.drivetrain.effects import Effect
+from tactile_cube.drivetrain.plant import CONSTANT_KEYS
 from tactile_cube.hand import Hand
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import with_inertias
@@ -54,16 +55,8 @@ class HandDrive:
         Raises:
             InputError: The torque loop would be unstable with these constants and this time step.
         """
-        constants = DrivetrainConstants(
-            kp=c.kp,
-            kd=c.kd,
-            stiffness=c.stiffness,
-            static_friction=c.static_friction,
-            reflected_inertia=c.reflected_inertia,
-            torque_limit=c.torque_limit,
-            rate_limit=c.rate_limit,
-            sign="physical" if c.elasticity_sign > 0 else "printed",
-        )
+        named = {key: getattr(c, key) for key in CONSTANT_KEYS if key != "compliance"} | {"stiffness": c.stiffness}
+        constants = DrivetrainConstants(**named, sign="physical" if c.elasticity_sign > 0 else "printed")
         self._refuse_unstable(constants)
         gravity = self._in_bases(c.gravity * c.down)
         self.memory[:] = self.plant.memory(constants, gravity=gravity, effects=[*self._effects, *c.effects])
@@ -93,12 +86,7 @@ class HandDrive:
         self.view("engine_gravity")[:] = self._in_bases(acceleration)
 
     def sense(self, q: Array, v: Array) -> None:
-        """Computes what the sensors read at rest, without moving anything or changing any state.
-
-        Args:
-            q: All joints (all joints,) [rad].
-            v: All joints (all joints,) [rad/s].
-        """
+        """Computes what the sensors read at rest at q, v (all joints,), without changing any state."""
         trial = self.memory.copy()
         self.plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), trial)
         self.view("signals")[:] = self.plant.view(trial, "signals")

@@ -11,9 +11,8 @@ from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, straight_half, unit_inertia
 from tactile_cube.hand.urdf import CollisionShape
 from tactile_cube.simulation.constants import Array, EpisodeConstants
-from tactile_cube.simulation.contact import SKIN_RELAXATION, Surface, surfaces
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import SimulationOptions
+from tactile_cube.simulation.engine import SKIN_RELAXATION, SimulationOptions, Surface, surfaces
 
 TABLE_HALF_SIZE = (0.25, 0.25, 0.02)
 """[m]."""
@@ -75,10 +74,7 @@ class HandSpec:
         rigid = [2.0 * self.spec.option.timestep, 1.0]
         parts = []
         for i, link in enumerate(finger.links):
-            place = {
-                "pos": view("placement_translation")[k, i],
-                "quat": _wxyz(view("placement_rotation")[k, i]),
-            }
+            place = {"pos": view("placement_translation")[k, i], "quat": _wxyz(view("placement_rotation")[k, i])}
             body = parent.add_body(name=f"{finger.name} {link}", explicitinertial=True, **place)
             joint = body.add_joint(
                 name=f"{finger.name}_q{i + 1}",

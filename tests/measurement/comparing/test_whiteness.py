@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 from statsmodels.stats.diagnostic import acorr_ljungbox
 
-from tactile_cube.measurement.comparing.whiteness import cross_correlations, ljung_box, whiteness
+from tactile_cube.measurement.comparing.regimes import cross_correlations, ljung_box, whiteness
 from tactile_cube.measurement.recordings.reading import read_recording
 from tests.measurement.small_rig import write
 

@@ -19,8 +19,15 @@ from tactile_cube.measurement.comparing.error import (
     with_fitted_offsets,
 )
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
-from tactile_cube.measurement.comparing.regimes import Regime, regimes, where_it_fails
-from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
+from tactile_cube.measurement.comparing.regimes import (
+    CrossCorrelation,
+    Regime,
+    Whiteness,
+    cross_correlations,
+    regimes,
+    where_it_fails,
+    whiteness,
+)
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints

@@ -10,7 +10,14 @@ from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_tree import with_own_files
-from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, pick_columns, without_outliers
+from tactile_cube.measurement.recordings.columns import (
+    MINIMUM_SAMPLES,
+    check_time,
+    on_grid,
+    pick_columns,
+    rows_of,
+    without_outliers,
+)
 from tactile_cube.measurement.recordings.consistency import (
     check_coupling,
     check_inertia,
@@ -30,7 +37,6 @@ from tactile_cube.measurement.recordings.plausibility import (
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.timing import check_time, on_grid, rows_of
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.untrusted_file import below, read_text
 

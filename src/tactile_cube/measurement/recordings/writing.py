@@ -13,11 +13,10 @@ import yaml
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError, warn
-from tactile_cube.measurement.recordings.columns import SIGNALS
+from tactile_cube.measurement.recordings.columns import SIGNALS, rows_of
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.timing import rows_of
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import whole_file, write_npz, write_whole, written_together
 

@@ -15,6 +15,7 @@ from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
+from tactile_cube.drivetrain.plant import TREE_KEYS
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
 from tactile_cube.measurement.comparing.noise_floor import LEAST, sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
@@ -27,17 +28,8 @@ from tactile_cube.measurement.replay.read_out import before_steps, free_way, gap
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
-MECHANICS = (
-    "ratio",
-    "offset",
-    "mass",
-    "placement_translation",
-    "axis",
-    "com",
-    "placement_rotation",
-    "inertia",
-    "gravity",
-)
+DRIVE = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
+MECHANICS = (*TREE_KEYS, "gravity")
 """What the equations of motion of a path depend on, but for rotors."""
 
 
@@ -180,17 +172,9 @@ class Simulator:
 
     def memory(self, model: Model) -> Array:
         """Memory (size,) of the plant with a model's constants and effects."""
-        known = model.constants
-        constants = DrivetrainConstants(
-            kp=known["kp"],
-            kd=known["kd"],
-            stiffness=known["stiffness"],
-            static_friction=known["static_friction"],
-            reflected_inertia=known["reflected_inertia"],
-            torque_limit=known["torque_limit"],
-        )
-        memory: Array = self.plant.memory(constants, gravity=self.recording.gravity)
-        self.plant.view(memory, "friction_creep")[:] = known.get("friction_creep", 0.0)
+        known = {key: model.constants[key] for key in DRIVE}
+        memory: Array = self.plant.memory(DrivetrainConstants(**known), gravity=self.recording.gravity)
+        self.plant.view(memory, "friction_creep")[:] = model.constants.get("friction_creep", 0.0)
         for term in model.terms:
             self.plant.set_effect(memory, term.effect, term.joint, term.values)
         return memory
@@ -233,6 +217,7 @@ class Simulator:
             _zero_links(out[0], windows, joints)
 
     def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
+        """Positions (S, K segment, M) as old as the log reads them."""
         delay = model.constants.get("reading_delay", np.zeros(1))
         if not delay.any():
             return position
@@ -253,26 +238,12 @@ class Simulator:
     ) -> None:
         count, fine = len(windows), windows.substeps
         commands = np.ascontiguousarray(windows.commands[:, windows.history * fine - past :])
+        lengths, segment = np.full(count, signals.shape[1]), windows.segment * fine
+        starts = (windows.position, windows.speed, windows.initial_state, np.tile(correction, (count, 1)))
+        given = (commands, np.arange(count), lengths, past, 1, segment, *starts, memory, paths, rows)
 
         def run(first: int, last: int) -> None:
-            self.plant.kernel.segments_batch(
-                commands,
-                np.arange(count),
-                np.full(count, signals.shape[1]),
-                past,
-                1,
-                windows.segment * fine,
-                windows.position,
-                windows.speed,
-                windows.initial_state,
-                np.tile(correction, (count, 1)),
-                memory,
-                paths,
-                rows,
-                first,
-                last,
-                signals,
-            )
+            self.plant.kernel.segments_batch(*given, first, last, signals)
 
         if pool is None:
             run(0, count)
@@ -312,9 +283,8 @@ class Simulator:
         """What the sensors show at once of a jump of the command, see `jump_ratio`, (S, 1, n) each."""
         first = windows.commands[:, windows.history * windows.substeps]
         _, chosen, which = np.unique(windows.gains, axis=0, return_index=True, return_inverse=True)
-        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])
-        position, torque = np.moveaxis(found[which.ravel()], 1, 0)[:, :, None]
-        return position, torque
+        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]
+        return found[:, 0], found[:, 1]
 
     def _links(self, model: Model, windows: Windows) -> Array:
         """Link positions (S, n) near those of the first row: measured less what the motor leads at the first torque."""

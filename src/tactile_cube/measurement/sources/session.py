@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.excitation import excitation, safe_range
+from tactile_cube.measurement.bench import excitation, safe_range
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
