@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import CONFIG
 from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from tactile_cube.api.environment import search_grasps as search_grasps
     from tactile_cube.api.evaluation import evaluate as evaluate
     from tactile_cube.api.evaluation import view as view
+    from tactile_cube.api.identification import export_model as export_model
     from tactile_cube.api.identification import identify as identify
-    from tactile_cube.api.model_export import export_model as export_model
     from tactile_cube.api.monitoring import monitor as monitor
     from tactile_cube.api.training import average as average
     from tactile_cube.api.training import train as train
@@ -47,12 +47,11 @@ if TYPE_CHECKING:
 _PLACES = {
     "api.comparison": "compare record",
     "api.deployment": "deploy export load_policy",
-    "api.model_export": "export_model",
     "api.diagnosis": "diagnose diagnose_each",
     "api.effects": "effects",
     "api.environment": "env_config make_env search_grasps",
     "api.evaluation": "evaluate view",
-    "api.identification": "identify",
+    "api.identification": "export_model identify",
     "api.monitoring": "monitor",
     "api.training": "average train",
     "drivetrain.model_file": "read_model",

@@ -3,8 +3,7 @@
 import sys
 
 from tactile_cube.cli import command_line, fail, quiet_when_nobody_reads
-from tactile_cube.command_help import commands
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import commands, suggestion
 from tactile_cube.run_folder import USAGE_ERROR
 
 

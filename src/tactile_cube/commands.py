@@ -91,7 +91,7 @@ def evaluate(job: Job) -> float:
 def export(job: Job) -> None:
     """Write a policy for a robot, or an identified model for another simulator."""
     if job.config.model is not None or job.config.format is not None:
-        from tactile_cube.api.model_export import run_model_export
+        from tactile_cube.api.identification import run_model_export
 
         print(run_model_export(job).text)
         return

@@ -5,7 +5,7 @@ import traceback
 from collections.abc import Iterator
 from typing import Any
 
-from tactile_cube.did_you_mean import meaning, near_key, suggestion
+from tactile_cube.composition import meaning, near_key, suggestion
 from tactile_cube.errors import InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

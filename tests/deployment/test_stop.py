@@ -19,13 +19,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactile_cube.deployment import run_loop
+from tactile_cube.deployment.command_guard import REPEATS, StopError
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import JointLimits, Reading, StopRules
 from tactile_cube.deployment.run_loop import LoopRun
 from tactile_cube.deployment.simulated_hand import SimulatedHand
-from tactile_cube.deployment.stop import REPEATS, StopError
 from tests.deployment.following_robot import TICK, FollowingRobot, Spoil, clock, drive, raising, torque
 from tests.deployment.test_every_command import HAND, LOWER, UPPER, sequences
 

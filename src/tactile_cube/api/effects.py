@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.effects import Effect, Parameter, catalogue
 from tactile_cube.errors import InputError
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue

@@ -15,9 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from tactile_cube.command_help import CONFIG
-from tactile_cube.composition import composed, refuse_unknown_keys, with_recipe
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import CONFIG, composed, refuse_unknown_keys, suggestion, with_recipe
 from tactile_cube.errors import InputError
 from tactile_cube.usage_error import usage_error
 

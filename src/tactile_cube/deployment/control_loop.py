@@ -8,11 +8,9 @@ from math import inf, isfinite
 
 import numpy as np
 
-from tactile_cube.deployment.command_guard import CommandGuard
+from tactile_cube.deployment.command_guard import CommandGuard, Stop
 from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController
-from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
-from tactile_cube.deployment.robot import Array, Reading
-from tactile_cube.deployment.stop import Stop
+from tactile_cube.deployment.robot import Array, JointLimits, Reading, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.drivetrain.laws import low_pass
 from tactile_cube.errors import InputError

@@ -10,7 +10,7 @@ import numpy as np
 
 from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.controller import POLICY_RATE, Network
-from tactile_cube.deployment.limits import RATE, StopRules
+from tactile_cube.deployment.robot import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand

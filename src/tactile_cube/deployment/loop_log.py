@@ -12,8 +12,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.limits import JointLimits
-from tactile_cube.deployment.robot import Array, Reading
+from tactile_cube.deployment.robot import Array, JointLimits, Reading
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.dlr_hand2 import REFLECTED_INERTIA, STATIC_FRICTION, STIFFNESS
 from tactile_cube.measurement.recordings.description import Controller, Coupling, Description, Sensors, TrialEntry

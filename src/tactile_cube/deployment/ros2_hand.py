@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tactile_cube.deployment.limits import Array, require_positive
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, Reading, require_positive
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from tactile_cube.deployment.command_guard import let_go
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
 from tactile_cube.deployment.loop_log import LoopLog
 from tactile_cube.deployment.robot import Robot
-from tactile_cube.deployment.stop import let_go
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 DEADLY = (signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGVTALRM, signal.SIGPROF, signal.SIGXCPU)

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tactile_cube.deployment.limits import require_positive
-from tactile_cube.deployment.robot import Array, Reading
+from tactile_cube.deployment.robot import Array, Reading, require_positive
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.env import cube_pose
 from tactile_cube.env.cube_pose import frame_along, seen_along

@@ -91,10 +91,7 @@ class Plant:
         return rows.reshape(*memory.shape[:-1], self.topology.joints)
 
     def memory(
-        self,
-        constants: DrivetrainConstants,
-        gravity: npt.ArrayLike = (0.0, 0.0, -9.81),
-        effects: Sequence[Effect] = (),
+        self, constants: DrivetrainConstants, gravity: npt.ArrayLike = (0.0, 0.0, -9.81), effects: Sequence[Effect] = ()
     ) -> Array:
         """A memory (size,) at rest at zero, with these constants, and effects whose classes are among the plant's.
 

@@ -30,11 +30,7 @@ def safe_range(joint: RigJoint, share: float) -> tuple[float, float]:
 
 
 def excitation(kind: str, low: Array, high: Array, duration: float, rate: float, rng: np.random.Generator) -> Array:
-    """Commands of one trial, shape (duration * rate, joints) [rad], within `low` and `high` (joints,).
-
-    Raises:
-        InputError: an unknown kind.
-    """
+    """Commands of one trial (duration * rate, joints) [rad], within `low` and `high` (joints,); see `KINDS`."""
     if kind not in KINDS:
         raise InputError(f"kinds: '{kind}' is no excitation; known: {list(KINDS)}")
     time = np.arange(round(duration * rate)) / rate
@@ -125,10 +121,8 @@ def touch_offsets(recording: Recording, model: ModelFile) -> dict[str, Estimate]
             deflection = _torque(trial)[rest, index].mean() / stiffness
             offset = float(trial.position[rest, index].mean() - deflection - trial.touch.angle)
             by_joint.setdefault(joint, []).append(offset)
-    return {
-        joint: Estimate(value=float(np.mean(offsets)), low=min(offsets), high=max(offsets), unit="rad")
-        for joint, offsets in by_joint.items()
-    }
+    spans = {joint: {"low": min(offsets), "high": max(offsets)} for joint, offsets in by_joint.items()}
+    return {joint: Estimate(value=float(np.mean(by_joint[joint])), **span, unit="rad") for joint, span in spans.items()}
 
 
 def _torque(trial: Trial) -> Array:

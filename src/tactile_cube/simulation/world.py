@@ -35,10 +35,7 @@ class World:
     constants: EpisodeConstants
 
     def __init__(
-        self,
-        hand: Hand = DLR_HAND2,
-        options: SimulationOptions | None = None,
-        effects: Sequence[Effect] = (),
+        self, hand: Hand = DLR_HAND2, options: SimulationOptions | None = None, effects: Sequence[Effect] = ()
     ) -> None:
         """Builds the bodies and the compiled control step, with further effects of the drivetrain, each at a joint.
 

@@ -10,22 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.errors import InputError
 
 EffectClass = type[Effect]
 CATALOGUE_MODULES = (
-    "command",
-    "controller",
-    "motor",
-    "elastic_joint",
-    "transmission",
-    "joint_torque",
-    "friction",
-    "mechanism",
-)
+    "command", "motor", "elastic_joint", "transmission", "joint_torque", "friction", "mechanism"
+)  # fmt: skip
 """Files of this folder; effects of one stage act in the order in which these define them."""
 
 

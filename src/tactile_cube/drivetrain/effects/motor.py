@@ -7,14 +7,7 @@ import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage, harmonic
 from tactile_cube.drivetrain.effects.scales import Scales, unit_at
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    ANGLE,
-    DAMPING,
-    JOINT_TORQUE,
-    TORQUE,
-    VELOCITY,
-)
+from tactile_cube.drivetrain.signals import ACCELERATION, ANGLE, DAMPING, JOINT_TORQUE, TORQUE, VELOCITY
 
 
 class TorqueGain(Effect):

@@ -78,6 +78,8 @@ def _parts(trials: Sequence[Trial], velocities: Sequence[Array], joint: int) -> 
     kinds = np.concatenate([np.full(len(trial.time), trial.kind) for trial in trials])
     position = np.concatenate([trial.position[:, joint] for trial in trials])
     phase = np.concatenate([trial.time / trial.duration for trial in trials])
+    others = [np.abs(np.delete(one, joint, axis=1)).max(axis=1, initial=0.0) for one in velocities]
+    fast = np.concatenate(others) > SPEEDS["low speed"]
     return {
         "speed": {
             name: (speed >= least) & (speed < most) for (name, most), least in zip(SPEEDS.items(), edges, strict=False)
@@ -87,16 +89,15 @@ def _parts(trials: Sequence[Trial], velocities: Sequence[Array], joint: int) -> 
         "load": _load(trials, joint),
         "posture": _thirds(position, "third of the range", ("low", "middle", "high")),
         "time": _thirds(phase, "third of the trial", ("first", "second", "last")),
-        "neighbours": _neighbours(velocities, joint),
+        "neighbours": {"other joints moving": fast, "other joints slow or still": ~fast} if fast.any() else {},
         "kind": {f"{kind} trials": kinds == kind for kind in dict.fromkeys(kinds.tolist())},
     }
 
 
 def _load(trials: Sequence[Trial], joint: int) -> dict[str, Mask]:
     """By the size of the measured torque, as far as there is one."""
-    torque = np.abs(
-        np.concatenate([np.full(len(t.time), np.nan) if t.torque is None else t.torque[:, joint] for t in trials])
-    )
+    parts = [np.full(len(t.time), np.nan) if t.torque is None else t.torque[:, joint] for t in trials]
+    torque = np.abs(np.concatenate(parts))
     if np.isnan(torque).all():
         return {}
     half = 0.5 * float(np.nanpercentile(torque, 98))
@@ -107,12 +108,6 @@ def _thirds(values: Array, of: str, names: tuple[str, str, str]) -> dict[str, Ma
     low, high = values.min() + np.ptp(values) * np.array([1, 2]) / 3
     part = (values >= low).astype(int) + (values >= high)
     return {f"{name} {of}": part == index for index, name in enumerate(names)}
-
-
-def _neighbours(velocities: Sequence[Array], joint: int) -> dict[str, Mask]:
-    others = [np.abs(np.delete(one, joint, axis=1)).max(axis=1, initial=0.0) for one in velocities]
-    fast = np.concatenate(others) > SPEEDS["low speed"]
-    return {"other joints moving": fast, "other joints slow or still": ~fast} if fast.any() else {}
 
 
 WORTH_SAYING = 1.5  # error / noise floor of a joint below which nothing is said
@@ -226,7 +221,10 @@ def cross_correlations(
         for trial, error in zip(trials, errors, strict=True):
             for name, cause in _causes(trial, joints).items():
                 causes.setdefault(name, []).append(_strongest(_filled(error[:, index]), cause, trial.step))
-        results += [_combined(joint, name, values) for name, values in causes.items()]
+        for name, values in causes.items():
+            correlation, delay, p = np.array(values).T
+            combined = float(stats.combine_pvalues(np.clip(p, 1e-300, 1), method="fisher").pvalue)
+            results.append(CrossCorrelation(joint, name, float(correlation.mean()), float(np.median(delay)), combined))
     return sorted(results, key=lambda one: -abs(one.correlation))
 
 
@@ -251,21 +249,11 @@ def _strongest(error: Array, cause: Array, step: float) -> tuple[float, float, f
     full = signal.correlate(a, b, mode="full", method="fft") / scale
     window = full[len(b) - 1 : len(b) + longest]
     lag = int(np.argmax(np.abs(window)))
-    effective = max(4.0, len(a) / _shared_memory(a, b))
+    lags = slice(1, len(a) // 4)
+    shared = float(1 + 2 * np.sum(_autocorrelation(a)[lags] * _autocorrelation(b)[lags]))
+    effective = max(4.0, len(a) / max(1.0, shared))  # fewer independent samples, by Bartlett's factor
     p = 2 * stats.norm.sf(abs(window[lag]) * np.sqrt(effective)) * max(1.0, longest / _memory(error))
     return float(window[lag]), lag * step, float(min(1.0, p))
-
-
-def _combined(joint: str, cause: str, values: list[tuple[float, float, float]]) -> CrossCorrelation:
-    correlation, delay, p = np.array(values).T
-    combined = stats.combine_pvalues(np.clip(p, 1e-300, 1), method="fisher").pvalue
-    return CrossCorrelation(joint, cause, float(correlation.mean()), float(np.median(delay)), float(combined))
-
-
-def _shared_memory(a: Array, b: Array) -> float:
-    """Bartlett's factor by which two signals with memory carry fewer independent samples."""
-    lags = len(a) // 4
-    return max(1.0, float(1 + 2 * np.sum(_autocorrelation(a)[1:lags] * _autocorrelation(b)[1:lags])))
 
 
 def _memory(values: Array) -> float:

@@ -19,15 +19,21 @@ SIGNALS = ("command", "position", "torque", "link_position", "feedforward")
 
 @dataclass(frozen=True)
 class TrialColumns:
-    """A trial as written in its file: time (n,) and signals (n, joints), None where no joint has them.
+    """What was commanded and measured; `sensors.read` of the recording says when `position[k]` was read.
 
-    A joint without a sensor on its link has nan in `link_position`; one without a feed-forward torque has 0 there.
+    Attributes:
+        time: (n,) [s].
+        command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
+        position: (n, joints) measured position, on the motor side [rad].
+        torque: (n, joints) measured torque [N m], or None.
+        link_position: (n, joints) measured on the link side [rad], nan where a joint has no sensor there; or None.
+        feedforward: (n, joints) torque that the controller added to its own [N m], acting like `command`; or None.
     """
 
     time: Array
     command: Array
     position: Array
-    torque: Array | None
+    torque: Array | None = None
     link_position: Array | None = None
     feedforward: Array | None = None
 
@@ -38,8 +44,12 @@ def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Tri
     Raises:
         InputError: a missing column, a trial too short to say anything, or a value that is no finite number.
     """
-    warnings = _unknown_columns(table, joints, path)
-    _require(table, ["time", *(f"{joint}.{signal}" for joint in joints for signal in SIGNALS[:2])], path)
+    others = {name.rpartition(".")[0] for name in table if name.rpartition(".")[2] in SIGNALS} - set(joints) - {""}
+    unknown = "columns of '{}' are ignored: it is not among joints {}"
+    warnings = [f"{path}: {unknown.format(joint, list(joints))}" for joint in sorted(others)]
+    needed = ["time", *(f"{joint}.{signal}" for joint in joints for signal in SIGNALS[:2])]
+    if missing := [name for name in needed if name not in table]:
+        raise InputError(f"{path}: column '{missing[0]}' is missing (missing: {missing}; the file has: {list(table)})")
     samples = len(table["time"])
     if samples < MINIMUM_SAMPLES:
         raise InputError(
@@ -56,12 +66,6 @@ def pick_columns(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Tri
         _of_some(table, joints, "feedforward", 0.0, path),
     )
     return columns, warnings + torque_warnings
-
-
-def _require(table: Table, names: list[str], path: Path) -> None:
-    missing = [name for name in names if name not in table]
-    if missing:
-        raise InputError(f"{path}: column '{missing[0]}' is missing (missing: {missing}; the file has: {list(table)})")
 
 
 def _torque(table: Table, joints: tuple[str, ...], path: Path) -> tuple[Array | None, list[str]]:
@@ -96,13 +100,6 @@ def _finite(table: Table, name: str, path: Path) -> Array:
             "leave out rows that were not measured, the time column then shows the gap"
         )
     return table[name]
-
-
-def _unknown_columns(table: Table, joints: tuple[str, ...], path: Path) -> list[str]:
-    others = {name.rpartition(".")[0] for name in table if name.rpartition(".")[2] in SIGNALS} - set(joints) - {""}
-    return [
-        f"{path}: columns of '{joint}' are ignored: it is not among joints {list(joints)}" for joint in sorted(others)
-    ]
 
 
 BEYOND = {0.9: 8.0, 0.99: 5.0}
@@ -140,7 +137,9 @@ def without_outliers(
 
 def _outliers(values: Array) -> tuple[NDArray[np.int64], Array]:
     """Rows of outliers, and the values with outliers replaced by the cubic through their neighbours."""
-    limit = _limit(np.abs(values - _beside(values)[1]))
+    differences = np.abs(values - _beside(values)[1])
+    bounds = (times * float(np.quantile(differences, quantile)) for quantile, times in BEYOND.items())
+    limit = next((bound for bound in bounds if bound > 0.0), 0.0)
     cleaned, far, found = values.copy(), _far(values), set[int]()
     while limit > 0.0 and len(found) <= min(MOST * len(values), MANY):
         row = int(np.argmax(far))
@@ -162,11 +161,6 @@ def _far(values: Array) -> Array:
     return far
 
 
-def _limit(differences: Array) -> float:
-    limits = [times * float(np.quantile(differences, quantile)) for quantile, times in BEYOND.items()]
-    return next((limit for limit in limits if limit > 0.0), 0.0)
-
-
 def _beside(values: Array) -> tuple[Array, Array]:
     """Median of the five readings around each one, and the cubic through the other four."""
     padded = np.pad(values, NEAR, mode="reflect", reflect_type="odd")
@@ -180,10 +174,10 @@ LONGEST_GAP = 0.25  # [s] beyond this the command in between is anybody's guess
 JITTER = 0.1  # share of a period that is worth a warning
 TINY = 1e-12  # share of a period below which no rate fits
 ON_GRID = 0.02  # share of a period below which samples are taken as they are
-Signals = TypeVar("Signals")
+Rows = TypeVar("Rows")
 
 
-def rows_of(signals: Signals, rows: slice | NDArray[np.bool_]) -> Signals:
+def rows_of(signals: Rows, rows: slice | NDArray[np.bool_]) -> Rows:
     """Columns, a trial or a table to be written with these rows of its arrays alone."""
     arrays = {one.name: getattr(signals, one.name) for one in fields(signals)}  # type: ignore[arg-type]
     return replace(signals, **{name: a[rows] for name, a in arrays.items() if isinstance(a, np.ndarray)})  # type: ignore[type-var]

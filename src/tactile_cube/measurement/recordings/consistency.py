@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.model_file import MAY_BE_INFINITE
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
@@ -14,13 +14,8 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
 from tactile_cube.measurement.recordings.trial import Array, Gains
 
-DEFAULTS = {
-    "stiffness": np.inf,
-    "static_friction": 0.0,
-    "reflected_inertia": 0.0,
-    "friction_creep": 0.0,
-    "reading_delay": 0.0,
-}
+DEFAULTS = {"stiffness": np.inf}
+DEFAULTS |= dict.fromkeys(("static_friction", "reflected_inertia", "friction_creep", "reading_delay"), 0.0)
 """What may be stated of a drive, and its value where nothing is."""
 EFFECTS = {"viscous_friction": "damping"}
 """Effects that may be stated too, by the value of one parameter."""

@@ -98,9 +98,8 @@ class Recording:
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
         values = getattr(self.gains, constant, self.nominal.get(constant))
-        return (
-            None if values is None or constant in self.description.unknown else float(values[self.joints.index(joint)])
-        )
+        known = values is not None and constant not in self.description.unknown
+        return float(values[self.joints.index(joint)]) if known else None
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
         """The mechanism.

@@ -158,7 +158,13 @@ def read_table(path: Path, most: int = limits.NUMBERS) -> Table:
         raise unknown_ending(path, f".parquet, {', '.join(CSV)}, .npz")
     regular(path, lacking="; recording.yaml names it under 'trials'")
     if suffix == ".npz":
-        table = _npz(path, most)
+        arrays = read_npz(path, most)
+        for name, one in arrays.items():
+            if one.ndim != 1 or one.dtype.kind not in "fiu":
+                raise InputError(
+                    f"{path}: column '{name}' is {one.ndim}-dimensional {one.dtype}, expected (samples,) numbers"
+                )
+        table = {name: np.asarray(array, dtype=np.float64) for name, array in arrays.items()}
     else:
         frame, dialect = read_frame(path, most)
         if dialect is not None and dialect.units:
@@ -212,21 +218,8 @@ def _csv(path: Path, most: int) -> tuple[polars.DataFrame, Dialect]:
         decimal_comma=dialect.decimal_comma, encoding="utf8-lossy", skip_lines=dialect.header,
     )  # fmt: skip
     names = [*dialect.names, *frame.columns[len(dialect.names) :]]
-    return frame.rename(dict(zip(frame.columns, _each_once(names), strict=False))), dialect
-
-
-def _each_once(names: list[str]) -> list[str]:
-    return [name if name not in names[:k] else f"{name}_{k}" for k, name in enumerate(names)]
-
-
-def _npz(path: Path, most: int) -> Table:
-    table = read_npz(path, most)
-    for name, array in table.items():
-        if array.ndim != 1 or array.dtype.kind not in "fiu":
-            raise InputError(
-                f"{path}: column '{name}' is {array.ndim}-dimensional {array.dtype}, expected (samples,) numbers"
-            )
-    return {name: np.asarray(array, dtype=np.float64) for name, array in table.items()}
+    once = [name if name not in names[:k] else f"{name}_{k}" for k, name in enumerate(names)]
+    return frame.rename(dict(zip(frame.columns, once, strict=False))), dialect
 
 
 def _require_size(path: Path, numbers: int, columns: int, most: int) -> None:

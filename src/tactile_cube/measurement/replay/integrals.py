@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.compiled import compiled_once
 from tactile_cube.drivetrain import Plant
-from tactile_cube.drivetrain.effects.controller import IntegralAction
+from tactile_cube.drivetrain.effects.command import IntegralAction
 from tactile_cube.drivetrain.signals import TORQUE
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.windows import Windows

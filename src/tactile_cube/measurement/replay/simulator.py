@@ -75,19 +75,12 @@ class Simulator:
     """The drivetrain that training uses as a recording's rig, with every effect that a model may have compiled in."""
 
     def __init__(
-        self,
-        recording: Recording,
-        effects: Sequence[type[Effect]] = (),
-        step: float = 0.002,
-        time: float = 1.0,
+        self, recording: Recording, effects: Sequence[type[Effect]] = (), step: float = 0.002, time: float = 1.0
     ) -> None:
         """Build the plant; its kernel is compiled once and kept on disk.
 
-        Args:
-            recording: rig, controller and sampling step.
-            effects: a user's classes that a model may use, beside those of the catalogue.
-            step: longest integration step [s]; a whole number of steps fits between two samples.
-            time: what a second of a finger stands for [s].
+        A model may use `effects` of a user beside the catalogue. A whole number of steps of `step` [s] at most fits
+        between two samples; `time` is what a second of a finger stands for [s].
         """
         self.recording = recording
         self.time = time
@@ -128,18 +121,13 @@ class Simulator:
         torques: bool = False,
         near: Path | None = None,
     ) -> Array:
-        """Each model through its windows, the start of each segment moved by the model's correction.
+        """Each of M models through its windows (of one shape), with its correction at the start of each segment.
 
-        Args:
-            models: M of them.
-            windows: one each, of one shape (S windows of K segments).
-            corrections: (M, 2 n) added to positions [rad] and speeds [rad/s] at every start.
-            torques: whether to give torques as well.
-            near: path of a model that they are close to: they follow it, at a third of the cost. Those of another
-                mechanism go their own way.
+        Corrections (M, 2 n) are added to positions [rad] and speeds [rad/s]. Models follow the path of one that they
+        are `near` to, at a third of the cost; those of another mechanism go their own way.
 
         Returns:
-            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and torques [N m].
+            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and, if wanted, torques [N m].
         """
         out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
         if corrections is None:

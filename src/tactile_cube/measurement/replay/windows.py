@@ -128,12 +128,12 @@ def cut(
     time: float = 1.0,
     speed: Array | float = np.inf,
 ) -> Windows:
-    """The trials of a recording as windows.
+    """The trials of a recording, all by default, as windows.
 
     Args:
         recording: gives the joints and the sampling step.
-        noise: (n,) standard deviation of the position sensor of each joint, or (2 n,) with those on links [rad].
-        trials: all of the recording's by default.
+        noise: (n,) standard deviation of each joint's position sensor [rad], or (2 n,) with those on links.
+        trials: of the recording.
         segment: rows of a segment; as short as identification likes it by default.
         time: what a second of a finger stands for [s].
         speed: (n,) as well as speeds should be known where a segment starts [rad/s].
