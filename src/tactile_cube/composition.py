@@ -95,14 +95,10 @@ if TYPE_CHECKING:
 
 
 def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False) -> DictConfig:
-    """The configuration of a command with some of its settings chosen.
+    """The configuration of a command with some of its settings chosen, e.g. "task=table", "seed=1".
 
-    A Hydra application that calls this keeps its own configuration.
-
-    Args:
-        name: of the command whose conf/<name>.yaml it is; None: nothing but what `settings` add.
-        settings: choices and values as on the command line, e.g. "task=table", "seed=1".
-        with_hydra: also give Hydra's own part, which names run folder and choices.
+    A Hydra application that calls this keeps its own. Without a name it is nothing but what `settings` add;
+    `with_hydra` also gives Hydra's own part, which names run folder and choices.
 
     Raises:
         hydra.errors.HydraException: a setting that there is not.
@@ -121,10 +117,6 @@ def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False
 
 def refuse_unknown_keys(name: str, config: DictConfig) -> None:
     """Refuse top-level keys that a command does not read: a mistyped `+experiment=` would start another run.
-
-    Args:
-        name: of the command.
-        config: as composed.
 
     Raises:
         InputError: a key that is none of the command's and no group of conf/.
@@ -156,11 +148,6 @@ SHORTEST = 5  # letters of the beginning of a name that tell it
 
 def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
     """Return the end of an error message: "; did you mean ...?", or nothing if no known name is near.
-
-    Args:
-        word: as the user wrote it.
-        known: names that there are.
-        prefix: what the user has to write before the name.
 
     Example:
         >>> suggestion("evalute", ["evaluate", "export"])

@@ -41,15 +41,10 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 - Gymnasium's own declaration
 
     def __init__(self, config: EnvConfig, render_mode: str | None = None, judged: bool = True) -> None:
-        """Builds the world.
-
-        Args:
-            config: what the environment is.
-            render_mode: "rgb_array", or None for no pictures.
-            judged: whether episodes are recorded for "is_success".
+        """Builds the world; with `judged` episodes are recorded for "is_success".
 
         Raises:
-            InputError: another render mode.
+            InputError: another render mode than "rgb_array", or None for no pictures.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"render_mode is {render_mode!r}; choose 'rgb_array' or None")

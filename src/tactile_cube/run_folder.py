@@ -28,13 +28,8 @@ INTERRUPTED = 130
 def configuration_in(folder: Path, config: DictConfig, log: str) -> Iterator[None]:
     """Write the configuration of a command into its folder, and take it back if the command is refused.
 
-    Hydra would write it over that of an earlier run before anybody can refuse. A folder in which nothing else was
-    written goes altogether.
-
-    Args:
-        folder: of the run.
-        config: of the command.
-        log: name of the file in the folder that keeps what the console showed.
+    Hydra would write it over that of an earlier run before anybody can refuse. A folder in which nothing else than
+    `log` was written goes altogether.
     """
     place = folder / CONFIGURATION
     before = {path: path.read_bytes() for path in place.glob("*.yaml")}

@@ -74,14 +74,10 @@ class CommandGuard:
         return now - self._sent
 
     def checked(self, dt: float, wanted: Array) -> Array:
-        """Return the command to send `(joints,)` [rad]: the nearest to the wanted one that keeps every limit.
+        """Return the command to send `(joints,)` [rad], `dt` [s] after the last: near the wanted one, in every limit.
 
         Where what is wanted is no number, the command stays. Where commands failed for so long that none keeps rate
         and torque, it keeps the torque.
-
-        Args:
-            dt: time since the last command [s].
-            wanted: `(joints,)` [rad].
         """
         if self.state is None:
             raise RuntimeError("no command before an accepted reading")

@@ -163,9 +163,7 @@ class ControlLoop:
     def tick(self, now: float, reading: Reading | None = None) -> Array | None:
         """Return the desired angles q_d `(joints,)` [rad] to send, or None while nothing may be sent.
 
-        Args:
-            now: time of this tick on a monotonic clock [s].
-            reading: what has been measured since the tick before; None: nothing.
+        `now` [s] is on a monotonic clock; `reading` is what has been measured since the tick before.
         """
         dt = now - self.time if now > self.time and isfinite(now) else 0.0
         if dt == 0.0:

@@ -124,10 +124,7 @@ class Watchdog:
     def judge(self, dt: float, silent: float, saturated: NDArray[np.bool_]) -> str:
         """Return why the hand must stop, in words; "" if it need not.
 
-        Args:
-            dt: since the tick before [s].
-            silent: since the last accepted measurement [s].
-            saturated: joints that demand all their torque `(joints,)`.
+        By the times since the tick before and the last accepted measurement [s], and the joints at full torque.
         """
         rules = self._rules
         if dt > rules.lateness:

@@ -96,15 +96,9 @@ class LoopRun:
 
 
 def run_loop(loop: ControlLoop, robot: Robot, say: Say = print, log: LoopLog | None = None) -> LoopRun:
-    """Run a new loop until it stops by itself or a signal ends it.
+    """Run a new loop until it stops by itself or a signal ends it; `log` is of the time in which the policy decides.
 
     However it ends, by an exception too, the stop has the last commands and the robot is closed.
-
-    Args:
-        loop: a new one.
-        robot: the hand.
-        say: takes a line at each change of mode.
-        log: of the time in which the policy decides.
 
     Raises:
         StopError: the fingers may still press.

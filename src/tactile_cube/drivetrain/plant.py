@@ -48,15 +48,10 @@ class Plant:
         joint_names: Sequence[str] | None = None,
         trace_rows: int = 0,
     ) -> None:
-        """Describe a plant.
+        """Describe a plant: equal chains whose trees may differ in their numbers alone, in steps of `dt` [s].
 
-        Args:
-            trees: one per chain; they may differ in their numbers, not in their structure.
-            dt: step of the physics [s].
-            effects: the effects that can be switched on; each once, in the order in which they act within a stage.
-            joint_names: of all actuated joints, chain by chain; by default the tree's own, with `0/`, `1/` .. before
-                them if there are several chains.
-            trace_rows: steps of the control loop whose signals are kept under the key `trace`.
+        Effects that can be switched on act in this order within a stage. Joints are named chain by chain, by default by
+        the tree with `0/`, `1/` .. before them if there are several. So many steps of the control loop are traced.
 
         Raises:
             InputError: trees of different structure, a step that is not positive.

@@ -95,15 +95,9 @@ class ObjectMesh:
 
 
 def read_mesh(file: str | Path, scale: float = 1.0, hull: bool = False) -> tuple[ObjectMesh, Array]:
-    """Read an OBJ or STL file, whose axes are the object's.
+    """Read an OBJ or STL file, whose axes are the object's, and the edges of its bounding box (3,) [m].
 
-    Args:
-        file: of the mesh.
-        scale: metres per unit of the file.
-        hull: whether a hollow or open mesh may be taken as its convex hull.
-
-    Returns:
-        The mesh and the edges of its bounding box (3,) [m].
+    `scale` is metres per unit of the file; with `hull` a hollow or open mesh is taken as its convex hull.
 
     Raises:
         InputError: there is no such file, no mesh in it, its size is none for fingers, or it is not convex.

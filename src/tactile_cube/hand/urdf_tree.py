@@ -171,16 +171,9 @@ PARTS = re.compile(r"^\s*(?:mtllib|map_\w+|bump|disp|decal|refl|norm)\s(.+)$", r
 
 
 def with_own_files(urdf: str, file: Path, root: Path, shapes: tuple[str, ...] = SHAPES) -> tuple[str, list[str]]:
-    """Return a URDF whose files all lie below a folder and have absolute names.
+    """Return a URDF, read from `file`, whose files lie below `root` and have absolute names, with `shapes` alone.
 
-    Args:
-        urdf: the text.
-        file: that it was read from, which names are relative to.
-        root: folder of the robot's files, which `package://NAME/` stands for.
-        shapes: kinds to keep.
-
-    Returns:
-        The text without shapes whose files lie elsewhere or are not there, and why each was left out.
+    `package://NAME/` stands for the root. Shapes whose files lie elsewhere or are not there are left out; why is said.
 
     Raises:
         InputError: no URDF, or elements nested too deeply.

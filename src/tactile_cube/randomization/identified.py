@@ -32,13 +32,8 @@ def identified(
     """The hand that was identified: values in place of nominal ones, intervals in place of ranges, effects added.
 
     A model of one finger (q1, q2, q3) stands for all four. Constants that were fitted are drawn from their intervals;
-    those that were not keep the relative range of `randomization` around the model's value.
-
-    Args:
-        model: what `identify` or `diagnose` wrote.
-        constants: nominal, of what the model does not mention.
-        randomization: ranges of the same.
-        joints: the hand's joints, in the order of the constants' vectors.
+    those that were not keep the relative range of `randomization` around the model's value. `joints` are the hand's, in
+    the order of the constants' vectors.
 
     Raises:
         InputError: joints, effects or limits that the hand does not have.

@@ -59,10 +59,6 @@ def find_effect(name: str) -> EffectClass:
 def parse_effect(text: str, find: Callable[[str], Any] = find_effect) -> tuple[str, dict[str, float]]:
     """Return `NAME@JOINT` and parameter -> value; parameters that are not given take their typical values.
 
-    Args:
-        text: as a user writes it.
-        find: returns the effect of a name.
-
     Raises:
         InputError: an unknown effect or parameter, or a value that is no number.
     """
@@ -83,8 +79,7 @@ def parse_effect(text: str, find: Callable[[str], Any] = find_effect) -> tuple[s
 def import_own_effects(names: Iterable[str]) -> None:
     """Import the modules of a user's own classes, so that files may name them; other names are ignored.
 
-    Args:
-        names: as the user wrote them, never from a file: `my_rig.CableDrag`, `my_rig.CableDrag@q2: tension=0.1`.
+    Names are as the user wrote them, never from a file: `my_rig.CableDrag`, `my_rig.CableDrag@q2: tension=0.1`.
 
     Raises:
         InputError: a module that cannot be imported, or has no such effect.
@@ -128,9 +123,7 @@ def _try_laws(effect: EffectClass, path: str) -> None:
 def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectClass, str]]:
     """Return effects and joints for names such as `backlash@q3`; without `@JOINT` an effect acts on every joint.
 
-    Args:
-        names: as a user writes them.
-        joints: the plant's joints; `@q3` also stands for every joint that ends in `_q3`, `/q3` or `.q3`.
+    `@q3` also stands for every joint that ends in `_q3`, `/q3` or `.q3`.
 
     Raises:
         InputError: an unknown effect or joint.

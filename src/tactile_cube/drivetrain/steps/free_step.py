@@ -187,8 +187,7 @@ def start_segment(position: Array, speed: Array, free: Array, trial: Array, memo
     """Puts the sensor to its measured position and speed; effects keep their past.
 
     `trial` has made the coming step already, which says how far the sensor is from the joint and how fast it leaves it.
-    A joint that is `free` of
-    its sensor around the start goes on as it was.
+    A joint that is `free` of its sensor around the start goes on as it was.
     """
     for a in range(C * n):
         column = a % n

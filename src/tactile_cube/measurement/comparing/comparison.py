@@ -116,16 +116,10 @@ def compare_recording(
 ) -> Comparison:
     """Simulate every trial freely from its start and describe what is left.
 
-    Args:
-        recording: what was measured.
-        model: simulated with the joint offsets of each initialisation that suit it best; None for the values in
-            recording.yaml and no offsets.
-        step: longest simulation step [s]; None: the usual one, or an eighth of it where the sensors would show its
-            error.
-        simulations: how many randomised simulations make the band; 0 for none.
-        spread: relative half widths of constants without an interval, `offset` in rad.
-        seed: of the randomised simulations.
-        floor: noise floor, if it is known already; by default found here.
+    A model is simulated with the joint offsets of each initialisation that suit it best; None: the values in
+    recording.yaml and no offsets. Steps last `step` [s] at most; None: the usual one, or an eighth of it where the
+    sensors would show its error. So many randomised simulations make the band; `spread` has relative half widths of
+    constants without an interval, `offset` in rad. The floor is found unless it is known.
     """
     if model is not None:
         require_same_joints(recording, model)

@@ -144,11 +144,7 @@ def unknown_ending(path: Path, known: str) -> InputError:
 
 
 def read_table(path: Path, most: int = limits.NUMBERS) -> Table:
-    """Column name -> values, all of one length.
-
-    Args:
-        path: Parquet, CSV (separated by comma, semicolon or tab) or NPZ.
-        most: numbers that it may hold; what it says of its size is looked at before it is read.
+    """Column name -> values, all of one length, of a Parquet, CSV or NPZ file of `most` numbers, looked at beforehand.
 
     Raises:
         InputError: a missing, truncated or too large file, an unknown ending, or a column that holds no numbers.

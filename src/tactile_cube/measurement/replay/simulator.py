@@ -57,13 +57,7 @@ class Path:
 
 
 def free_run(recording: Recording, model: Model, step: float = 0.002) -> list[Simulated]:
-    """Every trial of a recording simulated freely from its start.
-
-    Args:
-        recording: rig and trials.
-        model: with joint offsets for each of the trials' initialisations.
-        step: longest integration step [s].
-    """
+    """Every trial of a recording simulated freely from its start, in steps of `step` [s] at most."""
     simulator = Simulator(recording, [term.effect for term in model.terms], step)
     try:
         return simulator.free_runs([model])[0]

@@ -128,15 +128,10 @@ def cut(
     time: float = 1.0,
     speed: Array | float = np.inf,
 ) -> Windows:
-    """The trials of a recording, all by default, as windows.
+    """The trials of a recording, all by default, as windows of segments of `segment` rows, short ones by default.
 
-    Args:
-        recording: gives the joints and the sampling step.
-        noise: (n,) standard deviation of each joint's position sensor [rad], or (2 n,) with those on links.
-        trials: of the recording.
-        segment: rows of a segment; as short as identification likes it by default.
-        time: what a second of a finger stands for [s].
-        speed: (n,) as well as speeds should be known where a segment starts [rad/s].
+    `noise` (n,) [rad] is the standard deviation of each joint's position sensor, (2 n,) with those on links, `time`
+    what a second of a finger stands for [s]; speeds are to be known as well as `speed` (n,) [rad/s] at their starts.
     """
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
