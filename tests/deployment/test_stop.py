@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -191,7 +192,7 @@ def test_a_signal_breaks_what_hangs_but_neither_the_stop_nor_the_closing(monkeyp
         os.kill(os.getpid(), signal.SIGINT)
 
     now = [0.0]
-    monkeypatch.setattr(run_loop, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(run_loop, "time", SimpleNamespace(monotonic=lambda: now[0], perf_counter=time.perf_counter))
     for call in ("in_wait", "in_read", "in_send"):
         robot = FollowingRobot(HOME, follow=0.0)
         for tick in (AT, AT + 1, AT + 2, AT + 60):

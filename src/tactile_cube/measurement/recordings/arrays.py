@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -114,7 +114,7 @@ def _table(trial: TrialArrays, number: int, joints: int, rate: float) -> TrialTa
     for name in ("command", "position"):
         if signals[name] is None:
             raise InputError(f"trials[{number}]: {name} is None; give (samples, joints)")
-    found = {name: signal for name, signal in signals.items() if signal is not None}
+    found: dict[str, Any] = {name: signal for name, signal in signals.items() if signal is not None}
     samples, file = len(found["command"]), f"trials/{trial.kind}_{number}.parquet"
     for name, signal in found.items():
         if len(signal) != samples:

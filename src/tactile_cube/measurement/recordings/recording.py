@@ -97,7 +97,7 @@ class Recording:
 
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
-        values = getattr(self.gains, constant, self.nominal.get(constant))
+        values: Array | None = getattr(self.gains, constant, self.nominal.get(constant))
         known = values is not None and constant not in self.description.unknown
         return float(values[self.joints.index(joint)]) if known else None
 

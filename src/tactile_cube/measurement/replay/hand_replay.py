@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -100,7 +101,7 @@ class HandReplay:
         """
         load = trial.load
         assert load is not None, "only trials with an object are simulated here"
-        held = {"cube_size": load.size, "cube_mass": load.mass, "cube_com": load.com}
+        held: dict[str, Any] = {"cube_size": load.size, "cube_mass": load.mass, "cube_com": load.com}
         held |= {"gravity_onset": round(load.released * self.recording.rate), "joint_offset": offset[self._order]}
         constants = contact.apply(replace(self._nominal, **held))
         self._world.reset(constants, self._start(trial, load, offset, np.asarray(constants.stiffness)))

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +154,7 @@ class Simulator:
 
     def memory(self, model: Model) -> Array:
         """Memory (size,) of the plant with a model's constants and effects."""
-        known = {key: model.constants[key] for key in DRIVE}
+        known: dict[str, Any] = {key: model.constants[key] for key in DRIVE}
         memory: Array = self.plant.memory(DrivetrainConstants(**known), gravity=self.recording.gravity)
         self.plant.view(memory, "friction_creep")[:] = model.constants.get("friction_creep", 0.0)
         for term in model.terms:

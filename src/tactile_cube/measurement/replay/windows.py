@@ -98,7 +98,7 @@ class Windows:
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
         """Some of the windows."""
         places = [int(k) for k in np.arange(len(self))[chosen]]
-        picked = {key: tuple(getattr(self, key)[k] for k in places) for key in ("forces", "errors")}
+        picked: dict[str, Any] = {key: tuple(getattr(self, key)[k] for k in places) for key in ("forces", "errors")}
         return replace(self, **{key: getattr(self, key)[chosen] for key in ROWS}, **picked)
 
     def first_segments(self) -> Windows:
