@@ -22,8 +22,7 @@ from tactile_cube.usage_error import usage_error
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-PIPE_CLOSED = 141
-"""Exit status of a program that writes to a closed pipe, as shells count it: 128 + SIGPIPE."""
+PIPE_CLOSED = 141  # exit status of a program that writes to a closed pipe, as shells count it: 128 + SIGPIPE
 
 
 def command_line(name: str) -> Callable[[], None]:

@@ -16,14 +16,12 @@ import yaml
 
 from tactile_cube.errors import InputError
 
-CONFIG = Path(__file__).parent / "conf"
-"""The configuration tree; in a checkout a link to conf/ at the top."""
+CONFIG = Path(__file__).parent / "conf"  # the configuration tree; in a checkout a link to conf/ at the top
 
 ADDED = ("experiment", "without")
 """Groups of training that no default chooses from: `+experiment=option`, and `without=option` beside ablations."""
 
-RECIPE = {"train": "curriculum"}
-"""The experiment that a command takes where the command line names none."""
+RECIPE = {"train": "curriculum"}  # the experiment that a command takes where the command line names none
 
 
 def help_text(name: str) -> str:

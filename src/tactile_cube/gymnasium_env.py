@@ -19,10 +19,8 @@ from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
 Observation = NDArray[np.float32]
 Picture = NDArray[np.uint8]
-FULL_TURN = 2.0 * np.pi
-"""Bound of the readings: no joint of a hand turns that far [rad]."""
-VIEW = 256
-"""Edge of each of the two views in a picture [pixels]."""
+FULL_TURN = 2.0 * np.pi  # bound of the readings: no joint of a hand turns that far [rad]
+VIEW = 256  # edge of each of the two views in a picture [pixels]
 
 
 class GymnasiumRotation(gymnasium.Env[Observation, Observation]):

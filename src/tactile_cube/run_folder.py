@@ -18,10 +18,8 @@ if TYPE_CHECKING:
     from omegaconf import DictConfig
 
 CONFIGURATION = ".hydra"
-USAGE_ERROR = 2
-"""Exit status of a command that was refused."""
-INTERRUPTED = 130
-"""Exit status after Ctrl-C."""
+USAGE_ERROR = 2  # exit status of a command that was refused
+INTERRUPTED = 130  # exit status after Ctrl-C
 
 
 @contextlib.contextmanager

@@ -14,8 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from tactile_cube.run_folder import INTERRUPTED
 
-LONGEST = 180
-"""Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
+LONGEST = 180  # characters of a folder's name that stand for overrides; file systems allow 255 in all
 
 
 class SweepFolder(Callback):

@@ -22,14 +22,11 @@ from tactile_cube.usage_error import usage_error
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-Say = Callable[[str], None]
-"""Takes lines of progress, as `print` does."""
+Say = Callable[[str], None]  # takes lines of progress, as `print` does
 shown_at_once: Say = functools.partial(print, flush=True)
 PathLike = str | Path
-NO_KEYS = ("values", "folder", "say")
-"""Keywords of calls that are no keys of the configuration."""
-EFFECTS = ("effects", "own_effects", "hidden")
-"""Keys of the configuration that name effects."""
+NO_KEYS = ("values", "folder", "say")  # keywords of calls that are no keys of the configuration
+EFFECTS = ("effects", "own_effects", "hidden")  # keys of the configuration that name effects
 
 
 @dataclass(frozen=True)

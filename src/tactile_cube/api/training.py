@@ -36,15 +36,11 @@ PUBLISHED: dict[str, dict[str, Any]] = {
     "object": {"shape": "box", "size": 0.08, "mass": 0.05},
 }
 """Hand and object of the paper, by the groups of conf/."""
-KEY = re.compile(r"[+~]*([\w./@]+)")
-"""What a word of a command line sets."""
-NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")
-"""Keys of the training as a whole."""
+KEY = re.compile(r"[+~]*([\w./@]+)")  # what a word of a command line sets
+NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the training as a whole
 ENGINES = ("bullet", "mujoco")
-AVERAGED = 5
-"""Policies whose mean is what comes out, as in conf/average.yaml."""
-GRASPS = 1000
-"""As many as those that come with the package."""
+AVERAGED = 5  # policies whose mean is what comes out, as in conf/average.yaml
+GRASPS = 1000  # as many as those that come with the package
 COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
 """Columns of metrics.csv that go on from stage to stage."""
 

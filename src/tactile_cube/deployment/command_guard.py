@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tactile_cube.deployment.robot import Array, JointLimits, Reading, Robot, StopRules
 
-AGREEING = 5
-"""Readings in a row that must agree before the first command."""
+AGREEING = 5  # readings in a row that must agree before the first command
 ROUNDING = 1e-9  # [rad] of angles that add up ticks
 
 
@@ -132,12 +131,9 @@ class CommandGuard:
         return f"{self.names[at]} at {q_m[at]:.4g} rad, where no command keeps all limits"
 
 
-REPEATS = 100
-"""Commands at the goal that the robot takes before it is let alone, so that a lost message does no harm."""
-LOOKING = 0.2
-"""How long new measurements are awaited after a gap [s]."""
-PERIOD = 0.001
-"""Shortest time between two commands [s]."""
+REPEATS = 100  # commands at the goal that the robot takes before it is let alone, so that a lost message does no harm
+LOOKING = 0.2  # how long new measurements are awaited after a gap [s]
+PERIOD = 0.001  # shortest time between two commands [s]
 
 
 class StopError(RuntimeError):

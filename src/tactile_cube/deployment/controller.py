@@ -16,8 +16,7 @@ from tactile_cube.measurement.bench import excitation
 Weights = NDArray[np.float32]
 Array = NDArray[np.float64]
 
-POLICY_RATE = 10.0
-"""Rate at which the policy is asked [Hz]."""
+POLICY_RATE = 10.0  # rate at which the policy is asked [Hz]
 
 
 @dataclass(frozen=True)

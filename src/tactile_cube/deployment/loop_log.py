@@ -20,10 +20,8 @@ from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTa
 
 Rows = NDArray[np.void]
 """Rows of a log: `time` [s] and `position`, `command` [rad], `torque` [N m] `(joints,)`, nan where not measured."""
-CHUNK = 500
-"""Rows that are written at a time: what a crash may cost."""
-BEHIND = 20
-"""Chunks that may wait for the disk."""
+CHUNK = 500  # rows that are written at a time: what a crash may cost
+BEHIND = 20  # chunks that may wait for the disk
 
 
 class LoopLog:

@@ -56,8 +56,7 @@ class Robot(Protocol):
         """End the connection."""
 
 
-RATE = 6.28
-"""Largest change of a desired angle [rad/s]. Source: data sheet of the hand, about 360 deg/s."""
+RATE = 6.28  # largest change of a desired angle [rad/s]. Source: data sheet of the hand, about 360 deg/s.
 
 
 def require_positive(numbers: Mapping[str, float]) -> None:

@@ -28,8 +28,7 @@ DEADLY = (signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGVTALRM, sign
 """Signals that end a program which has no handler of its own for them."""
 TERMINAL = (signal.SIGTTIN, signal.SIGTTOU)
 """Signals by which a terminal suspends a program in the background that reads or writes."""
-PATIENCE = 1.0
-"""After how long without a step a signal breaks what hangs [s]."""
+PATIENCE = 1.0  # after how long without a step a signal breaks what hangs [s]
 
 
 class NotedSignals:

@@ -13,8 +13,7 @@ from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.untrusted_file import read_text
 
-DIGITS = 40
-"""Of a number in a file."""
+DIGITS = 40  # of a number in a file
 Schema = TypeVar("Schema", bound=BaseModel)
 
 

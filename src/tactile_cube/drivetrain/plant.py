@@ -20,8 +20,7 @@ EffectClass = type[Effect]
 TREE_KEYS = ("ratio", "offset", "placement_rotation", "placement_translation", "axis", "mass", "com", "inertia")
 CONSTANT_KEYS = ("kp", "kd", "compliance", "static_friction", "reflected_inertia", "torque_limit", "rate_limit")
 _STARTING_ROWS = {POSITION: "q", VELOCITY: "v", MOTOR_POSITION: "q", COMMAND: "q", FRICTION: "static_friction"}
-CONTACT_TORQUE_LIMIT = 5.0
-"""Largest contact torque that is believed [N m]: 30 N at the outstretched tip of a finger."""
+CONTACT_TORQUE_LIMIT = 5.0  # largest contact torque that is believed [N m]: 30 N at the outstretched tip of a finger
 
 
 LAST_SUBSTEP = 1e9

@@ -12,19 +12,14 @@ from tactile_cube.hand.chain import PlanarChain
 from tactile_cube.hand.hand import Finger, Hand
 from tactile_cube.hand.urdf import Array, CollisionShape, origin_element
 
-KP = 3.69
-"""Stiffness of the impedance law [N m/rad]. Source: W, table."""
-KD = 0.25
-"""Damping of the impedance law [N m s/rad]. Source: W, table (its picture says 0.28)."""
-STIFFNESS = 25.0
-"""Elasticity K_e between motor and joint [N m/rad]. Source: W, table."""
-STATIC_FRICTION = 0.02
-"""Dry friction of a joint [N m]. Source: W, table (its picture says 0.08 for q3)."""
+KP = 3.69  # stiffness of the impedance law [N m/rad]. Source: W, table.
+KD = 0.25  # damping of the impedance law [N m s/rad]. Source: W, table (its picture says 0.28).
+STIFFNESS = 25.0  # elasticity K_e between motor and joint [N m/rad]. Source: W, table.
+STATIC_FRICTION = 0.02  # dry friction of a joint [N m]. Source: W, table (its picture says 0.08 for q3).
 REFLECTED_INERTIA = 1.5e-3
 """Rotor inertia seen at the joint [kg m^2]. Estimate within 1e-3..2e-3, where the 500 Hz loop is stable with margin;
 gear ratios 120 and 200 with rotors of this size give 1.4e-3..6e-3, critical damping K_D^2 / 4 K_P = 4.2e-3."""
-TORQUE_LIMIT = 1.0
-"""Largest joint torque [N m]. Source: the authors' follow-up, ICRA 2023 page."""
+TORQUE_LIMIT = 1.0  # largest joint torque [N m]. Source: the authors' follow-up, ICRA 2023 page.
 
 _LIMITS = np.radians([(-30.0, 30.0), (-20.0, 86.0), (-10.0, 105.0), (-10.0, 105.0)])
 """Of q1 .. q4 [rad]. Source: W, "theta_min .. theta_max" of the hardware."""

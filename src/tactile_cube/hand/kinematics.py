@@ -12,8 +12,7 @@ from tactile_cube.hand.urdf import Array
 
 _ROOM = 2e-3
 """A point of a face counts as reachable only with this gap [m], so that a grasp and its approach take the same one."""
-_REACHED = 1e-5
-"""A fingertip this near to its target has reached it [m]."""
+_REACHED = 1e-5  # A fingertip this near to its target has reached it [m]
 
 
 def tip_positions(hand: Hand, angles: Array) -> Array:

@@ -121,8 +121,7 @@ def _keep_needed_meshes(root: ElementTree.Element, file: Path, folder: Path, com
 OF_JOINTS = {"armature": "reflected_inertia", "frictionloss": "static_friction", "damping": "viscous_friction"}
 """MuJoCo's constants of a joint, and what recording.yaml calls them."""
 GAINS = ("kp", "kd")
-USUAL_GRAVITY = (0.0, 0.0, -9.81)
-"""That importers take where none is said [m/s^2]."""
+USUAL_GRAVITY = (0.0, 0.0, -9.81)  # that importers take where none is said [m/s^2]
 
 
 @dataclass(frozen=True)

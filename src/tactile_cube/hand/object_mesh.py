@@ -187,10 +187,8 @@ ObjectShape = NamedShape | ObjectMesh
 its ends, which is a sphere where z equals x; or a convex mesh."""
 SHAPES: tuple[NamedShape, ...] = get_args(NamedShape)
 
-_SHARE = 0.7
-"""How far from the middle of a side towards its edges a fingertip is put."""
-_ARC = np.radians(30.0)
-"""The same around a round side [rad]."""
+_SHARE = 0.7  # how far from the middle of a side towards its edges a fingertip is put
+_ARC = np.radians(30.0)  # the same around a round side [rad]
 
 
 def straight_half(half: Array) -> float:

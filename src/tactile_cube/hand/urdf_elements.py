@@ -14,12 +14,9 @@ from tactile_cube.errors import InputError
 
 Array = npt.NDArray[np.float64]
 MOVABLE = ("revolute", "continuous", "prismatic")
-FREE = ("floating", "planar")
-"""Types of joints without a drive; their links are held where the URDF puts them."""
-ROUNDING = 0.02
-"""Share of the largest principal moment that rounded numbers may lack to those of a body."""
-NO_INERTIA = 1e-15
-"""[kg m^2] A moment that is rounding of zero: a milligram of 1 mm has 1e-13."""
+FREE = ("floating", "planar")  # types of joints without a drive; their links are held where the URDF puts them
+ROUNDING = 0.02  # share of the largest principal moment that rounded numbers may lack to those of a body
+NO_INERTIA = 1e-15  # [kg m^2] A moment that is rounding of zero: a milligram of 1 mm has 1e-13
 
 
 @dataclass(frozen=True)

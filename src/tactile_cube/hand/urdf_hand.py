@@ -136,12 +136,9 @@ def _principal_axes(axis: Array, inertia: Array) -> Array:
     return np.asarray(frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
 
 
-DESCRIPTIONS = Path(__file__).parent / "descriptions"
-"""URDFs that the package ships."""
-LARGEST_TIP = 0.1
-"""Radius of a fingertip [m]: a ball for a hand."""
-NOMINAL_OBJECT = (0.08, 0.08, 0.08)
-"""That the start angles are for where a description names none [m]."""
+DESCRIPTIONS = Path(__file__).parent / "descriptions"  # URDFs that the package ships
+LARGEST_TIP = 0.1  # radius of a fingertip [m]: a ball for a hand
+NOMINAL_OBJECT = (0.08, 0.08, 0.08)  # that the start angles are for where a description names none [m]
 
 
 def hand_from_urdf(

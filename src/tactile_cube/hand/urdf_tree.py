@@ -26,8 +26,7 @@ from tactile_cube.hand.urdf_elements import (
 from tactile_cube.untrusted_file import below, regular
 
 XACRO = "URDF: it is a xacro file, which other programs turn into a URDF; run xacro first: xacro FILE > robot.urdf"
-UNEXPANDED = re.compile(r"\$[{(]")
-"""What xacro would replace in an attribute."""
+UNEXPANDED = re.compile(r"\$[{(]")  # what xacro would replace in an attribute
 Homes = dict[str, tuple[str, Placement]]
 """The link that each link moves with, itself or the root's included, and where its frame is in that link's."""
 

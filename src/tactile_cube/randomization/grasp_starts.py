@@ -21,8 +21,7 @@ from tactile_cube.simulation import EpisodeConstants, Start
 from tactile_cube.untrusted_file import read_npz
 from tactile_cube.whole_file import write_npz
 
-MOST = 10_000
-"""Start poses; inverse kinematics is solved for each."""
+MOST = 10_000  # start poses; inverse kinematics is solved for each
 
 
 @dataclass(frozen=True)

@@ -124,10 +124,8 @@ class EffectRange:
         return self.effect(self.joint, **{key: float(sample(one, rng)) for key, one in self.parameters.items()})
 
 
-PARTS = 8
-"""Equally likely parts of the range of each constant."""
-RATE = 0.05
-"""Weight of one more episode: a part remembers its last twenty or so."""
+PARTS = 8  # equally likely parts of the range of each constant
+RATE = 0.05  # weight of one more episode: a part remembers its last twenty or so
 
 
 class Learnability:

@@ -108,16 +108,12 @@ class HandDrive:
         return np.stack([rotation.T @ vector for rotation in rotations])
 
 
-LEAST_INERTIA = 1e-3
-"""Reflected inertia below which spin inertia is not lowered further [kg m^2]."""
-TENDON_STIFFNESS = 15.0
-"""Spring that holds q4 at q3 [N m/rad]."""
-TENDON_DAMPING = 0.02
-"""Its damping [N m s/rad]; stable while k dt^2 w + 2 d dt w < 4 with w = (J3 + 4 J4) / (J3 J4)."""
+LEAST_INERTIA = 1e-3  # reflected inertia below which spin inertia is not lowered further [kg m^2]
+TENDON_STIFFNESS = 15.0  # spring that holds q4 at q3 [N m/rad]
+TENDON_DAMPING = 0.02  # its damping [N m s/rad]; stable while k dt^2 w + 2 d dt w < 4 with w = (J3 + 4 J4) / (J3 J4)
 
 
-PARALLEL = 0.99
-"""Cosine of the angle between axes from which on they count as parallel."""
+PARALLEL = 0.99  # cosine of the angle between axes from which on they count as parallel
 
 
 def spin_inertia(hand: Hand, shares: Array, reflected_inertia: Array) -> Array:

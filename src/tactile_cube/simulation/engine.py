@@ -53,8 +53,7 @@ def named_contact(
     return Contact(*first, second[0], middle + 0.5 * distance * normal, normal, distance, force, friction)
 
 
-SKIN_RELAXATION = 5e-3
-"""Damping over stiffness of a fingertip's skin [s]: rubber settles within a few ms."""
+SKIN_RELAXATION = 5e-3  # damping over stiffness of a fingertip's skin [s]: rubber settles within a few ms
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,7 @@ def surfaces(constants: EpisodeConstants) -> dict[str, Surface]:
 
 
 EngineName = Literal["bullet", "mujoco", "mixed"]
-MOST = 100_000
-"""Physics steps of a policy step, and iterations of a physics step."""
+MOST = 100_000  # physics steps of a policy step, and iterations of a physics step
 ENGINES = ("bullet", "mujoco", "mixed")
 _SINGLE: tuple[Literal["bullet", "mujoco"], ...] = ("bullet", "mujoco")
 
@@ -154,8 +152,7 @@ class SimulationOptions:
         return cls(engine, dt=5e-4, substeps=200, solver_iterations=150)
 
 
-OBJECT_STATE = 13
-"""Position (3), quaternion xyzw (4), linear and angular velocity (3 + 3) of the object."""
+OBJECT_STATE = 13  # position (3), quaternion xyzw (4), linear and angular velocity (3 + 3) of the object
 
 
 class Engine(Protocol):

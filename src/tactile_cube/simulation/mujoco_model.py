@@ -14,13 +14,11 @@ from tactile_cube.simulation.constants import Array, EpisodeConstants
 from tactile_cube.simulation.drive import HandDrive
 from tactile_cube.simulation.engine import SKIN_RELAXATION, SimulationOptions, Surface, surfaces
 
-TABLE_HALF_SIZE = (0.25, 0.25, 0.02)
-"""[m]."""
+TABLE_HALF_SIZE = (0.25, 0.25, 0.02)  # [m]
 SOLVER_TOLERANCE = 1e-10
 UNSAID = [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
 """An inertia with products that MuJoCo is to take for none: the moments then hold."""
-RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]
-"""Impedance of tendons and joint stops, as hard as MuJoCo has it."""
+RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]  # impedance of tendons and joint stops, as hard as MuJoCo has it
 
 
 class HandSpec:
@@ -178,15 +176,12 @@ def _six(inertia: Array) -> list[float]:
     return [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
 
 
-IMPRATIO = 100.0
-"""Regularisation of the normal force over that of friction."""
-HARD = 2e-5
-"""Compliance of surfaces that are called hard [m/N]: 3 N sink in by 60 um."""
+IMPRATIO = 100.0  # regularisation of the normal force over that of friction
+HARD = 2e-5  # compliance of surfaces that are called hard [m/N]: 3 N sink in by 60 um
 HARD_RELAXATION = 2e-2
 """Damping over stiffness of hard surfaces [s]. A body overlaps by up to its way in one step before it is met, which the
 spring gives back as speed unless that takes much longer than a step."""
-CONDIM = 4
-"""Normal force, two of lateral friction and a torque against spinning, under one elliptic cone."""
+CONDIM = 4  # normal force, two of lateral friction and a torque against spinning, under one elliptic cone
 LEAST_IMPEDANCE, MOST_IMPEDANCE = 1e-4, 0.9999
 
 

@@ -17,8 +17,7 @@ from tactile_cube.drivetrain.signals import (
     WEIGHT,
 )
 
-DEAD = (0.1, 0.4)
-"""Sizes of a dead zone of the torque at which a search starts, as parts of the usual torque."""
+DEAD = (0.1, 0.4)  # sizes of a dead zone of the torque at which a search starts, as parts of the usual torque
 
 
 class CommandDeadZone(Effect):
@@ -125,10 +124,8 @@ class RateLimit(Effect):
         return s[0]
 
 
-LONGEST = 0.1
-"""Longest delay that the state can hold [s]."""
-STEPS = 50
-"""Least number of steps that the state can hold."""
+LONGEST = 0.1  # longest delay that the state can hold [s]
+STEPS = 50  # least number of steps that the state can hold
 
 
 class CommandDelay(Effect):
@@ -169,8 +166,7 @@ class CommandDelay(Effect):
         return later + (steps - whole) * (earlier - later)
 
 
-CLAMPS = (0.3, 1.0)
-"""Limits at which a search starts, as parts of the torque that the recording usually asks for."""
+CLAMPS = (0.3, 1.0)  # limits at which a search starts, as parts of the torque that the recording usually asks for
 
 
 class IntegralAction(Effect):

@@ -98,8 +98,9 @@ class Recording:
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
         values: Array | None = getattr(self.gains, constant, self.nominal.get(constant))
-        known = values is not None and constant not in self.description.unknown
-        return float(values[self.joints.index(joint)]) if known else None
+        if values is None or constant in self.description.unknown:
+            return None
+        return float(values[self.joints.index(joint)])
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
         """The mechanism.

@@ -21,8 +21,7 @@ from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import whole_file, write_npz, write_whole, written_together
 
 Array = NDArray[np.float64]
-BLOCK = 100_000
-"""Rows of a table that are written at a time: signals may lie on the disk, as those of a log do."""
+BLOCK = 100_000  # rows of a table that are written at a time: signals may lie on the disk, as those of a log do
 
 
 @dataclass(frozen=True)

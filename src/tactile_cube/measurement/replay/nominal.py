@@ -14,8 +14,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, terms_of
 
 Array = NDArray[np.float64]
-STATED = 0.5
-"""Part by which a stated effect may be wrong: damping is copied from one model to the next."""
+STATED = 0.5  # part by which a stated effect may be wrong: damping is copied from one model to the next
 CONTROLLER = ("kp", "kd", "torque_limit")
 TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
 

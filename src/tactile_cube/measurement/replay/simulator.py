@@ -29,8 +29,7 @@ from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Wind
 
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
 DRIVE = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
-MECHANICS = (*TREE_KEYS, "gravity")
-"""What the equations of motion of a path depend on, but for rotors."""
+MECHANICS = (*TREE_KEYS, "gravity")  # what the equations of motion of a path depend on, but for rotors
 
 
 @dataclass(frozen=True)

@@ -116,8 +116,7 @@ class Windows:
         return values.reshape(len(self) * self.segments, -1)
 
 
-ROWS = tuple(field.name for field in fields(Windows))[:16]
-"""Arrays with one row a window."""
+ROWS = tuple(field.name for field in fields(Windows))[:16]  # arrays with one row a window
 
 
 def cut(
