@@ -22,14 +22,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.measurement.recordings import writing
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.deployment.following_robot import (
-    FollowingRobot,
-    Spoil,
-    change,
-    clock,
-    drive,
-    raising,
-)
+from tests.deployment.following_robot import FollowingRobot, Spoil, change, clock, drive, raising
 
 HOME = np.asarray(DLR_HAND2.start_angles)
 OPEN = HOME - 0.1
