@@ -52,10 +52,10 @@ class BoundedSearch(Search):
             return f"{unknown.key}@{self.fitted.joints[unknown.place]}"
         return f"{model.terms[unknown.place].label}.{unknown.key}" if unknown.kind == "effect" else ""
 
-    def numbers(self, model: Model) -> dict[str, Unknown]:
+    def numbers(self, model: Model, bounded: bool = True) -> dict[str, Unknown]:
         """Return what may be changed by name, the fixed numbers among it, within the user's bounds."""
         every = {self.key(one, model): one for one in super().unknowns(model)}
-        return {key: self._bounded(key, one) for key, one in every.items() if key}
+        return {key: self._bounded(key, one) if bounded else one for key, one in every.items() if key}
 
     def unknowns(self, model: Model) -> tuple[Unknown, ...]:
         """Return everything that a refit of the model may change."""
@@ -70,9 +70,8 @@ class BoundedSearch(Search):
     def within_bounds(self, model: Model) -> Model:
         """Return the model with every bounded number within its bounds."""
         for key, unknown in self.numbers(model).items():
-            if key in self.bounds:
-                low, high = self.bounds[key]
-                model = unknown.put(model, min(max(unknown.of(model), low), high))
+            low, high = self.bounds.get(key, (unknown.low, unknown.high))
+            model = unknown.put(model, min(max(unknown.of(model), low), high)) if key in self.bounds else model
         return model
 
     def bound(self, model: Model, key: str, low: float, high: float) -> None:
@@ -81,9 +80,9 @@ class BoundedSearch(Search):
         Raises:
             InputError: no such number, or bounds the wrong way round or outside of what it may be.
         """
-        widest = {self.key(one, model): one for one in super().unknowns(model)}
+        widest = self.numbers(model, bounded=False)
         if key not in widest:
-            raise InputError(f"{key}: no number of the model; it has {', '.join(filter(None, widest))}")
+            raise InputError(f"{key}: no number of the model; it has {', '.join(widest)}")
         if not widest[key].low <= low <= high <= widest[key].high:
             raise InputError(
                 f"{key}: bounds {low:g} to {high:g}; give the smaller one first, both within {widest[key].low:g} to "
@@ -92,7 +91,5 @@ class BoundedSearch(Search):
         self.bounds[key] = low, high
 
     def _bounded(self, key: str, unknown: Unknown) -> Unknown:
-        if key not in self.bounds or self.fixed(key):
-            return unknown
-        low, high = self.bounds[key]
-        return replace(unknown, low=low, high=high)
+        low, high = self.bounds.get(key, (unknown.low, unknown.high))
+        return replace(unknown, low=low, high=high) if low < high else unknown

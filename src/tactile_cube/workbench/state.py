@@ -157,7 +157,6 @@ class Workbench:
         self.untouched = held_out if tested is None else tested
         self.search = BoundedSearch(fitted, held_out, noise_with_links(self.recording), effects, say, self.known)
         self.floor = noise_floor(self.recording)
-        self._kept: tuple[Fit, Fit] | None = None
         self._looks: dict[str, Look] = {}
         self.history: list[tuple[ModelStage, ...]] = []
         self.base = self.search.base
@@ -259,27 +258,25 @@ class Workbench:
             InputError: an unknown effect or joint, or one that the model has.
         """
         stages = self.stages
-        for name in names:
-            for effect, joint in resolve([name], self.recording.joints):
-                label = f"{effect_path(effect)}@{joint}"
-                if label in [term.label for term in stages[-1].model.terms]:
-                    raise InputError(f"{label}: the model has it already")
-                if effect not in self.search.effects:
-                    raise InputError(f"{label}: name it when the workbench starts, own_effects=[{effect_path(effect)}]")
-                self.say(f"refitting with {label}")
-                if stages is self.stages and label in self._looks:
-                    added = self._looks[label].model
-                else:
-                    added = with_effect(self.search, self._frozen(stages[-1].fit), effect, joint).model
-                stages = (*stages, self._refitted(f"+ {label}", added))
+        for effect, joint in (one for name in names for one in resolve([name], self.recording.joints)):
+            label = f"{effect_path(effect)}@{joint}"
+            if label in [term.label for term in stages[-1].model.terms]:
+                raise InputError(f"{label}: the model has it already")
+            if effect not in self.search.effects:
+                raise InputError(f"{label}: name it when the workbench starts, own_effects=[{effect_path(effect)}]")
+            self.say(f"refitting with {label}")
+            if stages is self.stages and label in self._looks:
+                added = self._looks[label].model
+            else:
+                added = with_effect(self.search, self.search.frozen(stages[-1].fit), effect, joint).model
+            stages = (*stages, self._refitted(f"+ {label}", added))
         return self._push(stages)
 
     def adopt(self, found: Found) -> ModelStage:
         """Take the model that a diagnosis recommends, as it is."""
         after, before = [term.label for term in found.fitted.model.terms], self.effects
-        changes = [f"+ {one}" for one in after if one not in before] + [
-            f"- {one}" for one in before if one not in after
-        ]
+        changes = [f"+ {one}" for one in after if one not in before]
+        changes += [f"- {one}" for one in before if one not in after]
         stage = self._stage(" ".join(changes) or REFITTED, found.fitted.fit, final=found.fitted)
         return self._push((*self.stages, stage))
 
@@ -309,9 +306,8 @@ class Workbench:
 
     def values(self, joint: str) -> list[Value]:
         """Return the numbers of the model in force at a joint that a fit may change."""
-        search, model, found = self.search, self.stage.model, []
-        fitted = self.stage.fit
-        widths = {search.key(u, model): w for u, w in zip(fitted.unknowns, self.stage.half_width, strict=True)}
+        search, model, fit, found = self.search, self.stage.model, self.stage.fit, []
+        widths = {search.key(u, model): w for u, w in zip(fit.unknowns, self.stage.half_width, strict=True)}
         for key, unknown in search.numbers(model).items():
             if unknown.kind == "constant":
                 at, unit = self.recording.joints[unknown.place], UNITS[unknown.key]
@@ -319,9 +315,8 @@ class Workbench:
                 term = model.terms[unknown.place]
                 at, unit = term.joint, next(p.unit for p in term.effect.parameters if p.name == unknown.key)
             if at == joint:
-                value, low, high = unknown.of(model), unknown.low, unknown.high
-                width = 0.0 if search.fixed(key) else widths.get(key, 0.0)
-                interval = (max(value - width, low), min(value + width, high)) if width else None
+                value, width = unknown.of(model), 0.0 if search.fixed(key) else widths.get(key, 0.0)
+                interval = (max(value - width, unknown.low), min(value + width, unknown.high)) if width else None
                 unit = of_joint(unit, self.recording.units[joint])
                 found.append(Value(key, value, interval, unit, unknown, search.fixed(key)))
         return found
@@ -337,8 +332,7 @@ class Workbench:
             raise InputError(f"{key}: no number of the model; it has {', '.join(known)}")
         model = known[key].put(self.stage.fit.model, value)
         stage = self._stage(BY_HAND, replace(self.stage.fit, model=model), fitted=False)
-        stages = self.stages[:-1] if self.stage.label == BY_HAND else self.stages
-        return self._push((*stages, stage))
+        return self._push((*(self.stages[:-1] if self.stage.label == BY_HAND else self.stages), stage))
 
     def bound(self, key: str, low: float, high: float) -> None:
         """Keep a number within bounds at every refit from now on; both alike fix it.
@@ -426,14 +420,6 @@ class Workbench:
         """Errors of free runs of the untouched trials [rad], and of their segments over the sensor noise."""
         errors, over_noise = test_errors(self.search, self.untouched, {"": model}, USUAL_STEP)
         return errors[""], over_noise[""]
-
-    def _frozen(self, fit: Fit) -> Fit:
-        """A fit with its derivatives, which several refits take alike."""
-        if self._kept is not None and self._kept[0] is fit:
-            self.search.problem.linearise_starts(fit.model)
-        else:
-            self._kept = fit, self.search.frozen(fit)
-        return self._kept[1]
 
     def _as_torque(self, joint: str, residual: Array) -> Missing:
         search, model = self.search, self.stage.judgement.model
