@@ -177,7 +177,7 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     window.get_by_label("where it fails").select_option(index=1)
     picture(window, "4_zoomed")
     window.get_by_role("button", name="Propose").click()
-    window.get_by_text("times what decides").wait_for()
+    window.get_by_text("times the evidence needed").wait_for()
     with window.expect_download() as download:
         window.get_by_role("link", name="Download CSV").click()
     assert Path(download.value.path()).read_text().startswith("time,a.command\n")

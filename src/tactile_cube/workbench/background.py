@@ -29,21 +29,13 @@ LOOK = 2.0  # [s] between two looks at the clock while it says nothing
 
 
 class Found(NamedTuple):
-    """What a diagnosis answered.
+    """What a diagnosis answered."""
 
-    Attributes:
-        text: in plain words.
-        effects: what is missing, NAME@JOINT; of sets that do as well the first; where not all was found, that part.
-        fitted: the model that it recommends.
-        over_noise: error of its segments of untouched trials, in units of the sensor noise.
-        left_out: whether it masked intervals of the trials, so that its errors are of fewer samples than others.
-    """
-
-    text: str
-    effects: list[str]
-    fitted: Fitted
-    over_noise: float
-    left_out: bool
+    text: str  # in plain words
+    effects: list[str]  # what is missing, NAME@JOINT; of sets that do as well the first; a part where not all was found
+    fitted: Fitted  # the model that it recommends
+    over_noise: float  # error of its segments of untouched trials, in units of the sensor noise
+    left_out: bool  # whether it masked intervals of trials: its errors are of fewer samples than others
 
 
 class Diagnosing:

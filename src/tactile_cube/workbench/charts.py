@@ -6,17 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from bokeh import models
 from bokeh.events import Tap
-from bokeh.models import (
-    BoxAnnotation,
-    ColumnDataSource,
-    CrosshairTool,
-    DataRange1d,
-    GlyphRenderer,
-    HoverTool,
-    Range1d,
-    Span,
-)
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
@@ -31,6 +22,7 @@ from tactile_cube.workbench.missing_torque import curve
 from tactile_cube.workbench.text import label, plain
 
 Array = NDArray[np.float64]
+Points = Sequence[Any] | Array
 TOOLS = "xpan,xwheel_zoom,box_zoom,reset,save"
 POINTS, DRAWN = 1500, 20_000  # samples of the missing torque, and of a trial, that are drawn at most
 CONTEXT = 0.5  # [s] shown on either side of a failing interval
@@ -41,6 +33,7 @@ def _figure(height: int, x: str, y: str, tools: str = TOOLS, **more: object) -> 
     made = figure(height=height, sizing_mode="stretch_width", tools=tools, **more)
     label(made.xaxis[0], x)
     label(made.yaxis[0], y)
+    made.yaxis.formatter = models.PrintfTickFormatter(format="%.4g")
     made.toolbar.logo = None
     made.grid.grid_line_color = GRID
     made.outline_line_color = None
@@ -48,10 +41,10 @@ def _figure(height: int, x: str, y: str, tools: str = TOOLS, **more: object) -> 
     return made
 
 
-def _line(made: figure, name: str, color: str, kind: str = "line", **more: Any) -> GlyphRenderer:
+def _line(made: figure, name: str, color: str, kind: str = "line", **more: Any) -> models.GlyphRenderer:
     """A line, or several, without data; `name` stands in the legend."""
-    drawn: GlyphRenderer = getattr(made, kind)(
-        "x", "y", source=ColumnDataSource({"x": [], "y": []}), color=color, legend_label=plain(name), **more
+    drawn: models.GlyphRenderer = getattr(made, kind)(
+        "x", "y", source=models.ColumnDataSource({"x": [], "y": []}), color=color, legend_label=plain(name), **more
     )
     return drawn
 
@@ -61,7 +54,9 @@ def _legend_above(made: figure) -> None:
     made.legend[0].update(orientation="horizontal", click_policy="hide", border_line_color=None)
 
 
-def _draw(made: figure, line: GlyphRenderer, x: Sequence[Any] | Array = (), y: Sequence[Any] | Array = ()) -> None:
+def _draw(
+    made: figure, line: models.GlyphRenderer, x: Sequence[Any] | Array = (), y: Sequence[Any] | Array = ()
+) -> None:
     """Give a line its data, and the legend an entry only where something of it is drawn."""
     line.data_source.data = {"x": x, "y": y}
     for item in made.legend[0].items if made.legend else []:
@@ -73,14 +68,14 @@ class TimeChart:
     """The error over time with the noise band and the failing intervals; below it positions, and commanded torques."""
 
     def __init__(self) -> None:
-        self.x = Range1d(0.0, 1.0)
+        self.x = models.Range1d(0.0, 1.0)
         # the window of time decides what is shown of the other axis
         self.error, self.angle, self.command = self.figures = tuple(
-            _figure(height, axis, "", y_range=DataRange1d(), x_range=self.x, window_axis="x")
+            _figure(height, axis, "", y_range=models.DataRange1d(), x_range=self.x, window_axis="x")
             for height, axis in ((240, ""), (220, "time [s]"), (140, "time [s]"))
         )
         self.played = _line(self.angle, "command", FLOOR, line_dash="dotted", line_width=1.5)
-        self.asked = self.command.line("x", "y", source=ColumnDataSource({"x": [], "y": []}), color=FLOOR)
+        self.asked = self.command.line("x", "y", source=models.ColumnDataSource({"x": [], "y": []}), color=FLOOR)
         self.others = _line(self.error, "other trials", FLOOR, "multi_line", alpha=0.5)
         self.measured = _line(self.angle, "measured", MEASURED, line_width=1.5)
         self.models = [
@@ -93,16 +88,16 @@ class TimeChart:
                 ("model", SIMULATED, ERROR, "solid"),
             )
         ]
-        self.failing = ColumnDataSource({"x0": [], "x1": []})
-        cursor = Span(dimension="height", line_color=FLOOR, line_dash="dotted")
+        self.failing = models.ColumnDataSource({"x0": [], "x1": []})
+        cursor = models.Span(dimension="height", line_color=FLOOR, line_dash="dotted")
         for made, line in zip(self.figures, (self.models[1][1], self.measured, self.asked), strict=True):
-            hover = HoverTool(
+            hover = models.HoverTool(
                 renderers=[line], mode="vline", tooltips=[("time", "@x{0.000} s"), ("here", "@y{0.0000}")]
             )
-            made.add_tools(CrosshairTool(overlay=cursor, dimensions="height"), hover)
+            made.add_tools(models.CrosshairTool(overlay=cursor, dimensions="height"), hover)
             made.on_event(Tap, self._zoom_into)
             made.vstrip(x0="x0", x1="x1", source=self.failing, fill_color=FAILING, line_color=None, level="underlay")
-        self.band = BoxAnnotation(fill_color=FLOOR, fill_alpha=0.2, level="underlay")
+        self.band = models.BoxAnnotation(fill_color=FLOOR, fill_alpha=0.2, level="underlay")
         self.error.add_layout(self.band)
         _legend_above(self.error)
         _legend_above(self.angle)
@@ -112,14 +107,7 @@ class TimeChart:
     def show(
         self, compared: Comparison, joint: int, beside: Array | None, others: Sequence[tuple[Trial, Array]] = ()
     ) -> None:
-        """Draw one trial of a comparison.
-
-        Args:
-            compared: the model beside one trial.
-            joint: which.
-            beside: (n, joints) of another model.
-            others: trials whose errors are drawn over it, with their simulated positions.
-        """
+        """Draw a joint of a model beside one trial, another model's positions (n, joints), errors of other trials."""
         recording, trial = compared.recording, compared.recording.trials[0]
         name = recording.joints[joint]
         if self._trial is not trial:
@@ -173,14 +161,19 @@ def _rows(trial: Trial) -> slice:
     return slice(None, None, 1 + len(trial.time) // DRAWN)
 
 
+def named(signal: str, units: Mapping[str, str]) -> tuple[str, float]:
+    """A signal's label in the unit in which its joint is shown, and what its values are to be multiplied by."""
+    return shown(signal, next((unit for joint, unit in units.items() if f" of {joint} [" in signal), TURNS))
+
+
 class MissingChart:
     """The torque that the model lacks over a signal: its mean with an interval, and what a candidate would supply."""
 
     def __init__(self) -> None:
-        self.y = Range1d()
+        self.y = models.Range1d()
         self.figure = drawn = _figure(280, "", "missing torque", "pan,wheel_zoom,box_zoom,reset,save", y_range=self.y)
         self.points = _line(drawn, "missing", FLOOR, "scatter", size=2, alpha=0.25)
-        self.band = ColumnDataSource({"x": [], "low": [], "high": []})
+        self.band = models.ColumnDataSource({"x": [], "low": [], "high": []})
         drawn.varea("x", "low", "high", source=self.band, fill_color=MEASURED, fill_alpha=0.2, legend_label="95 %")
         self.mean = _line(drawn, "its mean", MEASURED, line_width=2.5)
         self.supplied = _line(drawn, "candidate", BEFORE, line_width=2.5, line_dash="dashed")
@@ -188,7 +181,7 @@ class MissingChart:
 
     def show(self, missing: Missing, signal: str, law: Missing | None, units: Mapping[str, str]) -> None:
         """Draw it over one of its signals; `units`: joint -> unit in which its position is shown."""
-        x, size = shown(signal, next((unit for joint, unit in units.items() if f" of {joint} [" in signal), TURNS))
+        x, size = named(signal, units)
         label(self.figure.xaxis[0], x)
         lacks, _ = shown("missing torque [N m]", units[missing.joint])
         label(self.figure.yaxis[0], lacks.replace("torque", "force") if lacks.endswith("[N]") else lacks)
@@ -208,18 +201,19 @@ class ExperimentChart:
     """A proposed command beside the limits of the machine."""
 
     def __init__(self) -> None:
-        self.range = Range1d()
+        self.range = models.Range1d()
         self.figure = _figure(220, "time [s]", "command", y_range=self.range)
 
     def show(self, experiment: Experiment, units: Sequence[str]) -> None:
         """Draw the commands of all joints as their file has them, and what the limits allow as dashed lines."""
-        self.figure.renderers, self.figure.center = [], [one for one in self.figure.center if not isinstance(one, Span)]
-        label(self.figure.yaxis[0], f"command [{' or '.join(dict.fromkeys(units))}]")
+        drawn = self.figure
+        drawn.renderers, drawn.center = [], [one for one in drawn.center if not isinstance(one, models.Span)]
+        label(drawn.yaxis[0], f"command [{' or '.join(dict.fromkeys(units))}]")
         allowed = experiment.safety.allowed
         low, high = float(allowed.low.min()), float(allowed.high.max())
         self.range.update(start=low - 0.1 * (high - low), end=high + 0.1 * (high - low))
         for j, joint in enumerate(experiment.joints):
             color = PALETTE[j % len(PALETTE)]
-            self.figure.line(experiment.time, experiment.commands[:, j], color=color, legend_label=plain(joint))
+            drawn.line(experiment.time, experiment.commands[:, j], color=color, legend_label=plain(joint))
             for bound in (allowed.low[j], allowed.high[j]):
-                self.figure.add_layout(Span(location=bound, dimension="width", line_color=color, line_dash="dashed"))
+                drawn.add_layout(models.Span(location=bound, dimension="width", line_color=color, line_dash="dashed"))

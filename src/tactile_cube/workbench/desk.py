@@ -28,41 +28,29 @@ LABEL = 60  # characters of a wrong name that an error repeats
 
 
 class Desk:
-    """One state and one worker for all windows.
-
-    Attributes:
-        bench: the state; None until a recording is loaded.
-        version: grows with every change of the model or the recording.
-        busy: what is being done, in words.
-        problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
-        waiting: files that wait to be imported; `preview`: what is in the first.
-        looks: a look at the candidates, joint -> best first, those that look alike together, of this version.
-        explainable: joint -> part of the missing torque that any law could explain, of this version.
-        chosen: the candidate looked at, NAME@JOINT; `signature`: the torque that it would supply; `promised`: the error
-            over noise that it would leave.
-        diagnosing: the diagnosis that runs or ran last; `outcome`: how it ended, empty while it runs.
-        experiment: proposed; `commands`: its file as text.
-    """
+    """One state and one worker for all windows."""
 
     def __init__(self, folder: Path, own_effects: Sequence[str] = (), seed: int = 0, model: str | None = None) -> None:
         self.folder, self.own_effects, self.seed, self.model = folder, tuple(own_effects), seed, model
-        self.bench: Workbench | None = None
-        self.version, self.ended = 0, False
-        self.busy = self.problem = self.commands = self.outcome = ""
-        self.notes: list[str] = []
-        self.waiting = Waiting()
-        self.preview: Preview | None = None
-        self.diagnosing: Diagnosing | None = None
+        self.bench: Workbench | None = None  # until a recording is loaded
+        self.version, self.ended = 0, False  # version grows with every change of the model or the recording
+        self.busy = self.problem = ""  # what is being done, and what went wrong last, in words
+        self.notes: list[str] = []  # what was understood and what is odd, a line each
+        self.waiting = Waiting()  # files that wait to be imported
+        self.preview: Preview | None = None  # of the first
+        self.diagnosing: Diagnosing | None = None  # that runs or ran last
+        self.outcome = self.commands = ""  # how it ended, empty while it runs; the proposed experiment's file as text
         self.listeners: list[Callable[[], None]] = []
         self._worker, self._queued = ThreadPoolExecutor(1), 0
         self._forget()
 
     def _forget(self) -> None:
-        self.looks: dict[str, list[list[Look]]] = {}
-        self.explainable: dict[str, float] = {}
-        self.chosen, self.promised = "", 0.0
-        self.signature: Missing | None = None
-        self.experiment: Experiment | None = None
+        """What was seen beside a model that is no longer in force."""
+        self.looks: dict[str, list[list[Look]]] = {}  # joint -> candidates, best first, those that look alike together
+        self.explainable: dict[str, float] = {}  # joint -> part of the missing torque that any law could explain
+        self.chosen, self.promised = "", 0.0  # candidate looked at, NAME@JOINT; error over noise that it would leave
+        self.signature: Missing | None = None  # the torque that it would supply
+        self.experiment: Experiment | None = None  # proposed
 
     def changed(self) -> None:
         """Tell every window."""
@@ -159,10 +147,8 @@ class Desk:
     def import_waiting(self, typed: dict[str, str], columns: dict[str, Any], together: bool = False) -> None:
         """Import the logs that wait and load what they make; they wait on where something is wrong.
 
-        Args:
-            typed: settings of `record source=csv`, as typed: "controller.kp", "read", ...
-            columns: as `source.columns`; none: as guessed.
-            together: with the trials of the recording that is loaded, if the URDF is its own.
+        `typed`: settings of `record source=csv` such as "controller.kp"; `columns`: as `source.columns`, none: as
+        guessed; `together`: with the trials of the recording that is loaded, if the URDF is its own.
         """
         waiting, before = self.waiting, self.same_rig if together else None
 
@@ -282,11 +268,6 @@ class Desk:
 
 
 def _path(text: str) -> Path:
-    """What somebody typed, as a path.
-
-    Raises:
-        InputError: no file can have this name.
-    """
     try:
         path = Path(text.strip()).expanduser()
         path.lstat()

@@ -7,17 +7,10 @@ from typing import Any
 
 from bokeh.models import Row, SVGIcon, Toggle
 
+from tactile_cube.measurement.sources import units
 from tactile_cube.measurement.sources.column_map import NEEDED
 from tactile_cube.measurement.sources.lever import ROBOTS
 from tactile_cube.measurement.sources.servo import servos
-from tactile_cube.measurement.sources.units import (
-    ANGLE_UNITS,
-    LENGTH_UNITS,
-    RANGE,
-    TIME_UNITS,
-    TORQUE_UNITS,
-    USUAL_TICKS,
-)
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import Preview
 from tactile_cube.workbench.tables import CELL, HEAD, ROW, TABLE
@@ -40,8 +33,8 @@ MORE = {
     "length": "cut into trials of [s]", "initialisation": "initialisation of each file",
 }  # fmt: skip
 UNITS = {
-    "time_unit": [*TIME_UNITS], "angle_unit": [*ANGLE_UNITS, RANGE, str(USUAL_TICKS)],
-    "length_unit": [*LENGTH_UNITS], "torque_unit": [*TORQUE_UNITS],
+    "time_unit": [*units.TIME_UNITS], "angle_unit": [*units.ANGLE_UNITS, units.RANGE, str(units.USUAL_TICKS)],
+    "length_unit": [*units.LENGTH_UNITS], "torque_unit": [*units.TORQUE_UNITS],
 }  # fmt: skip
 ICON = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 48 48" fill="none" stroke="#000" stroke-width="3">{}</svg>'
 ICONS = {
@@ -52,11 +45,7 @@ ICONS = {
 
 
 class ImportForm:
-    """What waits to be imported, and everything that may be said of it.
-
-    Attributes:
-        whole: its widgets.
-    """
+    """What waits to be imported, and everything that may be said of it; `whole` has all widgets."""
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
@@ -79,7 +68,7 @@ class ImportForm:
         self.servo = select("servo", NONE, *servos(), width=110)
         self.read = select("a position is read", BEFORE, "after", width=170)
         self.units = {
-            key: select(f"{key.removesuffix('_unit')} in", AUTO, *units, width=150) for key, units in UNITS.items()
+            key: select(f"{key.removesuffix('_unit')} in", AUTO, *known, width=150) for key, known in UNITS.items()
         }
         self.before = select("trials of this recording", TOGETHER, ALONE, width=200)
         more = Toggle(label="More: units, drive, trials", width=200, align="end")

@@ -19,12 +19,7 @@ from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.writing import (
-    RecordingTables,
-    TrialTable,
-    require_free,
-    write_recordings,
-)
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, require_free, write_recordings
 from tactile_cube.measurement.sources.column_map import map_columns
 from tactile_cube.measurement.sources.csv_files import kinds_of
 from tactile_cube.measurement.sources.lever import Lever
@@ -47,43 +42,26 @@ WORDS = ("servo", "controller.mode", "read", "time_unit", "angle_unit", "length_
 
 @dataclass(frozen=True)
 class Preview:
-    """What is in a log.
-
-    Attributes:
-        columns: their names; `rows`: the first ones.
-        guess: `time`, and each joint that may be actuated -> signal -> column, "" where names leave it open.
-        doubt: what they leave open.
-        mode: of the controller, `free` without a column of commands.
-    """
+    """What is in a log."""
 
     columns: list[str]
-    rows: list[list[float]]
-    guess: dict[str, dict[str, str]]
-    doubt: str
-    mode: str = "position"
+    rows: list[list[float]]  # the first ones
+    guess: dict[str, dict[str, str]]  # `time`, and each joint that may be actuated -> signal -> column, "" where open
+    doubt: str  # what the names leave open
+    mode: str = "position"  # of the controller, `free` without a column of commands
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """What waits to be imported.
+    """What waits to be imported."""
 
-    Attributes:
-        logs: files, or folders of LeRobot.
-        urdf: of their rig; `robot`: pendulum, wheel or slide in its place.
-        calibration: LeRobot's, of the arm.
-    """
-
-    logs: tuple[Path, ...] = ()
-    urdf: Path | None = None
-    robot: str | None = None
-    calibration: Path | None = None
+    logs: tuple[Path, ...] = ()  # files, or folders of LeRobot
+    urdf: Path | None = None  # of their rig
+    robot: str | None = None  # pendulum, wheel or slide in its place
+    calibration: Path | None = None  # LeRobot's, of the arm
 
     def with_files(self, files: Sequence[Path]) -> Waiting:
-        """Return it with more files, each by what it is; new logs take the place of old ones.
-
-        Raises:
-            InputError: a file that is none of these.
-        """
+        """Return it with more files, each by what it is; new logs take the place of old ones."""
         of = {kind: [file for file in files if kind_of(file) == kind] for kind in ("log", "rig", "calibration")}
         changed = replace(
             self,
@@ -106,11 +84,7 @@ class Waiting:
 
     @as_input_errors
     def preview(self) -> Preview | None:
-        """Return what the first log holds and which column seems to be what; None: something is still needed.
-
-        Raises:
-            InputError: a file that cannot be read.
-        """
+        """Return what the first log holds and which column seems to be what; None: something is still needed."""
         if self.lacks:
             return None
         table = read_logs(self.logs[0])[0].table
@@ -132,11 +106,7 @@ class Waiting:
 
 
 def kept(folder: Path, name: str, content: bytes) -> Path:
-    """Write a file that a browser handed over and return its path; of its name only the last part counts.
-
-    Raises:
-        InputError: it is too large, neither a log nor a URDF, or has a name that no file can have here.
-    """
+    """Write a log or URDF that a browser handed over and return its path; of its name only the last part counts."""
     name = Path(name.replace("\\", "/")).name
     if not name.isprintable() or len(os.fsencode(name)) > NAME:
         raise InputError(f"{name[:NAME]!r}: no name of a file here; give it one of at most {NAME} printable characters")
@@ -150,11 +120,7 @@ def kept(folder: Path, name: str, content: bytes) -> Path:
 
 
 def kind_of(file: Path) -> str:
-    """Return what a file is: log, rig, calibration, or what LeRobot says of its columns (description).
-
-    Raises:
-        InputError: none of these; for a bag with the command that imports it.
-    """
+    """Return what a file is: log, rig, calibration, or what LeRobot says of its columns (description)."""
     if (file / LEROBOT).is_file():
         return "log"
     _require_known(file)
@@ -187,9 +153,6 @@ def settings_of(typed: Mapping[str, str]) -> dict[str, Any]:
     Example:
         >>> settings_of({"controller.kp": "25, 12", "read": "after", "initialisation": "0"})
         {'controller': {'kp': [25.0, 12.0]}, 'read': 'after', 'initialisation': [0]}
-
-    Raises:
-        InputError: a text that is no number, or for a key that needs one several.
     """
     settings: dict[str, Any] = {}
     for key, text in typed.items():
@@ -200,11 +163,7 @@ def settings_of(typed: Mapping[str, str]) -> dict[str, Any]:
 
 
 def number(key: str, text: str) -> float:
-    """Return what somebody typed as a number.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Return what somebody typed as a number; `key` names it where it is none."""
     try:
         return float(text)
     except ValueError:
@@ -224,16 +183,13 @@ def _numbers(key: str, text: str) -> float | int | list[float] | list[int]:
 
 @as_input_errors
 def import_logs(out: Path, given: Mapping[str, Any], before: Recording | None = None) -> tuple[Recording, list[str]]:
-    """Write logs as a recording, as `record source=csv` does, and read it back.
+    """Write logs as a recording, as `record source=csv` does; return it and what was understood, a line each.
 
     Args:
         out: folder to write.
         given: settings of `record source=csv`.
         before: a recording of the same rig to whose trials they are added, as trials of one more initialisation. Where
             `given` says nothing of the controller its gains hold; what its owner believes stays.
-
-    Returns:
-        The recording, and what was understood and what is odd, a line each.
 
     Raises:
         InputError: what cannot be used: file, column or row, the value, what to do.

@@ -5,23 +5,15 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable
 
+from bokeh import models
 from bokeh.document import Document
-from bokeh.models import (
-    CheckboxGroup,
-    FileInput,
-    LayoutDOM,
-    Model,
-    MultiSelect,
-    PrintfTickFormatter,
-    RadioGroup,
-    Slider,
-)
 from tornado.ioloop import IOLoop
 
+from tactile_cube.identification.in_words import next_steps
 from tactile_cube.measurement.replay.model import effect_path
 from tactile_cube.measurement.units import milli
 from tactile_cube.visualization.charts import SIMULATED
-from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart
+from tactile_cube.workbench.charts import ExperimentChart, MissingChart, TimeChart, named
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.import_form import ImportForm
 from tactile_cube.workbench.importing import LOGS, RIGS, number
@@ -29,18 +21,8 @@ from tactile_cube.workbench.missing_torque import signals
 from tactile_cube.workbench.parameters import Value
 from tactile_cube.workbench.state import Look, Workbench
 from tactile_cube.workbench.tables import FOLDED, card, error_by_stage, error_of_trial, over_noise
-from tactile_cube.workbench.text import LABEL, Html, choose, choose_several, html, listed, plain, show
-from tactile_cube.workbench.widgets import (
-    NONE,
-    RED,
-    YELLOW,
-    button,
-    column_of,
-    field,
-    row_of,
-    select,
-    text_of,
-)
+from tactile_cube.workbench.text import LABEL, Html, choose, html, listed, plain, show
+from tactile_cube.workbench.widgets import NONE, RED, YELLOW, button, column_of, field, row_of, select, text_of
 
 SLIDERS = 12  # of one joint; laws with more numbers are profiles, which nobody sets by hand
 MOST = 20  # failing intervals, the worst
@@ -79,7 +61,7 @@ class Page:
         document.on_session_destroyed(lambda context: desk.listeners.remove(listener))
         self.refresh()
 
-    def _when(self, widget: Model, work: Callable[[], object], what: str = "value") -> None:
+    def _when(self, widget: models.Model, work: Callable[[], object], what: str = "value") -> None:
         """Do something, and show what came of it, when somebody changes a widget."""
 
         def changed(attr: str, old: object, new: object) -> None:
@@ -97,9 +79,9 @@ class Page:
 
     # What stands where
 
-    def _open_part(self) -> LayoutDOM:
+    def _open_part(self) -> models.LayoutDOM:
         path = field("Folder of a recording, logs (*.csv), URDF or model.yaml", 460)
-        files = FileInput(accept=",".join((*LOGS, *RIGS)), multiple=True, title="or drop files anywhere")
+        files = models.FileInput(accept=",".join((*LOGS, *RIGS)), multiple=True, title="or drop files anywhere")
 
         def take() -> None:
             if files.filename and files.value:
@@ -109,25 +91,25 @@ class Page:
         files.on_change("value", lambda attr, old, new: self.document.add_next_tick_callback(take))
         return row_of(path, button("Open", lambda: self.desk.open(path.value)), files, name="open")
 
-    def _compare_part(self) -> LayoutDOM:
+    def _compare_part(self) -> models.LayoutDOM:
         self.time, self.sentences = TimeChart(), text_of()
         self.trial, self.joint = select("trial"), select("joint", width=90)
         self.other, self.where = select("beside", NONE), select("where it fails", NONE)
-        self.over = MultiSelect(title="errors of other trials", size=3, width=190)
+        self.over = models.MultiSelect(title="errors of other trials", size=3, width=190)
         for one in (self.trial, self.joint, self.other, self.over):
             self._when(one, lambda: None)
         self._when(self.where, self._zoom)
         choices = row_of(self.trial, self.joint, self.other, self.where, self.over)
         return column_of(choices, *self.time.figures, self.sentences)
 
-    def _missing_part(self) -> LayoutDOM:
+    def _missing_part(self) -> models.LayoutDOM:
         self.missing, self.signal = MissingChart(), select("over", width=300)
         self._when(self.signal, lambda: None)
         return column_of(self.signal, self.missing.figure)
 
-    def _candidates_part(self) -> LayoutDOM:
+    def _candidates_part(self) -> models.LayoutDOM:
         self.looks: list[Look] = []
-        self.ranked = RadioGroup(labels=[], sizing_mode="stretch_width")
+        self.ranked = models.RadioGroup(labels=[], sizing_mode="stretch_width")
         self.another = select("another effect", width=260)
         self._when(self.ranked, self._look_closer, "active")
         self._when(self.another, lambda: self.another.value == NONE or self.ranked.update(active=None))
@@ -135,33 +117,33 @@ class Page:
         add = button("Add and refit", self._add, "primary")
         return column_of(self.ranked, row_of(self.another, add), self.card, self.unseen)
 
-    def _diagnosis_part(self) -> LayoutDOM:
+    def _diagnosis_part(self) -> models.LayoutDOM:
         self.start = button("Diagnose", lambda: (self.desk.stop if self.desk.running else self.desk.diagnose)())
         self.accept = button("Add what it found", self._accept, "primary")
         self.progress = text_of()
         return column_of(row_of(self.start, self.accept), self.progress)
 
-    def _stages_part(self) -> LayoutDOM:
+    def _stages_part(self) -> models.LayoutDOM:
         self.stairs = text_of()
         return column_of(self.stairs, row_of(button("Undo", lambda: self.desk.change("undo", Workbench.undo))))
 
-    def _values_part(self) -> LayoutDOM:
+    def _values_part(self) -> models.LayoutDOM:
         self.values: dict[str, Value] = {}
         self.sliders, self.number = column_of(), select("number", width=200)
         self._when(self.number, self._show_number)
         self.typed = [field(title, 90) for title in ("value", "at least", "at most")]
-        self.fixed = CheckboxGroup(labels=["fixed"], width=70, align="end")
+        self.fixed = models.CheckboxGroup(labels=["fixed"], width=70, align="end")
         self.present = select("effects of the model", width=260)
         self.remove = button("Remove and refit", self._remove)
         typed = (self.number, *self.typed, self.fixed, button("Set", self._set_typed))
         refit = button("Refit", lambda: self.desk.change("refitting", Workbench.refit))
         return column_of(self.sliders, row_of(*typed, refit), row_of(self.present, self.remove))
 
-    def _next_part(self) -> LayoutDOM:
+    def _next_part(self) -> models.LayoutDOM:
         self.experiment, self.proposal = ExperimentChart(), text_of()
         return column_of(row_of(button("Propose", self.desk.propose)), self.proposal, self.experiment.figure)
 
-    def _save_part(self) -> LayoutDOM:
+    def _save_part(self) -> models.LayoutDOM:
         folder = field("folder", 300, value=str(self.desk.folder / "model"))
         return row_of(folder, button("Save", lambda: self.desk.save(folder.value)))
 
@@ -261,7 +243,9 @@ class Page:
             self._show_candidates(bench, joint)
         law = desk.signature if desk.signature is not None and desk.signature.joint == joint else None
         if self._new("signals", desk.version, joint, chosen):
-            choose(self.signal, signals(bench.missing(joint)), signals(law)[0] if law else "")
+            units = bench.recording.shown
+            offered = [(signal, named(signal, units)[0]) for signal in signals(bench.missing(joint))]
+            choose(self.signal, offered, signals(law)[0] if law else "")
         if self._new("missing", desk.version, joint, chosen, self.signal.value):
             self.missing.show(bench.missing(joint), self.signal.value, law, bench.recording.shown)
         if self._new("card", desk.version, joint, chosen, self.candidate):
@@ -304,7 +288,7 @@ class Page:
         choose(self.trial, [(name, f"{name} (never fitted)") for name in trials] + [(name, name) for name in others])
         joints = bench.recording.joints
         choose(self.joint, joints, "" if self.joint.value else joints[-1])
-        choose_several(self.over, [*trials, *others])
+        choose(self.over, [*trials, *others])
         choose(self.other, [NONE, *(f"{k}: {one.label}" for k, one in enumerate(bench.stages[:-1]))])
         choose(self.present, bench.effects)
         self.remove.disabled = not bench.effects
@@ -361,15 +345,15 @@ class Page:
             ]
         show(self.card, card(self.candidate, *lines) if self.candidate else "")
 
-    def _slider(self, one: Value) -> Slider:
+    def _slider(self, one: Value) -> models.Slider:
         name = one.key.replace(f"@{self.joint.value}", "")
         found = "" if one.interval is None else f" in [{one.interval[0]:.4g}, {one.interval[1]:.4g}]"
         found = " fixed" if one.fixed else found
         low, high = one.unknown.low, one.unknown.high
-        slider = Slider(
+        slider = models.Slider(
             start=low, end=high, value=one.value, step=(high - low) / 1000, sizing_mode="stretch_width",
             title=plain(f"{name} [{one.unit}]: {one.value:.4g}{found}; now", 3 * LABEL),
-            format=PrintfTickFormatter(format="%.4g"),
+            format=models.PrintfTickFormatter(format="%.4g"),
         )  # fmt: skip
         slider.on_change("value", lambda attr, old, new: self._move(one, new))
         slider.on_change("value_throttled", lambda attr, old, new: self._set(one, new))
@@ -388,9 +372,6 @@ class Page:
         if proposed is None:
             show(self.proposal)
             return
-        safety = "keeps to the limits" if proposed.safety.safe else "would LEAVE the limits, do not play it"
-        worth = f"evidence expected: {proposed.told:.3g} times what decides" if proposed.decides else "decides nothing"
-        pair = " and ".join(proposed.predictions) or "the models"
-        line = f"{proposed.name}, {proposed.time[-1]:.1f} s, to tell {pair} apart: {worth}; {safety} (dashed)"
-        show(self.proposal, listed([line]), DOWNLOAD if proposed.decides else "")
+        said = next_steps(proposed, bench.recording.units)
+        show(self.proposal, listed(said), DOWNLOAD if proposed.decides else "")
         self.experiment.show(proposed, list(bench.recording.units.values()))

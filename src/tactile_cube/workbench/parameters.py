@@ -15,35 +15,21 @@ Bounds = tuple[float, float]
 
 @dataclass(frozen=True)
 class Value:
-    """A number of the model that a fit may change.
+    """A number of the model that a fit may change."""
 
-    Attributes:
-        key: `CONSTANT@JOINT` or `NAME@JOINT.PARAMETER`.
-        value: in the model in force.
-        interval: its 95 % interval within the bounds; None where it was set by hand or not fitted.
-        unit: SI unit.
-        unknown: its bounds; `put` gives a model, which `simulate` takes, with another value.
-        fixed: whether refits leave it as it is.
-    """
-
-    key: str
-    value: float
-    interval: Bounds | None
-    unit: str
-    unknown: Unknown
-    fixed: bool
+    key: str  # `CONSTANT@JOINT` or `NAME@JOINT.PARAMETER`
+    value: float  # in the model in force
+    interval: Bounds | None  # 95 %, within the bounds; None where it was set by hand or not fitted
+    unit: str  # SI
+    unknown: Unknown  # its bounds; `put` gives a model, which `simulate` takes, with another value
+    fixed: bool  # whether refits leave it as it is
 
 
 class BoundedSearch(Search):
-    """A search whose refits keep to the user's bounds.
-
-    Attributes:
-        bounds: key of a number -> smallest and largest value; both alike: it is fixed.
-    """
+    """A search whose refits keep to the user's bounds; arguments are those of `Search`."""
 
     def __init__(self, *given: Any, **more: Any) -> None:
-        """Begin without any; arguments are those of `Search`."""
-        self.bounds: dict[str, Bounds] = {}
+        self.bounds: dict[str, Bounds] = {}  # key of a number -> smallest and largest value; both alike: it is fixed
         super().__init__(*given, **more)
 
     def key(self, unknown: Unknown, model: Model) -> str:
@@ -71,15 +57,11 @@ class BoundedSearch(Search):
         """Return the model with every bounded number within its bounds."""
         for key, unknown in self.numbers(model).items():
             low, high = self.bounds.get(key, (unknown.low, unknown.high))
-            model = unknown.put(model, min(max(unknown.of(model), low), high)) if key in self.bounds else model
+            model = replace(unknown, low=low, high=high).put(model, unknown.of(model))
         return model
 
     def bound(self, model: Model, key: str, low: float, high: float) -> None:
-        """Keep a number within bounds from now on; both alike fix it.
-
-        Raises:
-            InputError: no such number, or bounds the wrong way round or outside of what it may be.
-        """
+        """Keep a number within bounds from now on; both alike fix it. Refuses bounds that it cannot have."""
         widest = self.numbers(model, bounded=False)
         if key not in widest:
             raise InputError(f"{key}: no number of the model; it has {', '.join(widest)}")

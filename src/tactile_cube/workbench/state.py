@@ -51,6 +51,7 @@ from tactile_cube.workbench.parameters import BoundedSearch, Value
 
 Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
+BEGUN = 2  # stages of a model to which nothing was added: stated, refitted
 AT_ONCE = 24  # candidates that are screened between two looks at who waits
 RANKED = 10  # effects that a look shows
 ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
@@ -61,44 +62,26 @@ COMMAND = "python -m tactile_cube.workbench recording={}"
 
 @dataclass(frozen=True)
 class ModelStage:
-    """One model on the way, and how it does on the trials that are untouched.
+    """One model on the way, and how it does on the trials that are untouched."""
 
-    Attributes:
-        label: `stated`, `refitted`, `+ NAME@JOINT`, `- NAME@JOINT` or `by hand`.
-        fit: what it was fitted by; of the stated model, and of values set by hand, the fit that came before.
-        model: with the joint offsets of every initialisation.
-        judgement: on the held-out trials, in segments; the missing torque comes from its residual.
-        over_noise: the error: of segments of untouched trials, in units of the sensor noise. `diagnose` states it too.
-        errors: RMS of free runs there [rad].
-        half_width: (P,) of the fit's unknowns: what noise and misfit leave unsure, 95 %; zero where nothing was fitted.
-        final: the fit of a diagnosis on all windows, as it is saved.
-    """
-
-    label: str
-    fit: Fit
-    model: Model
-    judgement: Judgement
-    over_noise: float
-    errors: ErrorSummary
-    half_width: Array
-    final: Fitted | None = None
+    label: str  # `stated`, `refitted`, `+ NAME@JOINT`, `- NAME@JOINT` or `by hand`
+    fit: Fit  # what it was fitted by; of the stated model, and of values set by hand, the fit that came before
+    model: Model  # with the joint offsets of every initialisation
+    judgement: Judgement  # on the held-out trials, in segments; the missing torque comes from its residual
+    over_noise: float  # error of segments of untouched trials, in units of the sensor noise, as `diagnose` states it
+    errors: ErrorSummary  # RMS of free runs there [rad]
+    half_width: Array  # (P,) of the fit's unknowns, 95 %; zero where nothing was fitted
+    final: Fitted | None = None  # the fit of a diagnosis on all windows, as it is saved
 
 
 @dataclass(frozen=True)
 class Look:
-    """An effect beside the model in force, after a few steps of its own numbers.
+    """An effect beside the model in force, after a few steps of its own numbers."""
 
-    Attributes:
-        candidate: the effect in the form that does best.
-        model: with it.
-        change: (G, R) that it makes to the weighted prediction of the windows looked at.
-        share: part of the squared error there that it takes away.
-    """
-
-    candidate: Candidate
-    model: Model
-    change: Array
-    share: float
+    candidate: Candidate  # the effect in the form that does best
+    model: Model  # with it
+    change: Array  # (G, R) that it makes to the weighted prediction of the windows looked at
+    share: float  # part of the squared error there that it takes away
 
     @property
     def name(self) -> str:
@@ -133,14 +116,7 @@ class Workbench:
         seed: int = 0,
         say: Callable[[str], None] = lambda line: None,
     ) -> None:
-        """Divide the trials as `diagnose` does, and refit what the model has already.
-
-        Args:
-            recording: what was measured, or its folder; two or more trials of free motion.
-            model: to begin with, or its file; None: what the recording states.
-            own_effects: dotted paths of the user's own classes, which are imported.
-            seed: which trials are never fitted.
-            say: takes lines of progress.
+        """Divide the trials as `diagnose` does, which has these arguments, and refit what the model has already.
 
         Raises:
             InputError: a recording, a model or an effect that cannot be used.
@@ -252,11 +228,7 @@ class Workbench:
 
     @as_input_errors
     def add(self, *names: str) -> ModelStage:
-        """Add effects, NAME@JOINT, one after another, each with a refit of everything on the fitted trials.
-
-        Raises:
-            InputError: an unknown effect or joint, or one that the model has.
-        """
+        """Add effects that the model has not, NAME@JOINT, each with a refit of everything on the fitted trials."""
         stages = self.stages
         for effect, joint in (one for name in names for one in resolve([name], self.recording.joints)):
             label = f"{effect_path(effect)}@{joint}"
@@ -281,11 +253,7 @@ class Workbench:
         return self._push((*self.stages, stage))
 
     def remove(self, label: str) -> ModelStage:
-        """Take an effect out and refit everything that is left.
-
-        Raises:
-            InputError: the model has no such effect.
-        """
+        """Take an effect that the model has out and refit everything that is left."""
         if label not in self.effects:
             raise InputError(f"{label}: the model has only {', '.join(self.effects) or 'its constants'}")
         model = self.stage.fit.model
@@ -322,11 +290,7 @@ class Workbench:
         return found
 
     def set_parameter(self, key: str, value: float) -> ModelStage:
-        """Set a number by hand; nothing is refitted. Several in a row are one stage, each undone alone.
-
-        Raises:
-            InputError: no such number.
-        """
+        """Set a number by hand; nothing is refitted. Several in a row are one stage, each undone alone."""
         known = self.search.numbers(self.stage.model)
         if key not in known:
             raise InputError(f"{key}: no number of the model; it has {', '.join(known)}")
@@ -335,19 +299,11 @@ class Workbench:
         return self._push((*(self.stages[:-1] if self.stage.label == BY_HAND else self.stages), stage))
 
     def bound(self, key: str, low: float, high: float) -> None:
-        """Keep a number within bounds at every refit from now on; both alike fix it.
-
-        Raises:
-            InputError: no such number, or bounds that it cannot have.
-        """
+        """Keep a number within bounds that it may have at every refit from now on; both alike fix it."""
         self.search.bound(self.stage.model, key, low, high)
 
     def propose(self) -> Experiment:
-        """Return the commands that would show whether the last effect is there, within the machine's limits.
-
-        Raises:
-            InputError: no effect was added.
-        """
+        """Return the commands that would show whether the effect added last is there, within the machine's limits."""
         added = [k for k, stage in enumerate(self.stages) if stage.label.startswith("+")]
         if not added:
             raise InputError("add an effect first: an experiment decides between the model with it and without it")
@@ -355,8 +311,8 @@ class Workbench:
         return next_experiment(self.search.shooting, self.recording, fits, self.search.noise, self.seed, extended=True)
 
     def diagnose(self, folder: PathLike) -> Diagnosing:
-        """Start `diagnose` beside the model in force, in a process of its own; its files go to a folder."""
-        model = self.model_file() if self.effects else self.known
+        """Start `diagnose` beside what was added or set so far, in a process of its own; its files go to a folder."""
+        model = self.known if len(self.stages) == BEGUN else self.model_file()
         return Diagnosing(self.opened, model, self.own_effects, self.seed, Path(folder))
 
     @as_input_errors
