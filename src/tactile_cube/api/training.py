@@ -99,29 +99,13 @@ def train(
 ) -> TrainingResult:
     """Train a policy, or go on training it: the same call resumes.
 
-    Args:
-        experiment: option of conf/experiment, which changes several choices at once; None: `curriculum`.
-        hand: option of conf/hand; this and the next fourteen: None: as the experiment says.
-        object: option of conf/object.
-        task: option of conf/task.
-        reward: option of conf/reward.
-        randomization: option of conf/randomization.
-        start: option of conf/start.
-        exploration: option of conf/exploration.
-        curriculum: option of conf/curriculum.
-        env: option of conf/env.
-        agent: option of conf/agent.
-        replay: option of conf/replay.
-        collector: option of conf/collector.
-        training: option of conf/training.
-        logger: option of conf/logger.
-        without: option of conf/without, with experiment="ablations".
-        engine: of the worlds.
-        model: model.yaml that describes the hand.
-        own_effects: classes of your own that the model names, as dotted paths.
-        seed: of everything random.
-        values: other keys of the configuration, dotted -> value, e.g. {"task.filter_time": 0.25}.
-        folder: run folder; None: outputs/train/<name>-seed<seed>.
+    `experiment` is an option of conf/experiment, which changes several choices at once; None: `curriculum`. From `hand`
+    to `logger` they are options of the groups of conf/ with these names, None: as the experiment says, and so is
+    `without`, with experiment="ablations". `engine` is that of the worlds, `model` the model.yaml of the hand;
+    `own_effects` names classes of your own that the model has, as dotted paths; `seed` is of everything random.
+
+    `values` sets other keys of the configuration, dotted -> value, e.g. {"task.filter_time": 0.25}; `folder` is the run
+    folder; None: outputs/train/<name>-seed<seed>.
 
     Raises:
         InputError: a value that cannot be used, or the folder is in use.
@@ -176,10 +160,8 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
     if before is not None:
         print(f"{job.folder}: finished before ({before.reason}); training.resume=never starts over")
         return TrainingResult(job.folder, before.reason, before.steps, before.final_angle)
-    return _in_stages(job, plain) if job.config.stages else _in_one(job, plain, stage, later)
-
-
-def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
+    if job.config.stages:
+        return _in_stages(job, plain)
     start = partial(_training_run, job, plain, stage, later)
     run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
