@@ -18,6 +18,7 @@ from tactile_cube.agent.policy_file import save_policy
 from tactile_cube.api.environment import grasps_of
 from tactile_cube.api.evaluation import run_evaluation
 from tactile_cube.api.job import Job, PathLike, as_input_errors, as_word, called_job, worded_job
+from tactile_cube.composition import composed
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import networks_path
@@ -39,7 +40,6 @@ PUBLISHED: dict[str, dict[str, Any]] = {
 KEY = re.compile(r"[+~]*([\w./@]+)")  # what a word of a command line sets
 NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the training as a whole
 ENGINES = ("bullet", "mujoco")
-AVERAGED = 5  # policies whose mean is what comes out, as in conf/average.yaml
 GRASPS = 1000  # as many as those that come with the package
 COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
 """Columns of metrics.csv that go on from stage to stage."""
@@ -236,9 +236,9 @@ def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
 
 def judged(job: Job, last: Path) -> str:
     """Write the mean of the last stage's policies, and judge it in fresh draws of its worlds, in both engines."""
-    kept = len(list(last.glob("policy_[0-9]*.safetensors")))
+    kept = min(composed("average", []).last, len(list(last.glob("policy_[0-9]*.safetensors"))))
     policy = job.folder / POLICY
-    save_policy(policy, *averaged(kept_policies(last, min(AVERAGED, kept)) if kept else [last / POLICY]))
+    save_policy(policy, *averaged(kept_policies(last, kept) if kept else [last / POLICY]))
     said, named = [], {_key(word) for word in job.words} & {"hand", "object"}  # which no policy's file has read
     again = [word for word in job.words if _key(word).partition(".")[0] in named]
     for engine in ENGINES:
