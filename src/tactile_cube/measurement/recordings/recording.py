@@ -109,11 +109,7 @@ class Recording:
         return float(values[self.joints.index(joint)])
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
-        """The mechanism.
-
-        Raises:
-            InputError: the URDF and the joints of recording.yaml make none.
-        """
+        """The mechanism. Raises InputError: the URDF and the joints of recording.yaml make none."""
         coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
         try:
             return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)
