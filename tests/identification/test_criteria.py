@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from benchmarks.regression.evidence import decided
-from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import CONFIG
 from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 

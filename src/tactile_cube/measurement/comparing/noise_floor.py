@@ -1,18 +1,15 @@
 """The error that no model can undercut: the scatter of repeats, or the sensor's noise where nothing was repeated."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.measurement.comparing.repeats import Drift, Repeats, aligned_repeats, drifts
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.trial import Array
 
-Array = NDArray[np.float64]
 LEAST = 1e-6  # [rad] no sensor is better; keeps the ratio of error to floor finite
 
 
@@ -25,9 +22,7 @@ class NoiseFloor:
     source: Literal["repeats", "guess", "contact"]  # contact: how well a world with the true effects follows a grasp
     repeats: int  # trials that had a repeat
     step_size: dict[str, float]  # what the simulator's time step adds, no part of the floor; empty: not asked for
-    sensor: dict[str, float] = field(
-        default_factory=dict
-    )  # noise of the position sensor, the floor where it is a guess
+    sensor: dict[str, float] = field(default_factory=dict)  # noise of the position sensor, the floor if it is a guess
     drift: tuple[Drift, ...] = ()  # what repeats change by in one direction, no part of the floor
 
     @property
@@ -82,10 +77,7 @@ def sensor_noise(recording: Recording) -> Array:
     return np.array([_noise(one, float(least)) for one, least in zip(signals, stated, strict=True)])
 
 
-WHOLE, MOSTLY = (
-    0.1,
-    0.98,
-)  # of a step by which a change may miss a multiple of it, and the share of changes that keep it
+WHOLE, MOSTLY = 0.1, 0.98  # of a step by which a change may miss a multiple of it; share of changes that keep it
 FEWEST_VALUES = 20  # that a signal takes: with fewer gaps chance looks like a step
 FEW_STEPS = 20  # a larger change is a multiple of any small step, within what its digits tell
 

@@ -46,7 +46,11 @@ def aligned_repeats(trials: Sequence[Trial]) -> list[Repeats]:
         same = repeats_of(waiting, 0)
         if same:
             members = [(waiting[0], 0), *((waiting[place], lag) for place, lag in same)]
-            groups.append(Repeats(tuple(trial for trial, _ in members), _cut(members)))
+            start = max(0, *(lag for _, lag in members))
+            measured = [np.where(_telling(trial), trial.position, np.nan)[start - lag :] for trial, lag in members]
+            length = min(map(len, measured))
+            told = np.stack([positions[:length] for positions in measured])
+            groups.append(Repeats(tuple(trial for trial, _ in members), told))
         taken = {0, *(place for place, _ in same)}
         waiting = [trial for place, trial in enumerate(waiting) if place not in taken]
     return groups
@@ -58,14 +62,11 @@ def repeats_of(trials: Sequence[Trial], index: int) -> list[tuple[int, int]]:
     lags = {
         place: lag_between(first.command, other.command, first.step)
         for place, other in enumerate(trials)
-        if place != index and _comparable(first, other)
+        if place != index
+        and (first.kind, first.clamped, first.force) == (other.kind, other.clamped, other.force)
+        and all(np.array_equal(getattr(first.gains, k), getattr(other.gains, k)) for k in ("kp", "kd"))
     }
     return [(place, lag) for place, lag in lags.items() if lag is not None]
-
-
-def _comparable(first: Trial, other: Trial) -> bool:
-    same_gains = all(np.array_equal(getattr(first.gains, k), getattr(other.gains, k)) for k in ("kp", "kd"))
-    return first.kind == other.kind and same_gains and first.clamped == other.clamped and first.force == other.force
 
 
 def lag_between(first: Array, other: Array, step: float) -> int | None:
@@ -85,13 +86,6 @@ def lag_between(first: Array, other: Array, step: float) -> int | None:
 def _differs(first: Array, other: Array) -> float:
     spread = float(np.sqrt(np.mean((first - first.mean(axis=0)) ** 2)))
     return float(np.sqrt(np.mean((first - other) ** 2))) / spread if spread > 0 else np.inf
-
-
-def _cut(members: list[tuple[Trial, int]]) -> Array:
-    start = max(0, *(lag for _, lag in members))
-    measured = [np.where(_telling(trial), trial.position, np.nan)[start - lag :] for trial, lag in members]
-    length = min(map(len, measured))
-    return np.stack([positions[:length] for positions in measured])
 
 
 def _telling(trial: Trial) -> NDArray[np.bool_]:
