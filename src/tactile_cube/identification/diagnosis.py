@@ -200,17 +200,14 @@ def in_steps(recording: Recording, effects: Sequence[type[Effect]], known: Model
         InputError: gains and inertias call for more steps than any search can make.
     """
     fine = resolved(recording, effects, say, known)
-    if _steps(fine) > MOST_STEPS:
+    steps = steps_per_row(fine, joint_scales(fine)[0].time)
+    if steps > MOST_STEPS:
         raise InputError(
-            f"{recording.rig.path}: gains and inertias call for {_steps(fine)} steps of simulation a row, at most "
+            f"{recording.rig.path}: gains and inertias call for {steps} steps of simulation a row, at most "
             f"{MOST_STEPS} are made; check kp, kd, nominal.reflected_inertia and the inertias of the URDF"
         )
-    say(f"{_steps(fine)} steps of simulation a sample")
+    say(f"{steps} steps of simulation a sample")
     return fine
-
-
-def _steps(recording: Recording) -> int:
-    return steps_per_row(recording, joint_scales(recording)[0].time)
 
 
 def open_fits(diagnosis: Diagnosis) -> dict[str, Fit]:

@@ -132,24 +132,21 @@ def fit_standard_model(
         known: the model to begin with; None: what the recording's owner states.
         effects: classes to compile in; their kernel is used again by a search for them.
     """
-    return _Fitting(fitted, held_out, noise, known, effects).run()
+    start = nominal_model(fitted, known)
+    shooting = Shooting(fitted, every_effect(effects, start))
+    judge = HeldOut(shooting, held_out, noise, nominal_model(held_out, known).offsets)
+    return _Fitting(fitted, noise, start, shooting, judge).run()
 
 
+@dataclass(frozen=True)
 class _Fitting:
-    """The trials, and the models that are tried one after another."""
+    """The trials to fit and those to judge by, and the models that are tried one after another."""
 
-    def __init__(
-        self,
-        fitted: Recording,
-        held_out: Recording,
-        noise: Array,
-        known: ModelFile | None,
-        effects: Sequence[type[Effect]],
-    ) -> None:
-        self.recording, self.noise = fitted, noise
-        self.start = nominal_model(fitted, known)
-        self.shooting = Shooting(fitted, every_effect(effects, self.start))
-        self.judge = HeldOut(self.shooting, held_out, noise, nominal_model(held_out, known).offsets)
+    recording: Recording
+    noise: Array
+    start: Model
+    shooting: Shooting
+    judge: HeldOut
 
     def run(self) -> StandardModel:
         """The plain model in growing windows, by direction too where that is better, then what of it is needed."""

@@ -12,7 +12,7 @@ from scipy.stats import t as student_t
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.identification.criteria import STANDARD, Criteria
 from tactile_cube.identification.fitting.intervals import NORMAL_95, standard_errors
-from tactile_cube.identification.search.candidates import Candidate, Sizes, first_term
+from tactile_cube.identification.search.candidates import Candidate, Score, Sizes, first_term
 from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
@@ -35,7 +35,6 @@ from tactile_cube.identification.search.proposals import (
     refitted,
     without,
 )
-from tactile_cube.identification.search.screening import Score
 from tactile_cube.identification.search.search import Search
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term

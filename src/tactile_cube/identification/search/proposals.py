@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects.effect import Stage
 from tactile_cube.identification.fitting.gauss_newton import Fit, fit, noise_inflation, precision, renewed
 from tactile_cube.identification.fitting.problem import Problem
-from tactile_cube.identification.search.candidates import Candidate, with_details, without_effect
+from tactile_cube.identification.search.candidates import (
+    Candidate,
+    Score,
+    resized,
+    screen,
+    start,
+    with_details,
+    without_effect,
+)
 from tactile_cube.identification.search.evidence import segment_errors
 from tactile_cube.identification.search.explanation import Proposal, named_by
-from tactile_cube.identification.search.residual_starts import PROFILE, residual_candidates, special_candidates
-from tactile_cube.identification.search.screening import Score, resized, screen, start
+from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search, some
 
 Array = NDArray[np.float64]
@@ -25,7 +32,6 @@ STEPS = 2  # of Gauss-Newton that every law gets
 MORE_STEPS = 6  # that a law gets which may be a twin of the chosen one
 SINGLES, SETS = 4, 3  # laws, and sets of several, that are refitted exactly
 CLOSE = 2.5  # squared error over the best one's up to which another law may do as well when everything is free
-SPECIAL = 3  # best laws of which a profile is looked at for simpler ones
 
 
 @dataclass(frozen=True)
@@ -65,13 +71,7 @@ def joint_errors(problem: Problem, one: Fit) -> Array:
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
-    """Every law at these joints gets its own steps beside a set that is fitted.
-
-    Args:
-        search: the recording.
-        parent: the set.
-        at: joints.
-    """
+    """Every law at these joints gets its own steps beside a set that is fitted."""
     problem = Problem(search.shooting, some(search.all_windows, search.segments // LOOKED_AT))
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
@@ -83,13 +83,6 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     ]
     scores = screen(problem, frozen, possible)
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(scores)), key=lambda pair: pair[1].cost)
-    simpler = [
-        special
-        for candidate, fitted in tried[:SPECIAL]
-        if PROFILE in candidate.form
-        for special in search.new(special_candidates(candidate, fitted.model.terms[-1], search.effects))
-    ]
-    tried = sorted([*tried, *(stepped(problem, frozen, one) for one in simpler)], key=lambda pair: pair[1].cost)
     return Looks(parent, problem, frozen, tried, scores)
 
 

@@ -25,17 +25,35 @@ from tactile_cube.measurement.replay.nominal import nominal_model
 from tactile_cube.measurement.replay.windows import Windows
 
 Array = NDArray[np.float64]
-BRIEF, LONG = 3, 8  # most iterations of a brief refit and of a long one; a fit that converges ends before
+LONG = 8  # most iterations of a refit; one that converges ends before
 SEGMENTS = 132  # enough data to judge by, 52.8 s of a finger; the final fit takes all
-RENEWED, HELPS = (
-    3,
-    0.98,
-)  # times that starts are taken anew, and squared error over the last one's with which it goes on
+RENEWED, HELPS = 3, 0.98  # times that starts are taken anew, and part of the squared error that has to be left for that
 FITTED = 2  # part of as many that a refit of a search takes: no answer was lost by it, and half the time saved
+ENOUGH = 24  # held-out segments at least
+FEWEST_ROWS = 8  # of a segment, for its start is unknown too
+GROWN = 3.0  # squared, an order of magnitude: from there on few unstable segments outweigh all stable ones
+MOSTLY = 0.9  # quantile over the segments: one that tips over is no reason to cut all of them
+FIRST_ANSWER = 10.0  # [s] after which the best answer so far is said, then after twice as long each time
 
 
-class Division:
-    """A recording's trials divided in two.
+class BestSoFar:
+    """Passes lines of progress on, and from time to time the best answer so far and what is tried next."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        """Begin to count time; `say` takes the lines."""
+        self.pass_on, self.answer, self.following = say, "", ""
+        self.began, self.due = time.monotonic(), FIRST_ANSWER
+
+    def __call__(self, line: str) -> None:
+        """Pass a line on, and the best answer where it is time."""
+        self.pass_on(line)
+        if self.answer and time.monotonic() - self.began > self.due:
+            self.pass_on(f"best answer so far: {self.answer}; next: {self.following}")
+            self.due *= 2.0
+
+
+class Search:
+    """A recording with its trials divided in two, and the effects that may be missing.
 
     Attributes:
         shooting: simulates both parts.
@@ -46,45 +64,52 @@ class Division:
         validation: the problem of the trials to judge by.
         free_runs: of the same trials, whole.
         offsets: joint offsets of all initialisations that are known by now [rad].
+        candidates: what may be missing, but for what starts from a residual.
     """
 
     def __init__(
         self,
-        shooting: Shooting,
         fitted: Recording,
         held_out: Recording,
         noise: Array,
-        segment: int | None = None,
+        effects: Sequence[type[Effect]],
+        say: Callable[[str], None],
         known: ModelFile | None = None,
+        criteria: Criteria = STANDARD,
         segments: int = SEGMENTS,
     ) -> None:
         """Prepare the problems.
 
         Args:
-            shooting: with all effects compiled in.
             fitted: trials to fit.
             held_out: trials to judge by.
             noise: (n,) of the position sensors [rad].
-            segment: rows of a segment; as long as identification likes them by default.
+            effects: classes to search.
+            say: takes progress lines.
             known: the model to begin with; None: what the recording's owner states.
-            segments: how many of them a search takes, of either part.
+            criteria: what decides.
+            segments: how many of them to judge by, at most as many to fit.
         """
-        self.shooting, self.fitted, self.held_out = shooting, fitted, held_out
-        self.noise, self.segment, self.known, self.segments = noise, segment, known, segments
+        self.fitted, self.held_out, self.noise, self.known, self.criteria = fitted, held_out, noise, known, criteria
+        self.say = say if isinstance(say, BestSoFar) else BestSoFar(say)
         self.start, self.start_held_out = nominal_model(fitted, known), nominal_model(held_out, known)
+        self.effects = every_effect(effects, self.start)
+        self.shooting = Shooting(fitted, self.effects)
+        usual = self.shooting.cut(fitted, noise)
+        rows = sum(np.count_nonzero(trial.valid) for trial in held_out.trials)
+        steady = steady_rows(self.shooting, self.start, some(usual, segments))
+        self.segment = min(steady, max(FEWEST_ROWS, int(rows) // ENOUGH))
+        self.segments = min(segments, segments * usual.segment // self.segment)
         self.all_windows = self.windows(fitted)
-        self.rows = self.all_windows.segment
-        self.problem = Problem(shooting, some(self.all_windows, segments // FITTED))
-        self.validation = Problem(shooting, some(self.windows(held_out), segments))
+        self.problem = Problem(self.shooting, some(self.all_windows, self.segments // FITTED))
+        self.validation = Problem(self.shooting, some(self.windows(held_out), self.segments))
         self.offsets = dict(self.start_held_out.offsets)
-        self.free_runs = HeldOut(shooting, held_out, noise, self.offsets)
+        self.free_runs = HeldOut(self.shooting, held_out, noise, self.offsets)
+        self.candidates = candidates(self.shooting.sizes, self.effects)
 
-    def windows(self, recording: Recording) -> Windows:
-        """Other trials cut likewise."""
-        return self.shooting.cut(recording, self.noise, segment=self.segment)
-
-    def fit_base(self) -> Explanation:
-        """Refit what the model already has; as it is stated where that follows the held-out trials better."""
+    @cached_property
+    def base(self) -> Explanation:
+        """Refitted constants alone; as they are stated where that follows the held-out trials better."""
         self.problem.linearise_starts(self.start)
         first = fit(self.problem, self.start, self.unknowns(self.start), iterations=4)
         self.problem.linearise_starts(first.model)
@@ -95,6 +120,10 @@ class Division:
         judgement = self.judged(second.model)
         self.offsets = dict(judgement.model.offsets)
         return Explanation((), second, judgement, 1.0, 0.0)
+
+    def windows(self, recording: Recording) -> Windows:
+        """Other trials cut likewise."""
+        return self.shooting.cut(recording, self.noise, segment=self.segment)
 
     def unknowns(self, model: Model) -> tuple[Unknown, ...]:
         """Everything that a refit of the model may change."""
@@ -136,83 +165,6 @@ class Division:
         self.validation.linearise_starts(found)
         return judge(self.validation, self.held_out, found)
 
-
-def some(windows: Windows, segments: int) -> Windows:
-    """Windows of about so many segments, spread over trials and over the time within trials."""
-    by_trial = [np.flatnonzero(windows.trial == k) for k in np.unique(windows.trial)]
-    order = [
-        int(rows[(turn + k) % len(rows)])
-        for turn in range(max(len(rows) for rows in by_trial))
-        for k, rows in enumerate(by_trial)
-        if turn < len(rows)
-    ]
-    return windows.take(np.array(sorted(order[: -(-segments // windows.segments)])))
-
-
-ENOUGH = 24  # held-out segments at least
-FEWEST_ROWS = 8
-FIRST_ANSWER = 10.0  # [s] after which the best answer so far is said, then after twice as long each time
-
-
-def enough_rows(held_out: Recording) -> int:
-    """Rows of a segment at most, so that the held-out trials have enough of them for a test."""
-    rows = sum(np.count_nonzero(trial.valid) for trial in held_out.trials)
-    return max(FEWEST_ROWS, int(rows) // ENOUGH)
-
-
-class BestSoFar:
-    """Passes lines of progress on, and from time to time the best answer so far and what is tried next."""
-
-    def __init__(self, say: Callable[[str], None]) -> None:
-        """Begin to count time; `say` takes the lines."""
-        self.pass_on, self.answer, self.following = say, "", ""
-        self.began, self.due = time.monotonic(), FIRST_ANSWER
-
-    def __call__(self, line: str) -> None:
-        """Pass a line on, and the best answer where it is time."""
-        self.pass_on(line)
-        if self.answer and time.monotonic() - self.began > self.due:
-            self.pass_on(f"best answer so far: {self.answer}; next: {self.following}")
-            self.due *= 2.0
-
-
-class Search(Division):
-    """A recording with its trials divided, and the effects that may be missing."""
-
-    def __init__(
-        self,
-        fitted: Recording,
-        held_out: Recording,
-        noise: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
-        effects: Sequence[type[Effect]],
-        say: Callable[[str], None],
-        known: ModelFile | None = None,
-        criteria: Criteria = STANDARD,
-        segments: int = SEGMENTS,
-    ) -> None:
-        """Prepare the problems.
-
-        Args:
-            fitted: trials to fit.
-            held_out: trials to judge by.
-            noise: (n,) of the position sensors [rad].
-            effects: classes to search.
-            say: takes progress lines.
-            known: the model to begin with; None: what the recording's owner states.
-            criteria: what decides.
-            segments: how many of them to judge by.
-        """
-        start = nominal_model(fitted, known)
-        effects = every_effect(effects, start)
-        shooting = Shooting(fitted, effects)
-        usual = shooting.cut(fitted, noise)
-        segment = min(steady_rows(shooting, start, some(usual, segments)), enough_rows(held_out))
-        segments = min(segments, segments * usual.segment // segment)
-        super().__init__(shooting, fitted, held_out, noise, segment, known, segments)
-        self.say = say if isinstance(say, BestSoFar) else BestSoFar(say)
-        self.criteria, self.effects = criteria, effects
-        self.candidates = candidates(shooting.sizes, effects)
-
     def stand(self, answer: str, following: str) -> None:
         """Note the best answer so far and what is tried next, in words."""
         self.say.answer, self.say.following = answer, following
@@ -226,11 +178,6 @@ class Search(Division):
     def spent(self) -> bool:
         """Whether the search has simulated as much as it may."""
         return self.shooting.simulated > self.criteria.most_simulated
-
-    @cached_property
-    def base(self) -> Explanation:
-        """Refitted constants alone."""
-        return self.fit_base()
 
     def new(self, wanted: Sequence[Candidate]) -> list[Candidate]:
         """Without effects that the model to begin with has at that joint already."""
@@ -246,24 +193,23 @@ class Search(Division):
         return found
 
 
-GROWN = 3.0  # squared, an order of magnitude: from there on few unstable segments outweigh all stable ones
-MOSTLY = 0.9  # quantile over the segments: one that tips over is no reason to cut all of them
-FEWEST_ROWS = 8  # that a segment keeps, for its start is unknown too
+def some(windows: Windows, segments: int) -> Windows:
+    """Windows of about so many segments, spread over trials and over the time within trials."""
+    by_trial = [np.flatnonzero(windows.trial == k) for k in np.unique(windows.trial)]
+    order = [
+        int(rows[(turn + k) % len(rows)])
+        for turn in range(max(len(rows) for rows in by_trial))
+        for k, rows in enumerate(by_trial)
+        if turn < len(rows)
+    ]
+    return windows.take(np.array(sorted(order[: -(-segments // windows.segments)])))
 
 
 def steady_rows(shooting: Shooting, model: Model, windows: Windows) -> int:
-    """Rows of a segment within which an error of its start does not grow more than `GROWN` times.
+    """Rows of a segment, at most those of the windows', within which an error of its start grows `GROWN` times at most.
 
     A pendulum about its upper rest makes a hundred out of one within a second, and no fit is judged by what is left.
     The model tells its own growth: the derivative of each joint's position by its position at the segment's start.
-
-    Args:
-        shooting: simulates.
-        model: known beforehand; nothing is fitted yet.
-        windows: with segments as long as identification likes them.
-
-    Returns:
-        Rows, those of the segments that there are where nothing grows.
     """
     joints = len(shooting.recording.joints)
     slopes = shooting.start_sensitivity(model, windows)[:joints]
