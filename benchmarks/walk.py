@@ -4,8 +4,8 @@
     python -m benchmarks.walk ../shared/data/pendulum_torque
 
 The first line makes the pictures of docs/workbench.md: a Feetech STS3215 under firmware gain 16 with 0.97 kg at 0.1 m,
-ten runs of time, goal and position (kscalelabs/sysid; not committed). The second one takes torques of a pendulum
-(lvjonok/mujoco-sysid). An action is a click, or a field that is typed or chosen. Needs Playwright and Chromium.
+ten runs of time, goal, position and torque_enable (kscalelabs/sysid; not committed). The second line takes a pendulum
+under torques (lvjonok/mujoco-sysid). An action is a click, or a field typed or chosen. Needs Playwright and Chromium.
 """
 
 import argparse
@@ -28,13 +28,13 @@ Logs = list[tuple[str, str]]
 
 
 def servo(folder: Path) -> Logs:
-    """Time, goal and position of all runs of one condition."""
+    """Time, goal, position, and where torque is on, of all runs of one condition."""
     columns = np.load(folder / "sts3215.npz")
     runs = [run for run in json.loads((folder / "runs.json").read_text()) if CONDITION.items() <= run.items()]
     return [
         (
             f"{run['trajectory']}_{run['run']}.csv",
-            _csv(columns, f"{run['run']:03d}.", ("time", "goal_position", "position")),
+            _csv(columns, f"{run['run']:03d}.", ("time", "goal_position", "position", "torque_enable")),
         )
         for run in runs
     ]
@@ -77,14 +77,15 @@ class Walk:
         self.page.get_by_label(label).fill(text)
         self.actions += 1
 
-    def picture(self, name: str, top: Locator | None = None, height: int = 860) -> None:
+    def picture(self, name: str, top: Locator | None = None, height: float = 860.0) -> None:
         """The window, scrolled to a part, in few colours."""
         if self.out is None:
             return
         self.page.wait_for_timeout(1500)
-        y = 0.0 if top is None else top.bounding_box()["y"] + self.page.evaluate("scrollY") - 8
-        clip = {"x": 0, "y": y, "width": 1280, "height": height}
-        whole = Image.open(io.BytesIO(self.page.screenshot(full_page=True, clip=clip))).convert("RGB")
+        box = None if top is None else top.bounding_box()
+        y = box["y"] + self.page.evaluate("scrollY") - 8.0 if box else 0.0
+        shot = self.page.screenshot(full_page=True, clip={"x": 0.0, "y": y, "width": 1280.0, "height": height})
+        whole = Image.open(io.BytesIO(shot)).convert("RGB")
         whole.quantize(COLORS, dither=Image.Dither.NONE).save(self.out / f"workbench_{name}.png", optimize=True)
 
 
@@ -110,7 +111,7 @@ def main() -> None:
             walk.type("its firmware's gain", "16")
         else:
             walk.choose("commands are", "torque")
-        walk.picture("import", height=760)
+        walk.picture("import", height=760.0)
         walk.click("Import")
         page.get_by_role("radio").first.wait_for()
         say("imported, candidates ranked")
