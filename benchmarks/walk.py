@@ -4,7 +4,7 @@
     python -m benchmarks.walk ../shared/data/pendulum_torque
 
 The first line makes the pictures of docs/workbench.md: a Feetech STS3215 under firmware gain 16 with 0.97 kg at 0.1 m,
-ten runs of time, goal, position and torque_enable (kscalelabs/sysid; not committed). The second line takes a pendulum
+six runs of time, goal and position (kscalelabs/sysid; not committed). The second line takes a pendulum
 under torques (lvjonok/mujoco-sysid). An action is a click, or a field typed or chosen. Needs Playwright and Chromium.
 """
 
@@ -21,6 +21,7 @@ from playwright.sync_api import Locator, Page
 from benchmarks.browser import processor_seconds, workbench
 
 CONDITION = {"kp": 16, "mass": 0.969, "length": 0.1}
+MOTIONS = ("brutal", "sin_sin", "up_and_down")
 COLORS = 48  # of a picture: lines and text need few
 DROP = """(files) => { const data = new DataTransfer();
 for (const [name, text] of files) data.items.add(new File([text], name)); return data; }"""
@@ -28,13 +29,14 @@ Logs = list[tuple[str, str]]
 
 
 def servo(folder: Path) -> Logs:
-    """Time, goal, position, and where torque is on, of all runs of one condition."""
+    """Time, goal and position of some runs of one condition."""
     columns = np.load(folder / "sts3215.npz")
     runs = [run for run in json.loads((folder / "runs.json").read_text()) if CONDITION.items() <= run.items()]
+    runs = [run for run in runs if run["trajectory"] in MOTIONS]
     return [
         (
             f"{run['trajectory']}_{run['run']}.csv",
-            _csv(columns, f"{run['run']:03d}.", ("time", "goal_position", "position", "torque_enable")),
+            _csv(columns, f"{run['run']:03d}.", ("time", "goal_position", "position")),
         )
         for run in runs
     ]
