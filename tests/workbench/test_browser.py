@@ -35,7 +35,7 @@ CHROMIUM = next(
 )
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (Debian: apt install chromium)")
 PICTURES = os.environ.get("WORKBENCH_PICTURES")
-PATIENCE = 60_000  # [ms]
+PATIENCE = 240_000  # [ms]
 FIRST = re.compile("% +stribeck_friction")  # not what looks like it
 STORY = ("Compare", "Missing torque", "What may be missing", "Diagnosis", "Error by stage", "Next experiment")
 NAME = "<img src=x onerror=document.title='run'>"  # of a column, as a hostile log may have it
