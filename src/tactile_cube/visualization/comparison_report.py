@@ -59,6 +59,7 @@ def outcome(comparison: Comparison) -> str:
     head = (
         f"The simulated joints are {milli(comparison.errors.overall, unit)} (RMS) away from the measured ones; "
         f"{milli(comparison.floor.overall, unit)} would be noise alone."
+        + "".join(f" {one.sentence(unit)}." for one in comparison.floor.drift)
     )
     if comparison.diverged:
         return (
