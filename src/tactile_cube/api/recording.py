@@ -8,7 +8,9 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
+from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
+from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import require_free, write_recordings
@@ -41,7 +43,24 @@ def record(
 
 def run_recording(job: Job) -> dict[str, Recording]:
     """Write what a job's source gives."""
-    out = Path(job.config.out)
+    return _imported(job, Path(job.config.out))
+
+
+def opened_or_imported(job: Job, recording: Recording | PathLike | None) -> Recording:
+    """The recording, or what a job's source of logs gives, which is written into its folder.
+
+    Raises:
+        InputError: neither of them, or both.
+    """
+    if (recording is None) == (job.config.get("source") is None):
+        raise InputError(
+            "give either recording=FOLDER (of a recording.yaml) or logs to import: source=csv source.files=LOGS "
+            "source.urdf=FILE"
+        )
+    return _imported(job, job.folder / "recording")[""] if recording is None else opened(recording)
+
+
+def _imported(job: Job, out: Path) -> dict[str, Recording]:
     require_free(out)
     settings: Any = OmegaConf.to_container(job.config.source, resolve=True)
     tables = recording_tables(settings, str(job.choices["source"]), job.config.seed)

@@ -44,8 +44,12 @@ def read_recording(folder: str | Path) -> Recording:
         InputError: naming file, column, row and value of what cannot be used.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"recording={folder}: no such folder; a recording is a folder with {DESCRIPTION} in it")
+    if not (folder / DESCRIPTION).is_file():
+        what = "no such folder" if not folder.exists() else f"a {'folder without it' if folder.is_dir() else 'file'}"
+        raise InputError(
+            f"recording={folder}: {what}; a recording is a folder with {DESCRIPTION}, which record makes of logs: "
+            f"source=csv source.files={folder} source.urdf=FILE out=FOLDER"
+        )
     file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)
     path = below(folder, description.rig, f"{file}: key 'rig'")

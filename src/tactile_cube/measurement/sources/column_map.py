@@ -157,16 +157,19 @@ def _owners(names: Sequence[str], joints: Sequence[str]) -> dict[str, str]:
 
 NEEDED = {mode: ("command", "position") for mode in ("position", "torque", "voltage")} | {"free": ("position",)}
 """Mode -> signals that a joint must have."""
-COMMANDED = {"position": "command", "torque": "command (a torque)", "voltage": "command (a voltage)"}
+COMMANDED = {
+    "position": "a commanded position", "torque": "a commanded torque", "voltage": "a commanded voltage",
+    "free": "a swing without command",
+}  # fmt: skip
 
 
 def _require_whole(chosen: Mapping[str, Mapping[str, str]], names: Sequence[str], mode: str) -> None:
     if not chosen:
-        what = "a position" if mode == "free" else f"both a {COMMANDED[mode]} and a position"
-        hint = ", or source.controller.mode=torque, voltage or free (a swing without command)"
+        what = "a position" if mode == "free" else f"both {COMMANDED[mode]} and a position"
+        others = [f"{one} ({COMMANDED[one]})" for one in COMMANDED if one != mode]
         raise InputError(
             f"source.columns: no joint of the URDF has {what} among the columns {list(names)}; "
-            f"say which they are: {EXAMPLE}{hint if mode == 'position' else ''}"
+            f"say which they are: {EXAMPLE}, or source.controller.mode={', '.join(others)}"
         )
     for joint, entry in chosen.items():
         missing = [signal for signal in NEEDED[mode] if signal not in entry]

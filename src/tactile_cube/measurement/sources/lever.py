@@ -59,16 +59,12 @@ class Lever:
         """Refuse what no joint has.
 
         Raises:
-            InputError: another robot, a mass or a lever that is not above 0.
+            InputError: another robot.
         """
         if self.robot not in ROBOTS:
             raise InputError(
                 f"source.robot={self.robot}: unknown; choose one of {', '.join(ROBOTS)}, or give source.urdf"
             )
-        for key in ("mass", "lever"):
-            value = getattr(self, key)
-            if value is not None and not 0.0 < value < np.inf:
-                raise InputError(f"source.{key}={value:g}: give a finite number above 0, or leave it out")
 
     def rig(self, mass: float = 1.0, lever: float = LEVER, hangs_at: float = 0.0) -> Rig:
         """Return it as a mechanism; of a pendulum that hangs down at an angle [rad]."""

@@ -37,6 +37,11 @@ class Mechanism:
                 "source=csv needs either source.urdf=... (of the rig, or its MJCF) or, for one joint without one, "
                 f"source.robot={'|'.join(ROBOTS)}"
             )
+        for key, whose in {"mass": "robot", "lever": "robot", "gain": "servo"}.items():
+            if getattr(self, key) is not None and getattr(self, whose) is None:
+                raise InputError(
+                    f"source.{key}={getattr(self, key):g}: is that of source.{whose}=NAME, which is not given"
+                )
         rig = self._lever().rig() if self.urdf is None else read_rig(Path(self.urdf))
         if self.servo is None:
             return rig

@@ -1,19 +1,19 @@
 """A ROS 2 bag in MCAP (joint states and commands) as a recording; needs the extra `ros`, but no ROS."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.description import PerJoint, TrialEntry
+from tactile_cube.measurement.recordings.description import PerJoint, Rate, TrialEntry
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
-from tactile_cube.measurement.sources.source import described, rate_of, with_stated
+from tactile_cube.measurement.sources.source import described, listed, rate_of, with_stated
 from tactile_cube.untrusted_file import regular
 
 Array = NDArray[np.float64]
@@ -27,21 +27,21 @@ class RosBag:
     Efforts of the joint states become torques. A Float64MultiArray of commands is in the order of `joints`.
     """
 
-    files: Iterable[str]
+    files: str | Sequence[str]
     urdf: str
-    joints: Iterable[str]
+    joints: Sequence[str]
     controller: Mapping[str, PerJoint | None]
     states: str
     commands: str
     nominal: Mapping[str, PerJoint | None]
-    gravity: Iterable[float]
-    rate: float | None
-    read: str
+    gravity: tuple[float, float, float]
+    rate: Rate | None
+    read: Literal["before", "after"]
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all bags."""
         rig, joints = read_rig(Path(self.urdf)), list(self.joints)
-        tables = [self._trial(Path(name), joints) for name in self.files]
+        tables = [self._trial(Path(name), joints) for name in listed(self.files)]
         rate = self.rate if self.rate is not None else rate_of(tables[0].time, 2, str(tables[0].entry.note))
         description = described(
             gravity=list(self.gravity), rate_hz=rate, joints=joints, sensors={"read": self.read},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -31,8 +31,8 @@ class SimulatedSession:
     controller: Mapping[str, float] = field(default_factory=dict)
     nominal: Mapping[str, float] = field(default_factory=dict)
     true_spread: float = 0.1
-    hidden: Iterable[str] = ()
-    kinds: Iterable[str] = ("ramps", "multisine", "policy", "holds")
+    hidden: Sequence[str] = ()
+    kinds: Sequence[str] = ("ramps", "multisine", "policy", "holds")
     initialisations: int = 3
     offset: float = 0.02
     duration: float = 12.0

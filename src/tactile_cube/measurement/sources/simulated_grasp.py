@@ -10,7 +10,7 @@ Source: paper, section II-D: lateral and spinning friction from the torque neede
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -43,14 +43,14 @@ HOLDING = {"hold": (0, 1, 2, 3), "twist": (1, 3)}  # fingers; middle and thumb o
 class SimulatedGrasp(SimulatedSession):
     """Simulates the bench tests of friction."""
 
-    kinds: Iterable[str] = ("hold", "twist")
+    kinds: Sequence[str] = ("hold", "twist")
     initialisations: int = 4
     duration: float = 8.0
     rate: float = 100.0
     step: float = 0.001
     size: float = 0.08
-    weights: Iterable[float] = (0.15, 0.25)
-    levers: Iterable[float] = (0.02, 0.06, 0.15)
+    weights: Sequence[float] = (0.15, 0.25)
+    levers: Sequence[float] = (0.02, 0.06, 0.15)
     lever_weight: float = 0.1
     placing: float = 0.001
     squeeze: float = 0.02

@@ -1,6 +1,6 @@
 """A recording of a simulated rig: commands, joint offsets, sensor noise, effects that the reader does not know of."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,8 +27,8 @@ class SimulatedRig(SimulatedSession):
     """Simulates a bench session; `urdf` may also name a description that the package ships."""
 
     urdf: str = "finger"
-    gravity: Iterable[float] = (0.0, 0.0, -9.81)
-    joints: Iterable[str] | None = None
+    gravity: Sequence[float] = (0.0, 0.0, -9.81)
+    joints: Sequence[str] | None = None
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """The recording, and fresh commands on the last initialisation under `validation`."""

@@ -1,8 +1,8 @@
 """What every source of recordings gives."""
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 from functools import cache
 from typing import Any, Protocol, TypeVar
 
@@ -10,6 +10,7 @@ import numpy as np
 from hydra.utils import get_class
 from numpy.typing import NDArray
 from omegaconf import OmegaConf
+from pydantic import TypeAdapter, ValidationError
 
 from tactile_cube.command_help import CONFIG
 from tactile_cube.composition import composed
@@ -46,6 +47,11 @@ def with_stated(
     """What the user says, and what the rig's file states of all joints; a limit that is infinite says nothing."""
     of_file = {key: {joint: row[joint] for joint in joints} for key, row in stated.items() if row.keys() >= set(joints)}
     return of_file | {key: value for key, value in known(said).items() if value != float("inf") or key not in of_file}
+
+
+def listed(files: str | Iterable[str]) -> list[str]:
+    """One file or several as a list."""
+    return [files] if isinstance(files, str) else [str(one) for one in files]
 
 
 REGULAR = 0.1  # part of a step by which those of a log at one rate differ
@@ -101,20 +107,35 @@ def recording_tables(settings: Mapping[str, Any], option: str, seed: int) -> dic
         seed: of simulated ones.
 
     Raises:
-        InputError: settings that are missing or that the source does not have, and what the source itself refuses.
+        InputError: settings that are missing, of another type or that the source does not have, and what the source
+            itself refuses.
     """
     source = get_class(settings["_target_"])
-    given = {key: value for key, value in settings.items() if key != "_target_"}
-    known = {one.name: one.default is MISSING and one.default_factory is MISSING for one in fields(source)}
-    for key in given.keys() - known:
+    given = {key: value for key, value in settings.items() if key != "_target_" and value != "???"}
+    known = [one.name for one in fields(source)]
+    for key in given.keys() - set(known):
         raise InputError(f"source.{key}: source={option} has no such setting{suggestion(key, known)}")
-    _require([key for key, needed in known.items() if given.get(key, "???" if needed else None) == "???"], option)
-    made: dict[str, RecordingTables] = source(**given).recordings(seed)
-    return made
+    try:
+        checked: Source = TypeAdapter(source).validate_python(given)
+    except ValidationError as error:
+        _require([str(one["loc"][0]) for one in error.errors() if one["type"] == "missing"], option)
+        raise InputError(_refused(error, given)) from None
+    return checked.recordings(seed)
+
+
+def _refused(error: ValidationError, given: Mapping[str, Any]) -> str:
+    first = error.errors()[0]
+    place: Any = given
+    keys: list[str] = []
+    for part in first["loc"]:  # behind the keys stand alternatives of a type
+        if not isinstance(place, Mapping) or part not in place:
+            break
+        place, keys = place[part], [*keys, str(part)]
+    said = str(first["msg"]).removeprefix("Input should be ")
+    return f"source.{'.'.join(keys)}={place}: expected {said}"
 
 
 def _require(missing: Sequence[str], option: str) -> None:
-    """Refuse a source without its mandatory settings, naming all of them and what its file says of each."""
     if missing:
         text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
         found = [re.search(rf"^ *{key}: \?\?\? *# *(.*)$", text, re.MULTILINE) for key in missing]

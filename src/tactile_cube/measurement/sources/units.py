@@ -95,7 +95,8 @@ def chosen_unit(said: str | int | None, name: str, units: Mapping[str, float], k
     """
     if said is not None:
         if said not in units:
-            raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}")
+            others = f", {RANGE} (LeRobot's -100 .. 100) or the ticks of a turn" if key == "angle_unit" else ""
+            raise InputError(f"source.{key}={said}: unknown; choose one of {', '.join(units)}{others}")
         return Unit(str(said), units[str(said)], f"source.{key}")
     found = _unit_of(name, units)
     return None if found is None else Unit(found, units[found], "its name")
