@@ -9,7 +9,7 @@ from bokeh.models import Button, Div, Row, Select, SVGIcon, TextInput, Toggle
 from tactile_cube.measurement.recordings.columns import SIGNALS
 from tactile_cube.measurement.sources.column_map import NEEDED
 from tactile_cube.measurement.sources.lever import ROBOTS
-from tactile_cube.measurement.sources.servo import servos
+from tactile_cube.measurement.sources.mechanism import servos
 from tactile_cube.measurement.sources.units import (
     ANGLE_UNITS,
     LENGTH_UNITS,

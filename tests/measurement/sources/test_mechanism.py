@@ -12,7 +12,7 @@ from tactile_cube.identification.identification import divided
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.writing import write_recordings
-from tactile_cube.measurement.sources.servo import read_servo, servos
+from tactile_cube.measurement.sources.mechanism import read_servo, servos
 from tactile_cube.measurement.sources.source import recording_tables, source_settings
 from tests.measurement.sources.bare_joint import INERTIA, KD, KP, LEVER, MASS, WEIGHT, played
 

@@ -76,16 +76,10 @@ class LoggedController(Strict):
 
 
 @dataclass(frozen=True)
-class CsvFiles:
+class CsvFiles(Mechanism):
     """Imports logs; conf/source/csv.yaml says what each setting means, and its units."""
 
     files: str | Sequence[str]
-    urdf: str | None
-    robot: str | None
-    mass: Positive | None
-    lever: Positive | None
-    servo: str | None
-    gain: Positive | None
     controller: LoggedController
     columns: Mapping[str, str | Mapping[str, str]] | None
     nominal: Mapping[str, PerJoint | None]
@@ -105,11 +99,7 @@ class CsvFiles:
 
     def recordings(self, seed: int) -> dict[str, RecordingTables]:
         """One recording of all files."""
-        mode, mechanism = (
-            self.controller.mode,
-            Mechanism(self.urdf, self.robot, self.mass, self.lever, self.servo, self.gain),
-        )
-        rig = mechanism.rig()
+        mode, rig = self.controller.mode, self.rig()
         left: list[str] = []
         logs = self._logs([name for name, joint in rig.joints.items() if joint.mimics is None])
         columns = self._columns(logs[0], rig)
@@ -123,7 +113,7 @@ class CsvFiles:
         trials = [_trial(piece, columns, units, second, self.rate) for piece in pieces]
         rate = self.rate if self.rate is not None else rate_of(trials[0].time, 3, str(pieces[0].path))
         trials = self._named(trials, pieces, logs, 1 / rate)
-        rig = mechanism.sized(rig, trials, mode, self.controller.kp, float(np.linalg.norm(self.gravity)))
+        rig = self.sized(rig, trials, mode, self.controller.kp, float(np.linalg.norm(self.gravity)))
         description = self._description(trials, list(columns.joints), rig, rate)
         doubts = [*columns.doubts, *rig.doubts, *_doubts(units, columns, trials, description, rig)]
         doubts += [f"left out: {reason}" for reason in left]
@@ -270,7 +260,6 @@ def _checked(log: Log, columns: ColumnMap) -> Log:
 
 
 def _label(log: Log, column: str) -> str:
-    """A column's name with the unit that stands below it."""
     return f"{column} [{log.units[column]}]" if column in log.units else column
 
 
@@ -323,7 +312,6 @@ def _doubts(
 
 
 def _steps(logs: Sequence[Log]) -> Iterator[tuple[str, str, str]]:
-    """What was done to the logs, each step once."""
     steps = list(dict.fromkeys(step for log in logs for step in log.steps))
     for what in dict.fromkeys(what for what, _ in steps):
         hows = [how for one, how in steps if one == what]
@@ -340,7 +328,6 @@ def _rows(columns: ColumnMap, units: Units, stamps: Unit | None, rate: float) ->
 
 
 def _beside(pattern: Path) -> str:
-    """What there is where a pattern looks."""
     folder = pattern.parent
     if not folder.is_dir():
         return f"; there is no folder {folder}" if "*" not in str(folder) else ""

@@ -1,9 +1,11 @@
 """A ROS 2 bag in MCAP (joint states and commands) as a recording; needs the extra `ros`, but no ROS."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,9 @@ from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable
 from tactile_cube.measurement.sources.source import described, listed, rate_of, with_stated
 from tactile_cube.untrusted_file import regular
+
+if TYPE_CHECKING:
+    from mcap.records import Chunk
 
 Array = NDArray[np.float64]
 SAME_STAMP = 1e-6  # [s]
@@ -66,20 +71,18 @@ class RosBag:
 
 
 def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float, Any]]]:
-    """Topic -> (time [s], message); the header's stamp where a message has one, else when it was logged."""
-    try:
-        from tactile_cube.measurement.sources.mcap_file import decoded_messages
-    except ImportError:
-        raise InputError("source=mcap needs the optional extra: pip install 'tactile-cube[ros]'") from None
+    """Topic -> (time [s], message)."""
     found: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
     try:
         with regular(path).open("rb") as stream:
-            for number, (topic, log_time, message) in enumerate(decoded_messages(stream, topics)):
+            for number, (topic, seconds, message) in enumerate(_decoded(stream, topics)):
                 if number == limits.MESSAGES:
                     raise InputError(f"{path}: more than {number} messages on {' and '.join(topics)}; split the bag")
-                found[topic].append((_stamp(message, log_time), message))
+                found[topic].append((seconds, message))
     except InputError:
         raise
+    except ImportError:
+        raise InputError("source=mcap needs the optional extra: pip install 'tactile-cube[ros]'") from None
     except Exception as error:  # decoder and decompressors raise a dozen kinds for damaged files
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a complete MCAP file: {reason}") from None
@@ -91,11 +94,52 @@ def _messages(path: Path, topics: tuple[str, str]) -> dict[str, list[tuple[float
     return {topic: sorted(messages, key=lambda one: one[0]) for topic, messages in found.items()}
 
 
-def _stamp(message: Any, log_time: int) -> float:
-    header = getattr(message, "header", None)
-    if header is not None and (header.stamp.sec or header.stamp.nanosec):
-        return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
-    return 1e-9 * log_time
+def _decoded(stream: BinaryIO, topics: Sequence[str]) -> Iterator[tuple[str, float, Any]]:
+    """Topic, time [s] by the header's stamp where there is one, else of logging, and content of ROS 2 messages."""
+    from mcap.records import Channel, Chunk, Message, Schema
+    from mcap.stream_reader import StreamReader, breakup_chunk
+    from mcap_ros2.decoder import DecoderFactory
+
+    factory, schemas, decoders = DecoderFactory(), {}, {}
+    whole = StreamReader(stream, emit_chunks=True, record_size_limit=limits.CHUNK).records
+    for record in (
+        one for part in whole for one in (breakup_chunk(unpacked(part)) if isinstance(part, Chunk) else [part])
+    ):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel) and record.topic in topics:
+            decode = factory.decoder_for(record.message_encoding, schemas.get(record.schema_id))
+            if decode is None:
+                raise ValueError(f"messages on '{record.topic}' are no ROS 2 messages ({record.message_encoding})")
+            decoders[record.id] = record.topic, decode
+        elif isinstance(record, Message) and record.channel_id in decoders:
+            topic, decode = decoders[record.channel_id]
+            message = decode(record.data)
+            stamp = getattr(getattr(message, "header", None), "stamp", None)
+            seconds = 0.0 if stamp is None else float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+            yield topic, seconds or 1e-9 * record.log_time, message
+
+
+def unpacked(chunk: Chunk) -> Chunk:
+    """Return a chunk as it was before it was compressed.
+
+    Raises:
+        ValueError: it is larger than it says, or than `limits.CHUNK`.
+    """
+    import lz4.frame
+    import zstandard
+
+    size = chunk.uncompressed_size
+    if size > limits.CHUNK:
+        raise ValueError(f"a chunk of {size / 1e6:.4g} MB; chunks up to {limits.CHUNK / 1e6:g} MB are read")
+    data = chunk.data
+    if chunk.compression == "zstd":
+        data = zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+    if len(data) != size:
+        raise ValueError(f"a chunk is not of the {size} bytes that it says")
+    return replace(chunk, compression="", data=data)
 
 
 def _by_joint(message: Any, joints: list[str], path: Path, signal: str) -> Array:

@@ -29,7 +29,7 @@ from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTa
 from tactile_cube.measurement.replay.hand_replay import ContactModel, HandReplay, to_hand
 from tactile_cube.measurement.replay.model import Model, terms_of
 from tactile_cube.measurement.replay.simulator import Simulator
-from tactile_cube.measurement.sources.session import SimulatedSession, silent_trial, unmeasured
+from tactile_cube.measurement.sources.simulated_rig import SimulatedSession, silent_trial, unmeasured
 from tactile_cube.simulation.contact_effects import find_any_effect, is_contact_effect
 from tactile_cube.simulation.engine import EngineName
 
