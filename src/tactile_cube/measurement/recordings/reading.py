@@ -35,6 +35,8 @@ from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.untrusted_file import below, read_text
 
 DESCRIPTION = "recording.yaml"
+REMEMBERED = 0.4  # [s] by which a drive has forgotten commands, all but a rate limit
+MOVING = 0.2  # of a trial's usual speed
 
 
 def read_recording(folder: str | Path) -> Recording:
@@ -77,6 +79,7 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     check_nominal(nominal, joints)
     warnings = [f"{file}: {line}" for line in (*description.doubts, *check_coupling(description, rig))]
     trials, gains, left = [], gains_of(description, None, "controller"), limits.NUMBERS
+    moving: list[str] = []
     undamped = [joint for joint, kd in zip(joints, gains.kd, strict=True) if kd == 0]
     if description.controller.mode == "position" and undamped:
         warnings.append(f"{file}: key 'controller.kd': 0 for {', '.join(undamped)}: no damping")
@@ -85,8 +88,14 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
         trial = _trial(path, left, entry, description, rig, f"trials.{index}.controller")
         left -= trial.time.size + 3 * trial.position.size
         trial = trial.with_earlier_commands(description.sensors.commands_late)
+        if description.controller.mode == "position" and begins_in_motion(trial):
+            trial = replace(trial, valid=trial.valid & (trial.time >= REMEMBERED))
+            moving.append(path.name)
         trials += without_excluded(trial, entry.exclude, f"{file}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
+    if moving:
+        count = f"{len(moving)} of {len(description.trials)} trials begin in motion, {moving[0]} first"
+        warnings.append(f"{file}: {count}: their first {REMEMBERED:g} s count in no error, the commands before are unknown")
     if not trials:
         raise InputError(f"{file}: key 'trials': 'exclude' leaves nothing of any trial")
     return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
@@ -120,6 +129,13 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         warnings=tuple(warnings + time_warnings + single),
         load=load_of(description.object, entry.object) if description.object and entry.object else None,
     )
+
+
+def begins_in_motion(trial: Trial) -> bool:
+    """Whether a trial was cut out of a motion: it follows commands that nobody has, through every delay and lag."""
+    speed = np.abs(trial.velocity())
+    usual = np.sqrt(np.mean(speed**2, axis=0))
+    return bool(trial.duration > 4.0 * REMEMBERED and (speed[0] > MOVING * usual).any())
 
 
 def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key: str) -> list[Trial]:

@@ -67,7 +67,7 @@ class Trial:
         command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
         position: (n, joints) measured position, on the motor side [rad].
         torque: (n, joints) measured torque [N m], or None.
-        valid: (n,) False where a dropped sample was interpolated; such samples count in no error.
+        valid: (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log.
         gains: the controller in this trial.
         force: a known force on a link, or None.
         clamped: the links were held still.
