@@ -1,5 +1,6 @@
 """A recording on disk: recording.yaml, the rig's URDF and one table a trial, read and checked."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,33 +11,24 @@ from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_tree import with_own_files
-from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, pick_columns, without_outliers
-from tactile_cube.measurement.recordings.consistency import (
-    check_coupling,
-    check_inertia,
-    check_joints,
-    check_nominal,
-    gains_of,
-    swap_warning,
+from tactile_cube.measurement.recordings import consistency, plausibility
+from tactile_cube.measurement.recordings.columns import (
+    MINIMUM_SAMPLES,
+    check_time,
+    on_grid,
+    pick_columns,
+    rows_of,
+    without_outliers,
 )
+from tactile_cube.measurement.recordings.consistency import check_nominal, gains_of
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
-from tactile_cube.measurement.recordings.plausibility import (
-    check_assignment,
-    check_links,
-    check_roles,
-    check_units,
-    without_wraps,
-)
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.timing import check_time, on_grid, rows_of
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.untrusted_file import below, read_text
 
 DESCRIPTION = "recording.yaml"
-REMEMBERED = 0.4  # [s] by which a drive has forgotten commands, all but a rate limit
-MOVING = 0.2  # of a trial's usual speed
 
 
 def read_recording(folder: str | Path) -> Recording:
@@ -46,11 +38,11 @@ def read_recording(folder: str | Path) -> Recording:
         InputError: naming file, column, row and value of what cannot be used.
     """
     folder = Path(folder)
-    if not (folder / DESCRIPTION).is_file():
-        what = "no such folder" if not folder.exists() else f"a {'folder without it' if folder.is_dir() else 'file'}"
+    if not os.path.lexists(folder / DESCRIPTION):
+        what = "no such folder" if not folder.exists() else f"{DESCRIPTION}: no such file"
         raise InputError(
-            f"recording={folder}: {what}; a recording is a folder with {DESCRIPTION}, which record makes of logs: "
-            f"source=csv source.files={folder} source.urdf=FILE out=FOLDER"
+            f"recording={folder}: {what}; record makes a recording of logs: source=csv source.files={folder} "
+            "source.urdf=FILE out=FOLDER"
         )
     file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)
@@ -58,16 +50,16 @@ def read_recording(folder: str | Path) -> Recording:
     rig = parse_rig(read_text(path, "; recording.yaml names it under 'rig'"), path)
     urdf, not_drawn = with_own_files(rig.text, rig.path, folder)
     rig = replace(rig, text=urdf)
-    check_joints(description, rig, file)
+    consistency.check_joints(description, rig, file)
     try:
         recording = _assemble(folder, description, rig)
     except InputError:
         raise
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
-    check_inertia(recording)
+    consistency.check_inertia(recording)
     warnings = [f"{rig.path}: {line}" for line in recording.rigid_body().corrected]
-    warnings += [*recording.warnings, *swap_warning(recording)]
+    warnings += [*recording.warnings, *consistency.swap_warning(recording)]
     if not_drawn:
         warnings.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
     return replace(recording, warnings=tuple(warnings))
@@ -77,9 +69,8 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     file, joints = folder / DESCRIPTION, tuple(description.joints)
     nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
     check_nominal(nominal, joints)
-    warnings = [f"{file}: {line}" for line in (*description.doubts, *check_coupling(description, rig))]
+    warnings = [f"{file}: {line}" for line in (*description.doubts, *consistency.check_coupling(description, rig))]
     trials, gains, left = [], gains_of(description, None, "controller"), limits.NUMBERS
-    moving: list[str] = []
     undamped = [joint for joint, kd in zip(joints, gains.kd, strict=True) if kd == 0]
     if description.controller.mode == "position" and undamped:
         warnings.append(f"{file}: key 'controller.kd': 0 for {', '.join(undamped)}: no damping")
@@ -88,38 +79,32 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
         trial = _trial(path, left, entry, description, rig, f"trials.{index}.controller")
         left -= trial.time.size + 3 * trial.position.size
         trial = trial.with_earlier_commands(description.sensors.commands_late)
-        if description.controller.mode == "position" and begins_in_motion(trial):
-            trial = replace(trial, valid=trial.valid & (trial.time >= REMEMBERED))
-            moving.append(path.name)
         trials += without_excluded(trial, entry.exclude, f"{file}: key 'trials.{index}.exclude'")
         warnings += trial.warnings
-    if moving:
-        count = f"{len(moving)} of {len(description.trials)} trials begin in motion, {moving[0]} first"
-        warnings.append(f"{file}: {count}: their first {REMEMBERED:g} s count in no error, the commands before are unknown")
     if not trials:
         raise InputError(f"{file}: key 'trials': 'exclude' leaves nothing of any trial")
     return Recording(folder, description, rig, gains, nominal, tuple(trials), tuple(warnings))
 
 
 def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
-    """One trial, checked and on the uniform grid of the recording's rate."""
     joints, rate = tuple(description.joints), description.rate_hz
     gains = gains_of(description, entry, key)
     columns, warnings = pick_columns(read_table(path, most), joints, path)
     columns, time_warnings = check_time(columns, rate, path)
     ranges = [rig.joints[joint] for joint in joints]
-    columns, wrapped = without_wraps(columns, ranges, path)
+    columns, wrapped = plausibility.without_wraps(columns, ranges, path)
     warnings += wrapped
     if description.controller.mode == "position":
-        warnings += check_units(columns, ranges, gains, path)
-        warnings += check_assignment(columns, ranges, path) if entry.object is None else []
-        warnings += check_roles(columns, joints, path)
-    check_links(columns, joints, path)
+        warnings += plausibility.check_units(columns, ranges, gains, path)
+        warnings += plausibility.check_assignment(columns, ranges, path) if entry.object is None else []
+        warnings += plausibility.check_roles(columns, joints, path)
+    plausibility.check_links(columns, joints, path)
     columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, rate)
     stamps = (columns.time[outlying] - columns.time[0]) * rate
     beside = np.concatenate([np.floor(stamps), np.ceil(stamps)]).astype(np.int64)
     valid[np.minimum(beside, len(valid) - 1)] = False
+    valid &= grid.time >= entry.unjudged
     return Trial(
         name=path.stem,
         **{key: getattr(entry, key) for key in ("file", "kind", "initialisation", "force", "clamped", "touch")},
@@ -129,13 +114,6 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
         warnings=tuple(warnings + time_warnings + single),
         load=load_of(description.object, entry.object) if description.object and entry.object else None,
     )
-
-
-def begins_in_motion(trial: Trial) -> bool:
-    """Whether a trial was cut out of a motion: it follows commands that nobody has, through every delay and lag."""
-    speed = np.abs(trial.velocity())
-    usual = np.sqrt(np.mean(speed**2, axis=0))
-    return bool(trial.duration > 4.0 * REMEMBERED and (speed[0] > MOVING * usual).any())
 
 
 def without_excluded(trial: Trial, intervals: Sequence[tuple[float, float]], key: str) -> list[Trial]:

@@ -46,6 +46,8 @@ Units = dict[str, dict[str, Unit]]
 OF_SOME = {"link_position": np.nan, "feedforward": 0.0}
 """Signals that some joints may have, and what stands for those of the others."""
 SHOWN = 3  # steps of one kind
+REMEMBERED = 0.4  # [s] by which a drive has forgotten earlier commands, but for a rate limit
+MOVING, LOOK = 0.2, 0.03  # of a trial's usual speed, and [s] that it is read from
 ASIDE = ("words", "left out", "array", "list column")
 
 
@@ -121,8 +123,14 @@ class CsvFiles(Mechanism):
         repeats = ", ".join(f"{kind} x {n}" if n > 1 else kind for kind, n in count.items())
         by = "source.kind" if self.kind is not None else "file names and commands"
         understood = [*_steps(pieces), *_rows(columns, units, stamps, rate), ("kinds", repeats, by)]
-        understood += rig.understood(list(columns.joints))
         tables = [piece for trial in trials for piece in cut_trial(trial, self.length)]
+        if moving := [k for k, table in enumerate(tables) if mode == "position" and _begins_in_motion(table)]:
+            late = f"{len(moving)} of {len(tables)} trials; their first {REMEMBERED:g} s count in no error"
+            understood.append(("begin in motion", late, "commands before are unknown"))
+        for k in moving:
+            entry = tables[k].entry.model_copy(update={"unjudged": REMEMBERED})
+            tables[k] = replace(tables[k], entry=entry)
+        understood += rig.understood(list(columns.joints))
         description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts))})
         return {"": RecordingTables(description, rig.text, tables, [row for row in understood if row[1]])}
 
@@ -282,6 +290,13 @@ def _trial(log: Log, columns: ColumnMap, units: Units, second: float, rate: floa
         time = np.arange(rows) / (rate or 1.0)
     entry = TrialEntry(file=f"trials/{log.name}.parquet", note=f"from {log.path.name}")
     return TrialTable(entry, time, origin=log.path, **values)
+
+
+def _begins_in_motion(trial: TrialTable) -> bool:
+    rows = max(1, int(np.searchsorted(trial.time, trial.time[0] + LOOK)))
+    way = np.abs(trial.position[rows:] - trial.position[:-rows])
+    long = trial.time[-1] - trial.time[0] > 4.0 * REMEMBERED
+    return bool(long and (way[0] > MOVING * np.sqrt(np.mean(way**2, axis=0))).any())
 
 
 def _doubts(
