@@ -63,10 +63,10 @@ def test_a_csv_import_that_failed_does_not_block_the_corrected_command(tmp_path:
 
 
 ARM = """<robot name="arm"><link name="base"/><link name="upper"><inertial><origin xyz="0.1 0 0"/><mass value="0.4"/>
-<inertia ixx="1e-4" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="shoulder_pan"
+<inertia ixx="1e-4" iyy="1.6e-2" izz="1.6e-2" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="shoulder_pan"
 type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="5"
 velocity="9"/></joint></robot>"""
-KP, KD, INERTIA, DELAY, FPS = 6.0, 0.5, 0.005, 0.06, 30
+KP, KD, INERTIA, DELAY, FPS = 6.0, 0.6, 0.02, 0.06, 30
 
 
 def lerobot_set(folder: Path) -> None:

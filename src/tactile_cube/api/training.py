@@ -1,7 +1,5 @@
 """Train a policy from a program: in one run, or in stages of which each begins with the networks of the one before."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
@@ -10,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
@@ -20,6 +18,7 @@ from tactile_cube.agent.policy_file import save_policy
 from tactile_cube.api.environment import grasps_of
 from tactile_cube.api.evaluation import run_evaluation
 from tactile_cube.api.job import Job, PathLike, as_input_errors, as_word, called_job, worded_job
+from tactile_cube.composition import composed
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import networks_path
@@ -38,15 +37,10 @@ PUBLISHED: dict[str, dict[str, Any]] = {
     "object": {"shape": "box", "size": 0.08, "mass": 0.05},
 }
 """Hand and object of the paper, by the groups of conf/."""
-KEY = re.compile(r"[+~]*([\w./@]+)")
-"""What a word of a command line sets."""
-NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")
-"""Keys of the training as a whole."""
+KEY = re.compile(r"[+~]*([\w./@]+)")  # what a word of a command line sets
+NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the training as a whole
 ENGINES = ("bullet", "mujoco")
-AVERAGED = 5
-"""Policies whose mean is what comes out, as in conf/average.yaml."""
-GRASPS = 1000
-"""As many as those that come with the package."""
+GRASPS = 1000  # as many as those that come with the package
 COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
 """Columns of metrics.csv that go on from stage to stage."""
 
@@ -105,29 +99,13 @@ def train(
 ) -> TrainingResult:
     """Train a policy, or go on training it: the same call resumes.
 
-    Args:
-        experiment: option of conf/experiment, which changes several choices at once; None: `curriculum`.
-        hand: option of conf/hand; this and the next fourteen: None: as the experiment says.
-        object: option of conf/object.
-        task: option of conf/task.
-        reward: option of conf/reward.
-        randomization: option of conf/randomization.
-        start: option of conf/start.
-        exploration: option of conf/exploration.
-        curriculum: option of conf/curriculum.
-        env: option of conf/env.
-        agent: option of conf/agent.
-        replay: option of conf/replay.
-        collector: option of conf/collector.
-        training: option of conf/training.
-        logger: option of conf/logger.
-        without: option of conf/without, with experiment="ablations".
-        engine: of the worlds.
-        model: model.yaml that describes the hand.
-        own_effects: classes of your own that the model names, as dotted paths.
-        seed: of everything random.
-        values: other keys of the configuration, dotted -> value, e.g. {"task.filter_time": 0.25}.
-        folder: run folder; None: outputs/train/<name>-seed<seed>.
+    `experiment` is an option of conf/experiment, which changes several choices at once; None: `curriculum`. From `hand`
+    to `logger` they are options of the groups of conf/ with these names, None: as the experiment says, and so is
+    `without`, with experiment="ablations". `engine` is that of the worlds, `model` the model.yaml of the hand;
+    `own_effects` names classes of your own that the model has, as dotted paths; `seed` is of everything random.
+
+    `values` sets other keys of the configuration, dotted -> value, e.g. {"task.filter_time": 0.25}; `folder` is the run
+    folder; None: outputs/train/<name>-seed<seed>.
 
     Raises:
         InputError: a value that cannot be used, or the folder is in use.
@@ -140,8 +118,7 @@ def train(
     return run_training(called_job("train", locals()))
 
 
-@dataclass(frozen=True)
-class AveragedPolicy:
+class AveragedPolicy(NamedTuple):
     """A policy whose weights are the mean of several, and after how many steps each of these was kept."""
 
     policy: Path
@@ -175,28 +152,22 @@ def run_averaging(job: Job) -> AveragedPolicy:
 def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
     """Train what a job says, in one run or in stages, and say how it went.
 
-    Args:
-        job: what to train.
-        stage: what lines of progress begin with where the run is a stage of several.
-        later: environment steps that the stages after it usually take.
+    Of a stage of several, `stage` is what lines of progress begin with, and the stages after it usually take `later`
+    environment steps.
     """
     plain = plain_settings(job)
     before = Finished.of(job.folder, plain)
     if before is not None:
         print(f"{job.folder}: finished before ({before.reason}); training.resume=never starts over")
         return TrainingResult(job.folder, before.reason, before.steps, before.final_angle)
-    return _in_stages(job, plain) if job.config.stages else _in_one(job, plain, stage, later)
-
-
-def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
-    """Train through faults of the workers."""
+    if job.config.stages:
+        return _in_stages(job, plain)
     start = partial(_training_run, job, plain, stage, later)
     run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 
 def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int, **changes: str) -> Run:
-    """The run that a job describes, with changes to how it is trained: new, or where its checkpoint says."""
     config: Any = job.config
     run = build_run(
         folder=job.folder,
@@ -255,7 +226,6 @@ def stages_of(job: Job) -> list[Job]:
 
 
 def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
-    """What is mastered, what is not, and what is to come, in one line."""
     lines = [
         f"{one.folder.name}: {one.reason if one.reason.startswith(MASTERED) else f'not mastered: {one.reason}'}"
         for one in results
@@ -266,9 +236,9 @@ def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
 
 def judged(job: Job, last: Path) -> str:
     """Write the mean of the last stage's policies, and judge it in fresh draws of its worlds, in both engines."""
-    kept = len(list(last.glob("policy_[0-9]*.safetensors")))
+    kept = min(composed("average", []).last, len(list(last.glob("policy_[0-9]*.safetensors"))))
     policy = job.folder / POLICY
-    save_policy(policy, *averaged(kept_policies(last, min(AVERAGED, kept)) if kept else [last / POLICY]))
+    save_policy(policy, *averaged(kept_policies(last, kept) if kept else [last / POLICY]))
     said, named = [], {_key(word) for word in job.words} & {"hand", "object"}  # which no policy's file has read
     again = [word for word in job.words if _key(word).partition(".")[0] in named]
     for engine in ENGINES:
@@ -281,8 +251,7 @@ def judged(job: Job, last: Path) -> str:
 
 
 def _key(word: str) -> str:
-    found = KEY.match(word)
-    return found[1] if found else word
+    return found[1] if (found := KEY.match(word)) else word
 
 
 def _own_grasps(job: Job, file: Path) -> str | None:
@@ -300,7 +269,6 @@ def _own_grasps(job: Job, file: Path) -> str | None:
 
 
 def _sum_up(folder: Path, results: Sequence[TrainingResult]) -> None:
-    """Write costs and curve of all stages so far into the folder of the whole training."""
     costs = [asdict(read_costs(result.folder / LEDGER)) for result in results]
     spent = Costs(**{name: sum(one[name] for one in costs) for name in costs[0]})
     write_costs(folder / LEDGER, sum(result.steps for result in results), spent)

@@ -4,26 +4,20 @@ One multibody per finger: the solver couples the rows of everything that hangs o
 several times faster than one hand.
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pybullet
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, ObjectShape, straight_half, unit_inertia
-from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, named_contact
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, SimulationOptions
-
-Array = NDArray[np.float64]
+from tactile_cube.simulation.engine import OBJECT_STATE, SKIN_RELAXATION, Contact, SimulationOptions, named_contact
 
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
 TILTED = 0.05
@@ -87,13 +81,11 @@ class BulletEngine:
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Builds the fingers; cube and table come with each episode."""
         self._hand, self._drive = hand, drive
         self.client = connect(options)
+        self._here = {"physicsClientId": self.client}
         half = (0.5 * _TABLE_SIZE).tolist()
-        self._table_shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
-        )
+        self._table_shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **self._here)
         self._cube_shape = -1
         self._cube_size = self._cube_com = np.zeros(3)
         self._cube_kind: ObjectShape = "box"
@@ -105,75 +97,80 @@ class BulletEngine:
             load_chain(self.client, urdf, *base) for urdf, base in zip(drive.finger_urdfs(), bases, strict=True)
         ]
         self._inertias = [
-            [pybullet.getDynamicsInfo(body, link, physicsClientId=self.client)[2] for link in self._links]
-            for body in self.fingers
+            [pybullet.getDynamicsInfo(body, link, **self._here)[2] for link in self._links] for body in self.fingers
         ]
         for body, bare in zip(self.fingers, self._bare, strict=True):  # Bullet boxes links without a shape too
             for link in (-1, *bare):
-                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, **self._here)
         self.q, self.v = np.zeros((2, len(hand.fingers), hand.links_per_finger))
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
-        """See `Engine.place`."""
         self._constants = constants
         self.q[:], self.v[:] = q, v
         # the table goes last: a new body gets the place in the broadphase that was left last, and the solver goes
         # through contacts in the order of these places, which must be the same in every episode
         for body in (self.cube, self.table):
             if body >= 0:
-                pybullet.removeBody(body, physicsClientId=self.client)
+                pybullet.removeBody(body, **self._here)
         self.table = -1
         if constants.table_height is not None:  # even a distant body takes 6 % of the time
             self.table = self._new_table(constants.table_height)
             friction = {"lateralFriction": constants.table_friction}
-            pybullet.changeDynamics(self.table, -1, **friction, physicsClientId=self.client)
+            pybullet.changeDynamics(self.table, -1, **friction, **self._here)
         self._set_cube(constants, start)
         for body, position, velocity in zip(self.fingers, q, v, strict=True):
             for k in self._links:
-                pybullet.resetJointState(body, k, position[k], velocity[k], physicsClientId=self.client)
-        self._set_friction(constants)
+                pybullet.resetJointState(body, k, position[k], velocity[k], **self._here)
+        self._set_links(constants)
         self._forget_contacts()
-        self._set_spin_inertia()
 
     def set_gravity(self, acceleration: Array) -> None:
-        """See `Engine.set_gravity`."""
-        pybullet.setGravity(*acceleration, physicsClientId=self.client)
+        pybullet.setGravity(*acceleration, **self._here)
 
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
-        """See `Engine.run`."""
         states = np.empty((steps + 1, OBJECT_STATE)) if record else None
         control, memory = self._drive.plant.kernel.control_step, self._drive.memory
         torque = np.zeros_like(self.q)
         for i in range(steps):
             control(i, self.q.reshape(-1), self.v.reshape(-1), torque.reshape(-1), memory)
-            self._apply(torque)
+            for body, forces in zip(self.fingers, torque.tolist(), strict=True):
+                pybullet.setJointMotorControlArray(
+                    body, self._links, pybullet.TORQUE_CONTROL, forces=forces, **self._here
+                )
             if states is not None:
                 states[i] = self.cube_state()
             if wrench is not None:
-                self._push(wrench)
-            pybullet.stepSimulation(physicsClientId=self.client)
-            self._read_joints()
+                centre, _ = pybullet.getBasePositionAndOrientation(self.cube, **self._here)
+                force, torque_on, frame = wrench[:3].tolist(), wrench[3:].tolist(), pybullet.WORLD_FRAME
+                pybullet.applyExternalForce(self.cube, -1, force, centre, frame, **self._here)
+                pybullet.applyExternalTorque(self.cube, -1, torque_on, frame, **self._here)
+            pybullet.stepSimulation(**self._here)
+            read = [one for body in self.fingers for one in pybullet.getJointStates(body, self._links, self.client)]
+            self.q.reshape(-1)[:] = [state[0] for state in read]
+            self.v.reshape(-1)[:] = [state[1] for state in read]
         if states is not None:
             states[steps] = self.cube_state()
         return states
 
     def cube_state(self) -> Array:
-        """See `Engine.cube_state`."""
-        position, quaternion = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
-        linear, angular = pybullet.getBaseVelocity(self.cube, physicsClientId=self.client)
-        return self._of_centre(np.array([*position, *quaternion, *linear, *angular]))
+        position, quaternion = pybullet.getBasePositionAndOrientation(self.cube, **self._here)
+        linear, angular = pybullet.getBaseVelocity(self.cube, **self._here)
+        state = np.array([*position, *quaternion, *linear, *angular])
+        if np.asarray(self._constants.cube_com).any():  # Bullet speaks of the centre of mass
+            arm = com_arm(self._constants, state[3:7])
+            state[:3] -= arm
+            state[7:10] -= np.cross(state[10:13], arm)
+        return state
 
     def gaps(self) -> list[float]:
-        """See `Engine.gaps`."""
-        return [row[8] for row in pybullet.getContactPoints(physicsClientId=self.client)]
+        return [row[8] for row in pybullet.getContactPoints(**self._here)]
 
     def contacts(self) -> list[Contact]:
-        """See `Engine.contacts`."""
         names = {(body, -1): (name, "") for body, name in ((self.cube, "cube"), (self.table, "table"))}
         for body, finger in zip(self.fingers, self._hand.fingers, strict=True):
             names |= {(body, k): (finger.name, link) for k, link in enumerate(finger.links)}
         found = []
-        for row in pybullet.getContactPoints(physicsClientId=self.client):
+        for row in pybullet.getContactPoints(**self._here):
             first, second = names[row[1], row[3]], names[row[2], row[4]]
             middle = 0.5 * (np.array(row[5]) + np.array(row[6]))
             friction_on_first = row[10] * np.array(row[11]) + row[12] * np.array(row[13])
@@ -181,9 +178,8 @@ class BulletEngine:
         return found
 
     def normal_forces(self) -> Array:
-        """See `Engine.normal_forces`."""
         force, tip = np.zeros((2, len(self.fingers))), self._links[-1]
-        for row in pybullet.getContactPoints(physicsClientId=self.client):
+        for row in pybullet.getContactPoints(**self._here):
             body, link = (row[2], row[4]) if row[1] == self.cube else (row[1], row[3])
             if self.cube in row[1:3] and body in self.fingers:
                 force[int(link == tip), self.fingers.index(body)] += row[9]
@@ -194,36 +190,11 @@ class BulletEngine:
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
 
-    def _apply(self, torque: Array) -> None:
-        for body, forces in zip(self.fingers, torque.tolist(), strict=True):
-            pybullet.setJointMotorControlArray(
-                body, self._links, pybullet.TORQUE_CONTROL, forces=forces, physicsClientId=self.client
-            )
-
-    def _read_joints(self) -> None:
-        states = [one for body in self.fingers for one in pybullet.getJointStates(body, self._links, self.client)]
-        self.q.reshape(-1)[:] = [state[0] for state in states]
-        self.v.reshape(-1)[:] = [state[1] for state in states]
-
-    def _push(self, wrench: Array) -> None:
-        centre, _ = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
-        frame = pybullet.WORLD_FRAME
-        pybullet.applyExternalForce(self.cube, -1, wrench[:3].tolist(), centre, frame, physicsClientId=self.client)
-        pybullet.applyExternalTorque(self.cube, -1, wrench[3:].tolist(), frame, physicsClientId=self.client)
-
-    def _of_centre(self, state: Array) -> Array:
-        """Bullet speaks of the centre of mass; the same state (13,) of the cube's centre."""
-        if np.asarray(self._constants.cube_com).any():
-            arm = com_arm(self._constants, state[3:7])
-            state[:3] -= arm
-            state[7:10] -= np.cross(state[10:13], arm)
-        return state
-
     def _new_table(self, height: float) -> int:
         centre = [0.0, 0.0, height - 0.5 * float(_TABLE_SIZE[2])]
         return int(
             pybullet.createMultiBody(
-                0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, physicsClientId=self.client
+                0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, **self._here
             )
         )
 
@@ -241,7 +212,7 @@ class BulletEngine:
                 basePosition=list(np.asarray(start.cube_position) + arm),
                 baseOrientation=list(np.asarray(start.cube_quaternion)),
                 useMaximalCoordinates=True,
-                physicsClientId=self.client,
+                **self._here,
             )
         )
         pybullet.changeDynamics(
@@ -252,23 +223,23 @@ class BulletEngine:
             rollingFriction=0.0,
             activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
             **_NO_DAMPING,
-            physicsClientId=self.client,
+            **self._here,
         )
         if constants.object_shape not in ("box", "cylinder"):  # Bullet takes that of a box for the others
             # without its mass it would lose the inertia; without a margin a mesh ends where its corners are
             inertia = constants.cube_mass * unit_inertia(constants.object_shape, np.asarray(constants.cube_size))
             heavy = {"mass": constants.cube_mass, "localInertiaDiagonal": np.diag(inertia).tolist()}
             heavy |= {"collisionMargin": 0.0} if isinstance(constants.object_shape, ObjectMesh) else {}
-            pybullet.changeDynamics(self.cube, -1, **heavy, physicsClientId=self.client)
+            pybullet.changeDynamics(self.cube, -1, **heavy, **self._here)
         if constants.tip_compliance > 0.0:
             skin = {
                 "contactStiffness": 1.0 / constants.tip_compliance,
                 "contactDamping": SKIN_RELAXATION / constants.tip_compliance,
             }
-            pybullet.changeDynamics(self.cube, -1, **skin, physicsClientId=self.client)
+            pybullet.changeDynamics(self.cube, -1, **skin, **self._here)
         turning = np.asarray(start.cube_angular_velocity)
         linear = np.asarray(start.cube_linear_velocity) + np.cross(turning, arm)
-        pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), physicsClientId=self.client)
+        pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), **self._here)
 
     def _shape_of(self, constants: EpisodeConstants) -> int:
         """The shape of the last object if it had this kind, size and centre of mass, else a new one.
@@ -284,31 +255,23 @@ class BulletEngine:
             else:
                 place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
                 geometry = _geometry(kind, size) | place
-            shape = pybullet.createCollisionShape(**geometry, physicsClientId=self.client)
+            shape = pybullet.createCollisionShape(**geometry, **self._here)
             self._cube_shape, self._cube_kind = int(shape), kind
             self._cube_size, self._cube_com = size.copy(), com.copy()
         return self._cube_shape
 
-    def _set_spin_inertia(self) -> None:
-        """Adds inertia about the joint axis to each link, for numerical stability."""
+    def _set_links(self, constants: EpisodeConstants) -> None:
+        """Friction of the links, whose factors Bullet multiplies with the object's, and inertia about their joints."""
         for body, inertias, spins in zip(self.fingers, self._inertias, self._drive.view("spin_inertia"), strict=True):
             for link, (diagonal, spin) in enumerate(zip(inertias, spins, strict=True)):
-                spinning = list(diagonal)
+                tip, spinning = link == self._links[-1], list(diagonal)
                 spinning[self._hand.axes[link]] += spin
-                pybullet.changeDynamics(body, link, localInertiaDiagonal=spinning, physicsClientId=self.client)
-
-    def _set_friction(self, constants: EpisodeConstants) -> None:
-        """Friction of the links; Bullet multiplies the factors of the two bodies that touch."""
-        for body in self.fingers:
-            for link in self._links:
-                tip = link == self._links[-1]
-                pybullet.changeDynamics(
-                    body,
-                    link,
-                    lateralFriction=constants.tip_friction if tip else constants.link_friction,
-                    spinningFriction=constants.tip_spinning_friction if tip else 0.0,
-                    physicsClientId=self.client,
-                )
+                numbers = {
+                    "lateralFriction": constants.tip_friction if tip else constants.link_friction,
+                    "spinningFriction": constants.tip_spinning_friction if tip else 0.0,
+                    "localInertiaDiagonal": spinning,
+                }
+                pybullet.changeDynamics(body, link, **numbers, **self._here)
 
     def _forget_contacts(self) -> None:
         """Registers every finger anew with the broadphase; cube and table are new themselves.
@@ -318,11 +281,9 @@ class BulletEngine:
         """
         for k, body in enumerate(self.fingers):
             group = _FIRST_FINGER_GROUP << k
-            for link in self._links:
-                if link not in self._bare[k]:
-                    pybullet.setCollisionFilterGroupMask(
-                        body, link, group, _ALL_GROUPS & ~group, physicsClientId=self.client
-                    )
+            mask = _ALL_GROUPS & ~group
+            for link in (one for one in self._links if one not in self._bare[k]):
+                pybullet.setCollisionFilterGroupMask(body, link, group, mask, **self._here)
 
 
 def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
@@ -337,7 +298,6 @@ def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
 
 
 def _geometry(kind: NamedShape, size: Array) -> dict[str, Any]:
-    """Bullet's words for an object of a kind with a bounding box (3,) [m]."""
     half = 0.5 * size
     if kind == "box":
         return {"shapeType": pybullet.GEOM_BOX, "halfExtents": half.tolist()}

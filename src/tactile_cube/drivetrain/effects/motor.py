@@ -7,14 +7,7 @@ import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage, harmonic
 from tactile_cube.drivetrain.effects.scales import Scales, unit_at
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    ANGLE,
-    DAMPING,
-    JOINT_TORQUE,
-    TORQUE,
-    VELOCITY,
-)
+from tactile_cube.drivetrain.signals import ACCELERATION, ANGLE, DAMPING, JOINT_TORQUE, TORQUE, VELOCITY
 
 
 class TorqueGain(Effect):
@@ -34,13 +27,11 @@ class TorqueGain(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         x[DAMPING, j] *= 1.0 + p[0]
         return x[TORQUE, j] * (1.0 + p[0])
 
 
-SMALLEST = 0.01
-"""Part of `reference` below which the curve is a straight line to zero."""
+SMALLEST = 0.01  # part of `reference` below which the curve is a straight line to zero
 
 
 class TorqueCurve(Effect):
@@ -74,7 +65,6 @@ class TorqueCurve(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         if p[0] == 0.0 and p[1] == 0.0:
             return x[TORQUE, j]
         load = abs(x[TORQUE, j]) / p[2]
@@ -99,7 +89,6 @@ class TorqueBias(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         return x[TORQUE, j] + p[0]
 
 
@@ -129,7 +118,6 @@ class TorqueCrosstalk(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         n = x.shape[1]
         return x[TORQUE, j] + p[0] * x[TORQUE, (j - 1) % n] + p[1] * x[TORQUE, (j + 1) % n]
 
@@ -179,7 +167,6 @@ class Cogging(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the joint torque [N m]."""
         angle = p[2] * x[ANGLE, j]
         if p[3] == 0.0 and p[4] == 0.0:
             return x[JOINT_TORQUE, j]
@@ -189,7 +176,6 @@ class Cogging(Effect):
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         angle = p[2] * x[ANGLE, j]
         ripple = p[0] * sin(angle) + p[1] * cos(angle)
         if p[3] == 0.0 and p[4] == 0.0:
@@ -241,14 +227,11 @@ class ActuatorLag(Effect):
         return s[0]
 
 
-LEVELS = 9
-"""Number of limits at which a search starts, from the median torque to the largest ones in equal factors."""
+LEVELS = 9  # number of limits at which a search starts, from the median torque to the largest ones in equal factors
 
-REACHED = 0.9
-"""Share of the stated limit from which it counts as reached: limits of drives vary by a tenth."""
+REACHED = 0.9  # share of the stated limit from which it counts as reached: limits of drives vary by a tenth
 
-HARD = 0.02
-"""A softness up to this counts as none: the torque is within 1.4 % of the limit, and larger powers overflow."""
+HARD = 0.02  # A softness up to this counts as none: the torque is within 1.4 % of the limit, and larger powers overflow
 
 
 class TorqueSaturation(Effect):
@@ -286,7 +269,6 @@ class TorqueSaturation(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         if p[1] > HARD:
             asked = 1.0 + abs(x[TORQUE, j] / p[0]) ** (1.0 / p[1])
             x[DAMPING, j] *= asked ** -(p[1] + 1.0)
@@ -296,10 +278,8 @@ class TorqueSaturation(Effect):
         return min(max(x[TORQUE, j], -p[0]), p[0])
 
 
-UNLIMITED = 1e9
-"""Neutral value of `stall`: a supply that is never too weak."""
-FASTER = (1.2, 2.5)
-"""No-load speeds at which a search starts, as multiples of the largest speed of the recording."""
+UNLIMITED = 1e9  # neutral value of `stall`: a supply that is never too weak
+FASTER = (1.2, 2.5)  # No-load speeds at which a search starts, as multiples of the largest speed of the recording
 
 
 class BackEmf(Effect):
@@ -331,7 +311,6 @@ class BackEmf(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         if p[0] >= UNLIMITED:
             return x[TORQUE, j]
         slope = p[0] / p[1]

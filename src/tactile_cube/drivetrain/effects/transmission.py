@@ -79,8 +79,7 @@ class VelocityFilterLag(Effect):
         return asked
 
 
-STIFF = 0.03
-"""Compliance of a stiffly controlled machine at which a search starts, as a part of a finger's."""
+STIFF = 0.03  # compliance of a stiffly controlled machine at which a search starts, as a part of a finger's
 
 
 class Elasticity(Effect):
@@ -178,7 +177,6 @@ class TransmissionError(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor position [rad]."""
         angle = p[2] * x[ANGLE, j]
         return x[MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)
 
@@ -200,13 +198,11 @@ class PositionOffset(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor position [rad]."""
         return x[MOTOR_POSITION, j] + p[0]
 
 
 NEWTON_STEPS = 12
-SHOWN = 0.5
-"""Part of the link's motion that its sensor must show, or the link is free within its gap."""
+SHOWN = 0.5  # part of the link's motion that its sensor must show, or the link is free within its gap
 
 
 def torque_behind_play(torque: Array, drop: Array, softness: Array) -> Array:
@@ -310,7 +306,6 @@ class Backlash(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor position [rad]."""
         reading = x[MOTOR_POSITION, j]
         if p[0] > 0.0:
             half = 0.5 * p[0]

@@ -15,8 +15,7 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Mass = Annotated[Positive, Field(le=limits.MASS)]
 Rate = Annotated[Positive, Field(le=limits.RATE)]
-MOST_LATE = 64
-"""Rows by which commands may be logged late."""
+MOST_LATE = 64  # rows by which commands may be logged late
 Size = Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
 """Edge lengths of a box [m]; one number for a cube."""
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
@@ -139,6 +138,7 @@ class Description(Strict):
     source: str = ""  # where the data come from
     # what nobody states; the numbers given for it are guesses, and identification begins with them
     unknown: list[Literal["kp", "kd", "reflected_inertia", "mass"]] = Field(default_factory=list)
+    shown_in: dict[str, Literal["deg"]] = Field(default_factory=dict)  # joints whose log is in degrees
     doubts: list[str] = Field(default_factory=list)  # what the import could not prove, and what it left out
 
     @model_validator(mode="after")

@@ -14,10 +14,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body
 from tactile_cube.measurement.recordings.description import Coupling, Description
 from tactile_cube.measurement.recordings.rig import Rig
-from tactile_cube.measurement.recordings.trial import Gains, Trial
+from tactile_cube.measurement.recordings.trial import Array, Gains, Trial
 from tactile_cube.measurement.units import SLIDES, TURNS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -97,19 +95,21 @@ class Recording:
         """Joint -> unit of its position: `rad` where it turns, `m` where it slides; torques are N m or N likewise."""
         return {joint: SLIDES if self.rig.joints[joint].prismatic else TURNS for joint in self.joints}
 
+    @property
+    def shown(self) -> dict[str, str]:
+        """Joint -> unit in which people read its position: `deg` where its log has degrees, else as `units`."""
+        said = self.description.shown_in
+        return {joint: said.get(joint, unit) if unit == TURNS else unit for joint, unit in self.units.items()}
+
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
-        values = getattr(self.gains, constant, self.nominal.get(constant))
-        return (
-            None if values is None or constant in self.description.unknown else float(values[self.joints.index(joint)])
-        )
+        values: Array | None = getattr(self.gains, constant, self.nominal.get(constant))
+        if values is None or constant in self.description.unknown:
+            return None
+        return float(values[self.joints.index(joint)])
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
-        """The mechanism.
-
-        Raises:
-            InputError: the URDF and the joints of recording.yaml make none.
-        """
+        """The mechanism. Raises InputError: the URDF and the joints of recording.yaml make none."""
         coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
         try:
             return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)

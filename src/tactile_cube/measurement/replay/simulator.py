@@ -1,47 +1,39 @@
 """A recorded rig in simulation: many models at once, in segments started anew or freely, on all cores."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from tactile_cube.compiled import compiled_once
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.catalogue import catalogue
+from tactile_cube.drivetrain.effects.command import IntegralAction
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
+from tactile_cube.drivetrain.plant import TREE_KEYS
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
+from tactile_cube.errors import InputError
+from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.comparing.noise_floor import LEAST, sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
+from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
-from tactile_cube.measurement.replay.integrals import integrating_joints, wind_up
-from tactile_cube.measurement.replay.known_force import force_torque
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
-Array = NDArray[np.float64]
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
-MECHANICS = (
-    "ratio",
-    "offset",
-    "mass",
-    "placement_translation",
-    "axis",
-    "com",
-    "placement_rotation",
-    "inertia",
-    "gravity",
-)
-"""What the equations of motion of a path depend on, but for rotors."""
+DRIVE = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
+MECHANICS = (*TREE_KEYS, "gravity")  # what the equations of motion of a path depend on, but for rotors
 
 
 @dataclass(frozen=True)
@@ -68,13 +60,7 @@ class Path:
 
 
 def free_run(recording: Recording, model: Model, step: float = 0.002) -> list[Simulated]:
-    """Every trial of a recording simulated freely from its start.
-
-    Args:
-        recording: rig and trials.
-        model: with joint offsets for each of the trials' initialisations.
-        step: longest integration step [s].
-    """
+    """Every trial of a recording simulated freely from its start, in steps of `step` [s] at most."""
     simulator = Simulator(recording, [term.effect for term in model.terms], step)
     try:
         return simulator.free_runs([model])[0]
@@ -86,19 +72,12 @@ class Simulator:
     """The drivetrain that training uses as a recording's rig, with every effect that a model may have compiled in."""
 
     def __init__(
-        self,
-        recording: Recording,
-        effects: Sequence[type[Effect]] = (),
-        step: float = 0.002,
-        time: float = 1.0,
+        self, recording: Recording, effects: Sequence[type[Effect]] = (), step: float = 0.002, time: float = 1.0
     ) -> None:
         """Build the plant; its kernel is compiled once and kept on disk.
 
-        Args:
-            recording: rig, controller and sampling step.
-            effects: a user's classes that a model may use, beside those of the catalogue.
-            step: longest integration step [s]; a whole number of steps fits between two samples.
-            time: what a second of a finger stands for [s].
+        A model may use `effects` of a user beside the catalogue. A whole number of steps of `step` [s] at most fits
+        between two samples; `time` is what a second of a finger stands for [s].
         """
         self.recording = recording
         self.time = time
@@ -139,18 +118,13 @@ class Simulator:
         torques: bool = False,
         near: Path | None = None,
     ) -> Array:
-        """Each model through its windows, the start of each segment moved by the model's correction.
+        """Each of M models through its windows (of one shape), with its correction at the start of each segment.
 
-        Args:
-            models: M of them.
-            windows: one each, of one shape (S windows of K segments).
-            corrections: (M, 2 n) added to positions [rad] and speeds [rad/s] at every start.
-            torques: whether to give torques as well.
-            near: path of a model that they are close to: they follow it, at a third of the cost. Those of another
-                mechanism go their own way.
+        Corrections (M, 2 n) are added to positions [rad] and speeds [rad/s]. Models follow the path of one that they
+        are `near` to, at a third of the cost; those of another mechanism go their own way.
 
         Returns:
-            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and torques [N m].
+            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and, if wanted, torques [N m].
         """
         out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
         if corrections is None:
@@ -183,17 +157,9 @@ class Simulator:
 
     def memory(self, model: Model) -> Array:
         """Memory (size,) of the plant with a model's constants and effects."""
-        known = model.constants
-        constants = DrivetrainConstants(
-            kp=known["kp"],
-            kd=known["kd"],
-            stiffness=known["stiffness"],
-            static_friction=known["static_friction"],
-            reflected_inertia=known["reflected_inertia"],
-            torque_limit=known["torque_limit"],
-        )
-        memory: Array = self.plant.memory(constants, gravity=self.recording.gravity)
-        self.plant.view(memory, "friction_creep")[:] = known.get("friction_creep", 0.0)
+        known: dict[str, Any] = {key: model.constants[key] for key in DRIVE}
+        memory: Array = self.plant.memory(DrivetrainConstants(**known), gravity=self.recording.gravity)
+        self.plant.view(memory, "friction_creep")[:] = model.constants.get("friction_creep", 0.0)
         for term in model.terms:
             self.plant.set_effect(memory, term.effect, term.joint, term.values)
         return memory
@@ -236,7 +202,7 @@ class Simulator:
             _zero_links(out[0], windows, joints)
 
     def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
-        """Positions (S, K segment, M) as old as the log reads them, within each segment."""
+        """Positions (S, K segment, M) as old as the log reads them."""
         delay = model.constants.get("reading_delay", np.zeros(1))
         if not delay.any():
             return position
@@ -257,26 +223,12 @@ class Simulator:
     ) -> None:
         count, fine = len(windows), windows.substeps
         commands = np.ascontiguousarray(windows.commands[:, windows.history * fine - past :])
+        lengths, segment = np.full(count, signals.shape[1]), windows.segment * fine
+        starts = (windows.position, windows.speed, windows.initial_state, np.tile(correction, (count, 1)))
+        given = (commands, np.arange(count), lengths, past, 1, segment, *starts, memory, paths, rows)
 
         def run(first: int, last: int) -> None:
-            self.plant.kernel.segments_batch(
-                commands,
-                np.arange(count),
-                np.full(count, signals.shape[1]),
-                past,
-                1,
-                windows.segment * fine,
-                windows.position,
-                windows.speed,
-                windows.initial_state,
-                np.tile(correction, (count, 1)),
-                memory,
-                paths,
-                rows,
-                first,
-                last,
-                signals,
-            )
+            self.plant.kernel.segments_batch(*given, first, last, signals)
 
         if pool is None:
             run(0, count)
@@ -316,9 +268,8 @@ class Simulator:
         """What the sensors show at once of a jump of the command, see `jump_ratio`, (S, 1, n) each."""
         first = windows.commands[:, windows.history * windows.substeps]
         _, chosen, which = np.unique(windows.gains, axis=0, return_index=True, return_inverse=True)
-        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])
-        position, torque = np.moveaxis(found[which.ravel()], 1, 0)[:, :, None]
-        return position, torque
+        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]
+        return found[:, 0], found[:, 1]
 
     def _links(self, model: Model, windows: Windows) -> Array:
         """Link positions (S, n) near those of the first row: measured less what the motor leads at the first torque."""
@@ -355,3 +306,87 @@ def _zero_links(shown: Array, windows: Windows, joints: int) -> None:
         for k in range(len(motors)):
             if np.isfinite(part := known[own, :, k]).any():
                 shown[own, :, joints + k] += np.nanmean(part)
+
+
+def force_torque(tree: RigidBodyTree, force: KnownForce, position: Array) -> Array:
+    """Torques (joints,) [N m] that a force on a link puts on the actuated joints at `position` (joints,) [rad].
+
+    Raises:
+        InputError: the force names a joint that the rig does not have.
+    """
+    if force.joint not in tree.dof_names:
+        raise InputError(f"trials: key 'force.joint': '{force.joint}' is not a joint of the rig {list(tree.dof_names)}")
+    dof, frames = tree.dof_names.index(force.joint), link_frames(tree, position)
+    rotation, origin = frames[dof]
+    point, vector = origin + rotation @ np.asarray(force.point), np.asarray(force.vector)
+    torque = np.zeros(len(tree.joint_names))
+    while dof >= 0:
+        rotation, origin = frames[dof]
+        axis = rotation @ tree.axis[dof]
+        lever = axis if tree.prismatic[dof] else np.cross(axis, point - origin)
+        torque[tree.follow[dof]] += tree.ratio[dof] * float(lever @ vector)
+        dof = int(tree.parent[dof])
+    return torque
+
+
+def link_frames(tree: RigidBodyTree, position: Array) -> list[tuple[Array, Array]]:
+    """Rotation (3, 3) and origin (3,) [m] of every link in the base frame, at actuated `position` (joints,)."""
+    angles = tree.ratio * position[tree.follow] + tree.offset
+    frames: list[tuple[Array, Array]] = []
+    for dof in range(tree.dofs):
+        parent = int(tree.parent[dof])
+        rotation, origin = frames[parent] if parent >= 0 else (np.eye(3), np.zeros(3))
+        placed = rotation @ tree.placement_rotation[dof]
+        origin = origin + rotation @ tree.placement_translation[dof]
+        if tree.prismatic[dof]:
+            frames.append((placed, origin + placed @ tree.axis[dof] * angles[dof]))
+        else:
+            frames.append((placed @ Rotation.from_rotvec(tree.axis[dof] * angles[dof]).as_matrix(), origin))
+    return frames
+
+
+def integrating_joints(model: Model, joints: tuple[str, ...]) -> list[int]:
+    """Joints whose controller integrates its error in a model."""
+    return [joints.index(t.joint) for t in model.terms if t.effect is IntegralAction and t.values["ki"] > 0.0]
+
+
+def wind_up(plant: Plant, model: Model, windows: Windows, memory: Array) -> None:
+    """Give integrals in memory (S, size) the value that they have as each window begins.
+
+    As a trial begins they balance the load, but for the `wound` of its windows; from there on the logged error counts.
+    """
+    joints = integrating_joints(model, plant.joint_names)
+    if not joints:
+        return
+    count, later = len(windows), windows.time > 0.0
+    state = plant.view(memory, f"state:{IntegralAction.name}")
+    state[:, joints, 1] = windows.wound[:, joints]
+    if not later.any():
+        return
+    position, command, speed = np.moveaxis(windows.trial_start[:, :, None], 1, 0).copy()
+    begun, unmoved = memory.copy(), np.zeros((count, 2 * position.shape[2]))
+    plant.reset(begun, position[:, 0], speed[:, 0])
+    which, lengths, starts = np.arange(count), np.ones(count, dtype=np.int64), (position, speed, unmoved, unmoved)
+    out, no_path = np.zeros((count, 1, 1, position.shape[2])), np.zeros((count, 1))
+    rows = np.array([TORQUE])
+    plant.kernel.segments_batch(command, which, lengths, 0, 1, 1, *starts, begun, no_path, rows, 0, count, out)
+    balance = plant.view(begun, f"state:{IntegralAction.name}")[:, :, 1]
+    values = {t.joint: t.values for t in model.terms if t.effect is IntegralAction}
+    for j in joints:
+        own = values[plant.joint_names[j]]
+        for k in np.flatnonzero(later):
+            start = balance[k, j] + windows.wound[k, j]
+            errors = windows.errors[k][:, 0, j] - own.get("lag", 0.0) * windows.errors[k][:, 1, j]
+            state[k, j, 1] = integrated(errors, start, own["ki"], own.get("limit", 0.0))
+        state[later, j, 0] = 2.0
+
+
+@compiled_once
+def integrated(errors: Array, start: float, gain: float, limit: float) -> float:
+    """Integral [N m] after errors (T,) [rad s], kept within a limit unless that is zero."""
+    value = start
+    for error in errors:
+        value += gain * error
+        if limit > 0.0:
+            value = min(max(value, -limit), limit)
+    return value
