@@ -17,13 +17,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 from tactile_cube import commands
 from tactile_cube.api.job import typed_job
-<<<<<<< HEAD
-from tactile_cube.command_help import CONFIG, help_text
-from tactile_cube.composition import refuse_unknown_keys, with_recipe
-from tactile_cube.errors import InputError
-=======
 from tactile_cube.composition import CONFIG, help_text, refuse_unknown_keys, with_recipe
->>>>>>> main
+from tactile_cube.errors import InputError
 from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in, console_kept_in
 from tactile_cube.usage_error import usage_error
 

@@ -9,9 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from tactile_cube.api.comparison import modelled
+from tactile_cube.api.comparison import modelled, opened, opened_or_imported
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
-from tactile_cube.api.recording import opened_or_imported
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.errors import InputError

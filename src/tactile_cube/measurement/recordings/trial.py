@@ -64,15 +64,7 @@ class Trial(TrialColumns):
         file: path inside the recording's folder.
         kind: kind of excitation; trials of one kind repeat one command.
         initialisation: robot initialisation it belongs to; each has joint offsets of its own.
-<<<<<<< HEAD
-        time: (n,) uniform, starts at 0 [s].
-        command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
-        position: (n, joints) measured position, on the motor side [rad].
-        torque: (n, joints) measured torque [N m], or None.
         valid: (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log.
-=======
-        valid: (n,) False where a dropped sample was interpolated; such samples count in no error.
->>>>>>> main
         gains: the controller in this trial.
         force: a known force on a link, or None.
         clamped: the links were held still.

@@ -124,7 +124,6 @@ class CsvFiles(Mechanism):
         by = "source.kind" if self.kind is not None else "file names and commands"
         understood = [*_steps(pieces), *_rows(columns, units, stamps, rate), ("kinds", repeats, by)]
         tables = [piece for trial in trials for piece in cut_trial(trial, self.length)]
-<<<<<<< HEAD
         if moving := [k for k, table in enumerate(tables) if mode == "position" and _begins_in_motion(table)]:
             late = f"{len(moving)} of {len(tables)} trials; their first {REMEMBERED:g} s count in no error"
             understood.append(("begin in motion", late, "commands before are unknown"))
@@ -132,11 +131,8 @@ class CsvFiles(Mechanism):
             entry = tables[k].entry.model_copy(update={"unjudged": REMEMBERED})
             tables[k] = replace(tables[k], entry=entry)
         understood += rig.understood(list(columns.joints))
-        description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts))})
-=======
         degrees = {joint: "deg" for joint, one in units.items() if one["position"].name.split()[0] == "deg"}
         description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts)), "shown_in": degrees})
->>>>>>> main
         return {"": RecordingTables(description, rig.text, tables, [row for row in understood if row[1]])}
 
     def _logs(self, joints: Sequence[str]) -> list[Log]:

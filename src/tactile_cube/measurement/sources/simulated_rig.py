@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.hand.urdf_hand import DESCRIPTIONS
-from tactile_cube.measurement.bench import BENCH_KINDS, bench_trials
-from tactile_cube.measurement.excitation import excitation, safe_range
+from tactile_cube.measurement.bench import BENCH_KINDS, bench_trials, excitation, safe_range
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig, read_rig
@@ -111,10 +110,9 @@ def silent_trial(command: Array, rig: Recording, entry: TrialEntry) -> Trial:
     """A trial that starts at rest at its first command (joints,) [rad]."""
     time = np.arange(len(command)) / rig.rate
     still = np.broadcast_to(command[0], command.shape)
-    valid = np.ones(len(command), dtype=bool)
-    torque = np.zeros_like(command)
-    return Trial(entry.kind, entry.file, entry.kind, entry.initialisation, time, command, still, torque, valid,
-                 rig.gains, entry.force, entry.clamped)  # fmt: skip
+    signals, valid = (time, command, still, np.zeros_like(command)), np.ones(len(command), dtype=bool)
+    said = {key: getattr(entry, key) for key in ("file", "kind", "initialisation", "force", "clamped")}
+    return Trial(*signals, name=entry.kind, valid=valid, gains=rig.gains, **said)
 
 
 @dataclass(frozen=True)
