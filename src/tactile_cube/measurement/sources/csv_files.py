@@ -244,7 +244,6 @@ class CsvFiles(Mechanism):
 
 
 def _each(make: Callable[[Log], list[Log]], logs: Sequence[Log], left: list[str]) -> list[Log]:
-    """What is made of each log; those of which nothing can be made are left out, unless that is all of them."""
     made: list[Log] = []
     for log in logs:
         try:
@@ -318,10 +317,10 @@ def _doubts(
                 open_.setdefault(unit.doubt, []).append(columns.joints[joint][signal])
     for doubt, names in open_.items():
         yield f"{', '.join(names)}: {doubt}"
-    guesses = [key for key in description.unknown if key not in rig.unknown]
-    for key in guesses:
-        begins = getattr(description.controller, key, description.nominal.get(key))
-        yield f"{key} is not stated: unknown, to be identified from {begins}, a guess"
+    if guesses := [key for key in description.unknown if key not in rig.unknown]:
+        begins = [getattr(description.controller, key, description.nominal.get(key)) for key in guesses]
+        said = "; ".join(f"{key} from {value}" for key, value in zip(guesses, begins, strict=True))
+        yield f"not stated, so unknown and to be identified, beginning with guesses: {said}"
     if description.controller.mode == "position":
         found = estimated_gains(trials, description.joints, rig, description.gravity)
         yield from gain_doubts(gains.kp, found, "kp" in description.unknown)

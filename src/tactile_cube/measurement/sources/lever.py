@@ -62,14 +62,7 @@ class Lever:
         return parse_rig(text, Path(f"{self.robot}.urdf"))
 
     def sized(self, trials: Sequence[TrialTable], mode: str, kp: float | None, gravity: float) -> Rig:
-        """Return it with the masses that logs show, and what stays unknown.
-
-        Args:
-            trials: of this joint alone.
-            mode: of the controller; `free` without a torque.
-            kp: of a position controller [N m/rad]; None: not known.
-            gravity: [m/s^2].
-        """
+        """Return it with the masses that logs of this joint show under gravity [m/s^2], and what stays unknown."""
         found = _seen(trials, mode, self.robot == "pendulum", kp or UNIT_GAIN)
         if self.mass is not None:
             rig = self.rig(self.mass, self.lever or LEVER, found.hangs_at)
@@ -106,18 +99,15 @@ class Lever:
         return found.weight / (gravity * lever), lever
 
     def _doubts(self, found: _Seen, scale: str) -> tuple[str, ...]:
-        lines = []
-        if self.mass is None:
-            lines.append(
-                f"no URDF: mass, lever and rotor of the {self.robot} are guesses from the log, and are identified"
-            )
-        if scale:
-            lines.append(f"{scale}: of torques, gains and inertias only the ratios are known")
-        if self.robot == "pendulum" and found.weight <= NO_WEIGHT * found.drive:
-            lines.append("the log shows no weight: is it a wheel (source.robot=wheel)?")
-        if found.hangs_at:
-            lines.append(f"by the log the pendulum hangs down at {found.hangs_at:.3g} rad, not at 0")
-        return tuple(lines)
+        guessed = f"no URDF: mass, lever and rotor of the {self.robot} are guesses from the log, and are identified"
+        light = self.robot == "pendulum" and found.weight <= NO_WEIGHT * found.drive
+        lines = {
+            guessed: self.mass is None,
+            f"{scale}: of torques, gains and inertias only the ratios are known": scale,
+            "the log shows no weight: is it a wheel (source.robot=wheel)?": light,
+            f"by the log the pendulum hangs down at {found.hangs_at:.3g} rad, not at 0": found.hangs_at,
+        }
+        return tuple(line for line, holds in lines.items() if holds)
 
 
 @dataclass(frozen=True)

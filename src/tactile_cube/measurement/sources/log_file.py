@@ -205,7 +205,6 @@ def _mat(path: Path) -> Log:
 
 
 def _require_small(path: Path) -> None:
-    """Refuse a MATLAB file that unpacks to too much: compressed elements say nothing of their size."""
     left, content = 8 * limits.NUMBERS, path.read_bytes()
     order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
     place = 128
@@ -225,7 +224,6 @@ def _require_small(path: Path) -> None:
 
 
 def _json(path: Path) -> Log:
-    """A list of rows, such as BAM and K-Scale write it, or an object of columns."""
     regular(path, limits.CHUNK)
     try:
         data = json.loads(path.read_text(encoding="utf-8"))

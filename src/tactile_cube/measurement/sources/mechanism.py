@@ -27,11 +27,7 @@ class Servo(Strict):
     gain: float
 
     def constants(self, gain: float | None) -> dict[str, float]:
-        """Return kp [N m/rad], kd [N m s/rad] of the back-EMF, torque_limit [N m] and reflected_inertia [kg m^2].
-
-        Args:
-            gain: of the firmware; None: the usual one.
-        """
+        """Return kp [N m/rad], kd of the back-EMF, torque_limit and reflected_inertia at a firmware's gain."""
         stall = self.volts * self.kt / self.R
         kp = (self.gain if gain is None else gain) * self.duty_per_gain * stall
         values = {"kp": kp, "kd": self.kt**2 / self.R, "torque_limit": self.most_duty * stall}

@@ -121,11 +121,7 @@ def _decoded(stream: BinaryIO, topics: Sequence[str]) -> Iterator[tuple[str, flo
 
 
 def unpacked(chunk: Chunk) -> Chunk:
-    """Return a chunk as it was before it was compressed.
-
-    Raises:
-        ValueError: it is larger than it says, or than `limits.CHUNK`.
-    """
+    """Return a chunk as it was before it was compressed; a ValueError if larger than it says, or `limits.CHUNK`."""
     import lz4.frame
     import zstandard
 
@@ -143,7 +139,6 @@ def unpacked(chunk: Chunk) -> Chunk:
 
 
 def _by_joint(message: Any, joints: list[str], path: Path, signal: str) -> Array:
-    """Positions in the order of `joints`."""
     if hasattr(message, "points"):
         names, values = message.joint_names, message.points[0].positions
     elif hasattr(message, "position"):

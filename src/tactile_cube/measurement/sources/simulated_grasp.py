@@ -98,8 +98,6 @@ class SimulatedGrasp(SimulatedSession):
 
 @dataclass(frozen=True)
 class _Session:
-    """One hand with its true constants, its sensors, and somebody who puts the box in its place."""
-
     settings: SimulatedGrasp
     free: Simulator
     loaded: HandReplay
@@ -132,7 +130,6 @@ class _Session:
         return tables
 
     def _played(self, entry: TrialEntry, grasp: Grasp, offset: Array) -> TrialTable:
-        """Simulate one trial and log it as the sensors would."""
         s, command, recording = self.settings, self._command(entry.kind), self.loaded.recording
         assert recording.description.object is not None
         load = load_of(recording.description.object, grasp)

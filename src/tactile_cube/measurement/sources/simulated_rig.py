@@ -75,10 +75,7 @@ class SimulatedSession:
     def played(
         self, entry: TrialEntry, command: Array, offset: Array, rig: Simulator, true: Model, rng: np.random.Generator
     ) -> TrialTable:
-        """Log a trial of a `rig` that holds nothing, with its `true` constants and effects, after it has settled.
-
-        `command` is (n, joints) [rad], `offset` that of the joints in this initialisation (joints,) [rad].
-        """
+        """Log commands (n, joints) [rad] to a `rig` that holds nothing, with joint offsets (joints,) [rad]."""
         settle = round(SETTLING * self.rate)
         trial = silent_trial(np.pad(command, ((settle, 0), (0, 0)), mode="edge"), rig.recording, entry)
         terms = true.terms
@@ -157,11 +154,7 @@ class SimulatedRig(SimulatedSession):
         return result
 
     def rig(self) -> Rig:
-        """The mechanism.
-
-        Raises:
-            InputError: the URDF cannot be read.
-        """
+        """The mechanism; raises an `InputError` where the URDF cannot be read."""
         if self.urdf in BUILT_IN:
             return parse_rig(BUILT_IN[self.urdf](), Path(f"{self.urdf}.urdf"))
         shipped = DESCRIPTIONS / self.urdf

@@ -57,11 +57,10 @@ HIDDEN = 0.01  # of a step: what the last row of a log may be off by a rounded r
 
 
 def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
-    """Samples per second of rows at times (samples,) [s] of the file `where`.
+    """Samples per second of rows at times (samples,) [s] of the file `where`, rounded to digits if no row shows it.
 
     Where the steps are regular, their number over the whole time: a clock that counts from 1970 tells a step of some
-    milliseconds to 0.2 us only. Else the median's, for a log with pauses has no other. Rounded to so many digits if no
-    row shows it.
+    milliseconds to 0.2 us only. Else the median's, for a log with pauses has no other.
 
     Raises:
         InputError: time does not go forward.
@@ -80,10 +79,7 @@ def rate_of(time: NDArray[np.float64], digits: int, where: str) -> float:
 
 
 def source_settings(option: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of `record source=OPTION` with others in their place, those of mappings key by key.
-
-    For programs: what is given may be the words of strangers' files, and no configuration interprets them.
-    """
+    """Return the settings of `record source=OPTION` with others in their place, which no configuration interprets."""
     settings = dict(_shipped(option))
     for key, value in given.items():
         old = settings.get(key)
@@ -116,7 +112,12 @@ def recording_tables(settings: Mapping[str, Any], option: str, seed: int) -> dic
     try:
         checked: Source = TypeAdapter(source).validate_python(given)
     except ValidationError as error:
-        _require([str(one["loc"][0]) for one in error.errors() if one["type"] == "missing"], option)
+        missing = [str(one["loc"][0]) for one in error.errors() if one["type"] == "missing"]
+        if missing:
+            text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
+            said = dict(re.findall(r"^ *(\w+): \?\?\? *# *(.*)$", text, re.MULTILINE))
+            needs = [f"source.{key}=..." + (f" ({said[key]})" if key in said else "") for key in missing]
+            raise InputError(f"source={option} needs {'; '.join(needs)}") from None
         raise InputError(_refused(error, given)) from None
     return checked.recordings(seed)
 
@@ -131,14 +132,3 @@ def _refused(error: ValidationError, given: Mapping[str, Any]) -> str:
         place, keys = place[part], [*keys, str(part)]
     said = str(first["msg"]).removeprefix("Input should be ")
     return f"source.{'.'.join(keys)}={place}: expected {said}"
-
-
-def _require(missing: Sequence[str], option: str) -> None:
-    if missing:
-        text = (CONFIG / "source" / f"{option}.yaml").read_text(encoding="utf-8")
-        found = [re.search(rf"^ *{key}: \?\?\? *# *(.*)$", text, re.MULTILINE) for key in missing]
-        said = [
-            f"source.{key}=..." + (f" ({meaning[1]})" if meaning else "")
-            for key, meaning in zip(missing, found, strict=True)
-        ]
-        raise InputError(f"source={option} needs {'; '.join(said)}")
