@@ -65,6 +65,26 @@ def test_a_command_leaves_the_environment_of_later_programs_as_it_was(monkeypatc
     assert os.environ["HYDRA_FULL_ERROR"] == "0"
 
 
+@pytest.mark.parametrize(
+    ("name", "words", "said"),
+    [
+        ("effects", ["stribek"], "effect 'stribek' is unknown; did you mean stribeck_friction?"),
+        ("diagnose", ["rec"], "rec: settings are KEY=VALUE; did you mean recording=rec?"),
+        ("diagnose", ["recordng=rec"], "recordng: no such setting; did you mean recording?"),
+        ("record", ["source=csv", "source.controller.ki=5"], "source.controller.ki: no such setting; did you mean"),
+        ("record", ["source=csv", "source.xyzzy=5"], "source.xyzzy: no such setting; --help lists them"),
+        ("diagnose", [], "give either recording=FOLDER (of a recording.yaml) or logs to import: source=csv"),
+    ],
+)
+def test_a_mistyped_command_line_is_told_what_was_meant(
+    name: str, words: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", [name, *words])
+    with pytest.raises(SystemExit, match="2"):
+        cli.command_line(name)()
+    assert capsys.readouterr().err.startswith(f"error: {said}")
+
+
 def test_input_error_is_found_behind_what_hydra_wraps_around_it() -> None:
     wrapped = RuntimeError("Error in call to target")
     wrapped.__cause__ = InputError("row 3: NaN")
@@ -151,7 +171,7 @@ def test_help_marks_the_default_of_each_group() -> None:
     [
         ("agent.gama=1", "agent.gamma"),
         ("gamma=1", "agent.gamma"),
-        ("trainig.steps=1", "training"),
+        ("trainig.steps=1", "training.steps"),
         ("taks=table", "task"),
         ("task=tabel", "task=table"),
         ("+experiment=curiculum", "experiment=curriculum"),

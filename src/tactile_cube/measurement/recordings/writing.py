@@ -119,9 +119,9 @@ def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
 def require_free(out: Path) -> None:
     """Refuse, by an InputError, a folder that holds something."""
     if (out / DESCRIPTION).exists():
-        raise InputError(f"out={out}: holds a recording already; choose another folder or remove it")
+        raise InputError(f"{out}: holds a recording already; choose another folder or remove it")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"out={out}: is there already and not empty; choose another folder or remove it")
+        raise InputError(f"{out}: is there already and not empty; choose another folder or remove it")
 
 
 def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
