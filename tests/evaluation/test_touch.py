@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.evaluation.episode_record import ContactTable
-from tactile_cube.evaluation.touch import finger_history, support, touched_faces, touching
+from tactile_cube.evaluation.verdict import finger_history, support, touched_faces, touching
 from tests.evaluation.synthetic import SPOTS, contacts, episode
 
 

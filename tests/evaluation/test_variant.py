@@ -6,7 +6,7 @@ import pytest
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.env import Task
 from tactile_cube.errors import InputError
-from tactile_cube.evaluation.variant import NumbPolicy, Pull, Variant, numb_reading, typical_effects
+from tactile_cube.evaluation.protocol import NumbPolicy, Pull, Variant, numb_reading, typical_effects
 from tactile_cube.randomization import Randomization, Uniform
 from tactile_cube.transforms import EnvConfig
 

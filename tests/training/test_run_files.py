@@ -69,19 +69,26 @@ def test_what_neither_workers_nor_learner_used_of_the_cores_is_waiting(
 
 
 def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = iter([100.0, 101.0, 110.0, 120.0])
+    clock = iter([100.0, 101.0, 110.0, 115.0, 120.0, 1000.0, 1005.0])
     monkeypatch.setattr(loggers.time, "perf_counter", lambda: next(clock))
     stream = io.StringIO()
-    line = ProgressLine(total=10_000, steps=1000, updates=50, usual=7000, stream=stream)
+    reference = {2000: (0.5, 1.0), 7000: (2.0, 4.0)}
+    line = ProgressLine(total=10_000, steps=1000, updates=50, reference=reference, stream=stream)
     summary = {"final_angle": 1.234, "episode_length": 88.0, "ended_time_limit": 0.9}
     line.stage, line.later = "stage 1 of 2", 3000
     line.show(1010, 51, summary, {"T_s": 0.25})
     assert stream.getvalue() == ""  # too soon
     line.show(4000, 1050, summary, {"T_s": 0.25})
     assert stream.getvalue() == (
-        "stage 1 of 2 |      4.0 k of 10 k steps |  300 steps/s  100 updates/s | final angle  1.23 rad,  88 steps | "
-        "90 % kept | T_s 0.25 | usually 0 min 20 s left\n"
+        "stage 1 of 2 |      4.0 k of 10 k steps |  300 steps/s  100 updates/s | final angle  1.23 rad (recorded "
+        "runs 1.10 to 2.20),  88 steps | 90 % kept | T_s 0.25 | usually 0 min 20 s left\n"
     )
+    line.show(4000, 1050, summary, {"T_s": 0.25})  # a busy machine: no step for five seconds
+    assert stream.getvalue().endswith("usually 0 min 30 s left\n")
     line.later = 0
     line.show(12_000, 3000, summary, {"T_s": 0.25})  # the last barrier lies beyond the end
     assert stream.getvalue().endswith("at most 0 min 00 s left\n")
+    assert stream.getvalue().count("recorded runs") == 2
+    line.show(12_000, 3000, summary, {"T_s": 0.25})
+    line.show(12_000, 3000, summary, {"T_s": 0.25})
+    assert stream.getvalue().endswith("time left unknown\n")

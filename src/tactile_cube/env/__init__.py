@@ -3,13 +3,12 @@
 from tactile_cube.env.cube_pose import CubePose, cube_pose
 from tactile_cube.env.reward import Reward
 from tactile_cube.env.rotation import RotationEnv, TimeStep
-from tactile_cube.env.task import OUTCOMES, Conditions, Curriculum, Task
+from tactile_cube.env.task import OUTCOMES, Conditions, Task
 
 __all__ = [
     "OUTCOMES",
     "Conditions",
     "CubePose",
-    "Curriculum",
     "Reward",
     "RotationEnv",
     "Task",

@@ -6,32 +6,35 @@ generator and the worlds' own, and `restart` sets both.
 
 import contextlib
 import copy
+import ctypes
 import multiprocessing
 import os
+import queue
+import signal
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, TimeoutError
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import Collector, MultiSyncCollector
 from torchrl.envs import EnvBase
+from torchrl.weight_update import SharedMemWeightSyncScheme, WeightSyncScheme
 
 from tactile_cube.agent.networks import Actor
 from tactile_cube.env import Conditions
-from tactile_cube.training.worker_process import Background, WeightSync, cpu_seconds, prepare_worker
+from tactile_cube.training.settings import CollectorSettings
 
+T = TypeVar("T")
 MakeEnv = Callable[..., EnvBase]
-"""make_env(worlds=n, seed=s) -> batched environment of n worlds with a method set_progress(steps, performance)."""
-
+"""make_env(worlds=n, seed=s) -> batched environment of n worlds whose first transform is a `Curriculum`."""
 Progress = tuple[Any, ...]
-"""What a curriculum goes by: environment steps so far, and mean final angle [rad] of the last episodes; where constants
-are steered also the odds of their parts."""
-
-
+"""What `Curriculum.set_progress` takes."""
 GLANCE = 0.5
 """How long a dead worker may go unnoticed [s]; siblings that inherited its pipe would hide its death for ever."""
 LAST_START = 3.0
@@ -54,8 +57,13 @@ class Behaviour(TensorDictModuleBase):  # type: ignore[misc]
 
     def __init__(self, actor: Actor):
         super().__init__()
-        self.actor = actor.requires_grad_(False)
+        self.actor = copy.deepcopy(actor).requires_grad_(False)
         self.register_buffer("random", torch.zeros(()))
+
+    def take_over(self, actor: Actor, random: bool) -> None:
+        """Act as `actor` does from here on, or at random."""
+        self.actor.load_state_dict(actor.state_dict())
+        self.random.fill_(float(random))
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Sample an action for each world."""
@@ -71,14 +79,13 @@ class SingleCollection:
     Arguments as of `MultiSyncCollection`.
     """
 
-    def __init__(self, make_env: MakeEnv, actor: Actor, worlds: int, steps: int):
-        self._behaviour = Behaviour(copy.deepcopy(actor))
+    def __init__(self, make_env: MakeEnv, actor: Actor, settings: CollectorSettings, steps: int):
+        self._behaviour = Behaviour(actor)
         with torch.random.fork_rng(devices=[]):  # worlds seed torch's generator, which here is the learner's too
-            self._env = make_env(worlds=worlds, seed=0)
             self._collector = Collector(
-                self._env,
+                make_env(worlds=settings.worlds, seed=0),
                 self._behaviour,
-                frames_per_batch=worlds * steps,
+                frames_per_batch=settings.worlds * steps,
                 total_frames=-1,
                 trust_policy=True,
                 auto_register_policy_transforms=False,
@@ -90,7 +97,7 @@ class SingleCollection:
 
     def restart(self, seed: int, progress: Progress) -> None:
         """Reset all worlds and seed everything random in them."""
-        self._env.set_progress(*progress)
+        self._set_progress(progress)
 
         def seed_and_reset() -> None:
             self._collector.set_seed(seed)
@@ -101,9 +108,8 @@ class SingleCollection:
 
     def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Collect one block."""
-        conditions: Conditions = self._env.set_progress(*progress)
-        self._behaviour.actor.load_state_dict(actor.state_dict())
-        self._behaviour.random.fill_(float(random))
+        conditions = self._set_progress(progress)
+        self._behaviour.take_over(actor, random)
         self._block = self._aside(lambda: next(self._blocks).clone())
         return conditions
 
@@ -119,6 +125,10 @@ class SingleCollection:
     def close(self) -> None:
         """Close the worlds."""
         self._collector.shutdown()
+
+    def _set_progress(self, progress: Progress) -> Conditions:
+        conditions: Conditions = self._collector.env.transform[0].set_progress(*progress)
+        return conditions
 
     def _aside(self, call: Callable[[], Any]) -> Any:
         """Run a call on the collection's own random state, as if it were another process."""
@@ -138,52 +148,36 @@ class MultiSyncCollection:
     Args:
         make_env: see `MakeEnv`.
         actor: any actor of the right sizes.
-        worlds: number of worlds in all.
+        settings: number of worlds and workers, and how long to wait for them.
         steps: environment steps a world and block.
-        processes: worker processes; divides `worlds`.
-        timeout: longest wait for a block [s]; then the workers count as stuck.
-        start_timeout: the same up to the end of the first block: workers that start may have to compile first.
-        start_method: "fork" (Linux, fast) or "spawn".
 
     Raises:
         CollectionError: a worker failed, died or got stuck, here or in any method.
     """
 
-    def __init__(
-        self,
-        make_env: MakeEnv,
-        actor: Actor,
-        worlds: int,
-        steps: int,
-        processes: int,
-        timeout: float,
-        start_timeout: float,
-        start_method: str,
-    ):
-        self._workers, self._timeout, self._start_timeout = processes, timeout, start_timeout
-        self._started = False
-        self._behaviour, self._weights = Behaviour(copy.deepcopy(actor)), WeightSync()
-        self._thread = Background()
+    def __init__(self, make_env: MakeEnv, actor: Actor, settings: CollectorSettings, steps: int):
+        self._settings, self._started = settings, False
+        self._behaviour, self._weights, self._thread = Behaviour(actor), WeightSync(), Background()
         self._block: Future[TensorDictBase] | None = None
         self._final_cpu: float | None = None
         self._processes: list[Any] = []
         self._others = set(multiprocessing.active_children())
-        build = partial(self._build, make_env, worlds // processes, worlds * steps, start_method)
         try:
-            self._collector, self._blocks = self._call(build, "start")
+            self._collector, self._blocks = self._call(partial(self._build, make_env, steps), "start")
         except BaseException:
             self._thread.close()
             raise
         self._processes = self._collector.procs
 
-    def _build(self, make_env: MakeEnv, worlds: int, frames: int, start_method: str) -> tuple[MultiSyncCollector, Any]:
-        torch.multiprocessing.set_start_method(start_method, force=True)
+    def _build(self, make_env: MakeEnv, steps: int) -> tuple[MultiSyncCollector, Any]:
+        method, workers, worlds = self._settings.start_method, self._settings.workers, self._settings.worlds
+        torch.multiprocessing.set_start_method(method, force=True)
         threads = torch.get_num_threads()
         collector = MultiSyncCollector(
-            [make_env] * self._workers,
+            [make_env] * workers,
             self._behaviour,
-            create_env_kwargs=[{"worlds": worlds, "seed": index} for index in range(self._workers)],
-            frames_per_batch=frames,
+            create_env_kwargs=[{"worlds": worlds // workers, "seed": index} for index in range(workers)],
+            frames_per_batch=worlds * steps,
             total_frames=-1,
             cat_results="stack",
             num_threads=threads,
@@ -191,7 +185,7 @@ class MultiSyncCollection:
             trust_policy=True,
             auto_register_policy_transforms=False,
             weight_sync_schemes={"policy": self._weights},
-            init_fn=partial(prepare_worker, None if start_method == "forkserver" else os.getpid()),
+            init_fn=partial(prepare_worker, None if method == "forkserver" else os.getpid()),
         )
         torch.set_num_threads(threads)
         return collector, iter(collector)
@@ -204,8 +198,7 @@ class MultiSyncCollection:
     def launch(self, actor: Actor, random: bool, progress: Progress) -> Conditions:
         """Hand the weights to the workers and let them collect one block."""
         conditions = self._set_progress(progress)
-        self._behaviour.actor.load_state_dict(actor.state_dict())
-        self._behaviour.random.fill_(float(random))
+        self._behaviour.take_over(actor, random)
         weights = TensorDict.from_module(self._behaviour).data.clone()
         self._block = self._thread.submit(partial(self._collect, weights))
         return conditions
@@ -219,9 +212,7 @@ class MultiSyncCollection:
 
     def cpu_seconds(self) -> float:
         """CPU time of all workers since they started [s]; 0 where the system does not tell."""
-        if self._final_cpu is not None:
-            return self._final_cpu
-        return sum(map(cpu_seconds, self._processes))
+        return sum(map(_cpu_seconds, self._processes)) if self._final_cpu is None else self._final_cpu
 
     def close(self) -> None:
         """End the workers: nothing in them is worth a wait, and one that is stuck would not listen."""
@@ -233,7 +224,8 @@ class MultiSyncCollection:
         self._thread.close()
 
     def _set_progress(self, progress: Progress) -> Conditions:
-        call = partial(self._collector.map_fn, "env.set_progress", [progress] * self._workers)
+        arguments = [progress] * self._settings.workers
+        call = partial(self._collector.map_fn, "env.transform[0].set_progress", arguments)
         conditions: Conditions = self._call(call, "set the curriculum")[0]
         return conditions
 
@@ -249,7 +241,8 @@ class MultiSyncCollection:
         return self._wait(self._thread.submit(call), doing)
 
     def _wait(self, future: "Future[Any]", doing: str) -> Any:
-        name, seconds = ("timeout", self._timeout) if self._started else ("start_timeout", self._start_timeout)
+        name = "timeout" if self._started else "start_timeout"  # workers that start may have to compile first
+        seconds = float(getattr(self._settings, name))
         try:
             return self._answer(future, seconds)
         except TimeoutError:
@@ -272,7 +265,7 @@ class MultiSyncCollection:
             except TimeoutError:
                 if future.done() or time.monotonic() >= until:
                     raise
-                if not all(process.is_alive() for process in self._weights.processes):
+                if not all(process.is_alive() for process in getattr(self._weights.context, "procs", ())):
                     self._kill()  # what waits for it, says so then
                     until = time.monotonic() + LAST_START
 
@@ -294,3 +287,73 @@ class MultiSyncCollection:
 
 Collection = SingleCollection | MultiSyncCollection
 """A source of blocks of experience (worlds, steps)."""
+
+
+class WeightSync(SharedMemWeightSyncScheme):  # type: ignore[misc]
+    """Weights in shared memory, without a farewell: workers are killed, and nobody waits for what they do not read.
+
+    torchrl's own sends "stop" when it is deleted. Where that is at the end of the interpreter, the thread that a
+    queue's first item starts never runs, and the program never ends.
+    """
+
+    def init_on_sender(self, *args: Any, **kwargs: Any) -> None:
+        """Make the queues."""
+        super().init_on_sender(*args, **kwargs)
+        for queues in (self._weight_init_queues, self._instruction_queues, self._ack_queues):
+            for one in queues.values():
+                one.cancel_join_thread()
+
+    def shutdown(self) -> None:
+        """End the thread that receives weights, in a worker."""
+        WeightSyncScheme.shutdown(self)
+
+
+class Background:
+    """A daemon thread that runs submitted calls one after another, so that none is waited for without a time limit.
+
+    Daemonic, because a call may be stuck in a pipe to a dead process, and that must not keep the program from ending.
+    One for all calls, because a worker ends with the thread that started it (`prepare_worker`).
+    """
+
+    def __init__(self) -> None:
+        self._calls: queue.SimpleQueue[tuple[Future[object], Callable[[], object]] | None] = queue.SimpleQueue()
+        threading.Thread(target=self._run, daemon=True, name="collection").start()
+
+    def submit(self, call: Callable[[], T]) -> "Future[T]":
+        """Queue a call; its result or exception arrives in the future."""
+        future: Future[T] = Future()
+        self._calls.put((future, call))  # type: ignore[arg-type]
+        return future
+
+    def close(self) -> None:
+        """End the thread after the calls already queued."""
+        self._calls.put(None)
+
+    def _run(self) -> None:
+        while (entry := self._calls.get()) is not None:
+            future, call = entry
+            try:
+                future.set_result(call())
+            except BaseException as error:  # noqa: BLE001, RUF100 - handed to whoever asks for the result
+                future.set_exception(error)
+
+
+def prepare_worker(parent: int | None) -> None:
+    """Leave Ctrl-C to the main process `parent`, and end with it even if it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    torch.set_num_threads(1)
+    if os.uname().sysname == "Linux":
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)  # SIGTERM would not reach a stopped process
+        if parent is not None and os.getppid() != parent:  # it ended before
+            os._exit(1)
+
+
+def _cpu_seconds(process: Any) -> float:
+    """User and system time of a running process [s], from /proc; 0 for one that is closed already."""
+    try:
+        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    except (OSError, ValueError):
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

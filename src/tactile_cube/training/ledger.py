@@ -27,6 +27,10 @@ class Costs:
     waiting: float = 0.0
     wall: float = 0.0
 
+    def __add__(self, other: "Costs") -> "Costs":
+        """Spent together."""
+        return Costs(*(one + two for one, two in zip(vars(self).values(), vars(other).values(), strict=True)))
+
 
 class Ledger:
     """Book-keeping of a session on top of what earlier sessions of the run spent.
@@ -45,19 +49,13 @@ class Ledger:
 
     def costs(self) -> Costs:
         """Spent by this run until now."""
-        wall = time.perf_counter() - self._wall
-        simulating = self._simulating()
+        wall, simulating = time.perf_counter() - self._wall, self._simulating()
         learning = time.process_time() - self._cpu - (simulating if self._in_process else 0.0)
         waiting = max(self._processes * wall - simulating - learning, 0.0)
-        return Costs(
-            self.before.simulating + simulating,
-            self.before.learning + learning,
-            self.before.waiting + waiting,
-            self.before.wall + wall,
-        )
+        return self.before + Costs(simulating, learning, waiting, wall)
 
     def write(self, steps: int) -> None:
-        """Put the costs into the run folder, in hours as in the paper."""
+        """Put the costs into the run folder."""
         write_costs(self.path, steps, self.costs())
 
 

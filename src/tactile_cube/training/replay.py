@@ -76,9 +76,14 @@ class Replay:
             "steps_to_next_obs": 1,
             "demonstrated": 1,
         }
-        self.capacity = capacity
-        self.width = sum(self.widths.values())
-        _require_memory(4 * capacity * self.width, capacity)
+        self.capacity, self.width = capacity, sum(self.widths.values())
+        size = 4 * capacity * self.width
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else size
+        if size > memory:  # it would be taken page by page, hours later
+            raise InputError(
+                f"training.replay_size={capacity}: takes {size / 2**30:.3g} GiB, this machine has "
+                f"{memory / 2**30:.3g}; keep fewer transitions"
+            )
         self.generator = torch.Generator().manual_seed(seed)
         self.buffer = make(storage=LazyTensorStorage(capacity), generator=self.generator)
 
@@ -91,15 +96,13 @@ class Replay:
         """The filled part of the ring, (len, width)."""
         return Rows(self.buffer, self.widths)
 
-    def extend(self, transitions: TensorDictBase) -> None:
+    def extend(self, transitions: Mapping[NestedKey, Tensor] | TensorDictBase) -> None:
         """Append transitions (rows,) with the keys of `widths`."""
-        if len(transitions):
-            kept = transitions[-self.capacity :]
-            self._extend({key: kept[key] for key in self.widths})
-
-    def _extend(self, parts: Mapping[NestedKey, Tensor]) -> None:
-        kept = {key: part.bool() if key in FLAGS else part.float() for key, part in parts.items()}
-        self.buffer.extend(TensorDict(kept, [len(kept["observation"])]))
+        count = min(len(transitions["observation"]), self.capacity)
+        if count:
+            kept = {key: transitions[key][-count:] for key in self.widths}
+            typed = {key: part.bool() if key in FLAGS else part.float() for key, part in kept.items()}
+            self.buffer.extend(TensorDict(typed, [count]))
 
     def sample(self, size: int, weights: Tensor) -> TensorDictBase:
         """Draw `size` transitions with replacement, as TorchRL's losses read them; reward = reward_terms @ weights."""
@@ -127,22 +130,11 @@ class Replay:
                 f"replay in the checkpoint holds {rows.shape[0]} rows of width {rows.shape[1]}, this run's up to "
                 f"{self.capacity} of width {width}; keep training.replay_size and the observation"
             )
-        if rows.shape[0]:
-            parts = torch.split(rows[:], list(self.widths.values()), -1)
-            self._extend(dict(zip(self.widths, parts, strict=True)))
+        parts = torch.split(rows[:], list(self.widths.values()), -1)
+        self.extend(dict(zip(self.widths, parts, strict=True)))
         self.buffer.writer.load_state_dict({"_cursor": written % self.capacity, "_write_count": written})
         self.buffer.sampler.load_state_dict(state["sampler"])
         self.generator.set_state(state["generator"])
-
-
-def _require_memory(size: int, capacity: int) -> None:
-    """Refuse a replay larger than the machine's memory: it would be taken page by page, hours later."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else size
-    if size > memory:
-        raise InputError(
-            f"training.replay_size={capacity}: takes {size / 2**30:.3g} GiB, this machine has {memory / 2**30:.3g}; "
-            "keep fewer transitions"
-        )
 
 
 FOLDER = "replay"
@@ -197,7 +189,14 @@ class ReplayFiles:
         self._require_whole(segments, written, capacity, width)
         ring = torch.empty(min(written, capacity), width)
         for segment in segments:
-            block = self._read(segment).reshape(-1, width)
+            path = self._path(segment[0])
+            try:
+                content = path.read_bytes()
+            except OSError as error:
+                raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+            if hashlib.sha256(content).hexdigest() != segment[2]:
+                raise InputError(f"{path}: its checksum is wrong")
+            block = torch.from_numpy(np.frombuffer(bytearray(content), "<f4")).reshape(-1, width)
             number = torch.arange(segment[0], _end(segment))
             inside = number >= written - capacity
             ring[number[inside] % capacity] = block[inside]
@@ -234,16 +233,6 @@ class ReplayFiles:
 
     def _path(self, first: int) -> Path:
         return self.folder / f"{first:012d}.f32"
-
-    def _read(self, segment: Segment) -> Tensor:
-        path = self._path(segment[0])
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-        if hashlib.sha256(content).hexdigest() != segment[2]:
-            raise InputError(f"{path}: its checksum is wrong")
-        return torch.from_numpy(np.frombuffer(bytearray(content), "<f4"))
 
 
 def _end(segment: Segment) -> int:
