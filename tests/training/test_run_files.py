@@ -53,19 +53,19 @@ def test_more_steps_starting_over_a_damaged_file_or_a_lost_policy_do_not_find_it
 
 def test_costs_add_up_over_sessions(tmp_path: Path) -> None:
     for expected in (100.0, 200.0):
-        Ledger(tmp_path / LEDGER, processes=2, simulating=lambda: 100.0, in_process=False).write(steps=7)
+        Ledger(tmp_path / LEDGER, simulating=lambda: 100.0, in_process=False).write(steps=7)
         assert json.loads((tmp_path / LEDGER).read_text())["seconds"]["simulating"] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("in_process", "learning", "waiting"), [(False, 2.0, 20.0), (True, 1.5, 20.5)])
-def test_what_neither_workers_nor_learner_used_of_the_cores_is_waiting(
-    tmp_path: Path, in_process: bool, learning: float, waiting: float, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("in_process", "learning"), [(False, 2.0), (True, 1.5)])
+def test_what_is_simulated_in_the_learners_process_is_counted_once(
+    tmp_path: Path, in_process: bool, learning: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / LEDGER).write_text("{")  # a damaged one counts for nothing
     clocks = SimpleNamespace(perf_counter=iter([100.0, 107.5]).__next__, process_time=iter([30.0, 32.0]).__next__)
     monkeypatch.setattr("tactile_cube.training.ledger.time", clocks)
-    costs = Ledger(tmp_path / LEDGER, processes=3, simulating=lambda: 0.5, in_process=in_process).costs()
-    assert costs == Costs(simulating=0.5, learning=learning, waiting=waiting, wall=7.5)
+    costs = Ledger(tmp_path / LEDGER, simulating=lambda: 0.5, in_process=in_process).costs()
+    assert costs == Costs(simulating=0.5, learning=learning, wall=7.5)
 
 
 def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,6 +29,7 @@ class Policy(Protocol):
 
     def start(self, env: RotationEnv, seed: int) -> None:
         """Begin an episode that has just been reset; by default there is nothing to prepare."""
+        return
 
     def act(self, observation: NDArray[np.float32], step: int) -> Array:
         """Return the action `(joints,)` in [-1, 1] for the stacked observation."""

@@ -132,7 +132,9 @@ class Variant:
         numb_reading(self.numb, config.hand)
         if self.pull is not None:
             self.pull.check(config.hand)
-        constants = {key: tuple(map(float, v)) if hasattr(v, "__iter__") else v for key, v in self.constants.items()}
+        constants: dict[str, Any] = {
+            key: tuple(map(float, v)) if hasattr(v, "__iter__") else v for key, v in self.constants.items()
+        }
         values = {key: value for key, value in config.randomization.values.items() if key not in constants}
         return dataclasses.replace(
             config,

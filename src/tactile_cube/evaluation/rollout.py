@@ -21,7 +21,7 @@ Interference = Callable[[RotationEnv, int], None]
 """Something done to the world before each policy step, given the number of the step."""
 NO_NUMBERS = ("effects", "joints", "object_shape")
 WORLD_SIGNALS = ("q", "q_f", "cube_position", "cube_quaternion")
-CONTACT_SHAPES = {"position": (-1, 3), "force": (-1, 3)}
+CONTACT_KINDS: dict[str, Any] = {"step": np.int64, "finger": np.int64, "tip": np.bool_}
 
 
 def run_episode(
@@ -66,7 +66,7 @@ class Recorder:
         self._steps: dict[str, list[Any]] = {"reward": [], "terms": [], "target": []}
         self._policy: dict[str, list[Array]] = {}
         self._contacts: list[dict[str, Any]] = []
-        self._trace: list[dict[str, Array]] = []
+        self._trace: list[dict[str, Any]] = []
         self._outcome = 0
         self._sample()
 
@@ -111,13 +111,10 @@ class Recorder:
         task, samples = self._task, {name: np.array(rows) for name, rows in self._samples.items()}
         weights = task.reward.weights(task.conditions.penalty_scale)
         terms = np.array(self._steps["terms"]).reshape(-1, len(weights)) * weights
-        kinds = {"step": np.int64, "finger": np.int64, "tip": np.bool_}
-        table = {
-            field.name: np.array(
-                [one[field.name] for one in self._contacts], dtype=kinds.get(field.name, np.float64)
-            ).reshape(CONTACT_SHAPES.get(field.name, (-1,)))
-            for field in dataclasses.fields(ContactTable)
-        }
+        table: dict[str, Any] = {field.name: [] for field in dataclasses.fields(ContactTable)}
+        for name in table:
+            column = np.array([one[name] for one in self._contacts], dtype=CONTACT_KINDS.get(name, np.float64))
+            table[name] = column.reshape(-1, 3) if name in ("position", "force") else column
         return EpisodeRecord(
             time=np.arange(len(samples["theta"]), dtype=np.float64) * task.world.options.policy_dt,
             theta=samples["theta"],

@@ -149,12 +149,7 @@ def build_run(
             learner.replay.load_state_dict(_replay_of(training.init_from))
         if training.resume == "never":  # nothing refuses any more
             _clear(folder, checkpoints)
-        ledger = Ledger(
-            folder / LEDGER,
-            processes=1 if collector.kind == "single" else collector.workers + 1,
-            simulating=collection.cpu_seconds,
-            in_process=collector.kind == "single",
-        )
+        ledger = Ledger(folder / LEDGER, collection.cpu_seconds, in_process=collector.kind == "single")
         known = {key: saved[key] for key in ("best_angle", "best_score", "tried") if key in saved} if saved else {}
         run = Run(
             learner=learner,

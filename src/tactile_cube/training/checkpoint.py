@@ -1,24 +1,23 @@
-"""What a run goes on from, bit for bit: the two newest checkpoints, and the replay they share."""
+"""What a run goes on from, bit for bit: the two newest checkpoints, replay included."""
 
 import hashlib
 import io
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
-from pydantic import BaseModel, NonNegativeInt, PositiveInt, ValidationError
+from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt, ValidationError, model_validator
 from torch import Tensor
 
 from tactile_cube.drivetrain.plain_yaml import describe
 from tactile_cube.errors import InputError
 from tactile_cube.run_folder import CHECKPOINT
-from tactile_cube.training.replay import ReplayFiles, Segment
 from tactile_cube.untrusted_file import regular
 from tactile_cube.whole_file import sync_folder, write_whole
 
 FILE, BEFORE = CHECKPOINT, "checkpoint_before.pt"
-HEAD = b"tactile_cube checkpoint 3, sha256 "
+HEAD = b"tactile_cube checkpoint 4, sha256 "
 """First words of a file; its checksum follows, then a line break, then what torch.save wrote."""
 FREE = {
     "training": "steps policy_every reference trial_every trial_episodes log_iterations resume stop_if_no_regrasp_by "
@@ -30,39 +29,32 @@ FREE_KEYS = {"own_effects", "logger"} | {f"{group}.{key}" for group, keys in FRE
 
 
 class Checkpoints:
-    """The checkpoints of a run folder: the newest, the one before in case that is damaged, and the replay's rows."""
+    """The checkpoints of a run folder: the newest, and the one before in case that is damaged."""
 
     def __init__(self, folder: Path):
         self.folder, self.notice = folder, ""
-        self._replay, self._segments = ReplayFiles(folder), list[Segment]()
 
     def save(self, state: dict[str, Any]) -> None:
-        """Write a state whose `["learner"]["replay"]` is that of a `Replay`; a crash leaves the one before.
+        """Write a state; a crash leaves the one before.
 
         Raises:
             InputError: it cannot be written, for instance because the disk is full.
         """
         path, aside = self.folder / FILE, self.folder / "checkpoint_next.pt"
         try:
-            replay = dict(state["learner"]["replay"])
-            rows = replay.pop("rows")
-            segments = self._replay.append(rows, replay["written"], replay["capacity"])
-            replay |= {"segments": segments, "width": rows.shape[1]}
             stream = io.BytesIO()
-            torch.save(state | {"learner": state["learner"] | {"replay": replay}}, stream)
+            torch.save(state, stream)
             content = stream.getbuffer()
             write_whole(aside, HEAD, hashlib.sha256(content).hexdigest().encode(), b"\n", content)
             if path.exists():
                 path.replace(self.folder / BEFORE)
             aside.replace(path)
             sync_folder(self.folder)
-            self._replay.delete_all_but([*self._segments, *segments])
         except OSError as error:
             raise InputError(
                 f"{path}: cannot be written ({error.strerror or error}); is the disk full? The checkpoint before it is "
                 "whole, and the same command goes on from there"
             ) from error
-        self._segments = segments
 
     def load(self) -> dict[str, Any] | None:
         """The newest whole checkpoint, or None where there never was one; `notice` says if it is not the newest.
@@ -79,13 +71,9 @@ class Checkpoints:
                 continue
             try:
                 state = load_checkpoint(path)
-                replay = state["learner"]["replay"]
-                segments = [tuple(segment) for segment in replay["segments"]]
-                replay["rows"] = self._replay.read(segments, replay["written"], replay["capacity"], replay["width"])
             except InputError as error:
                 refusals.append(error)
                 continue
-            self._segments = segments
             if path != newest:
                 reason = refusals[0] if refusals else f"{newest}: was not finished"
                 self.notice = f"{reason}; the run goes on from the checkpoint before it"
@@ -99,15 +87,22 @@ class Checkpoints:
         """Delete them all, to start over."""
         for name in (FILE, BEFORE):
             (self.folder / name).unlink(missing_ok=True)
-        self._replay.clear()
 
 
 class _Ring(BaseModel):
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
     written: NonNegativeInt
     capacity: PositiveInt
-    width: PositiveInt
-    segments: list[tuple[NonNegativeInt, PositiveInt, str]]
+    transitions: list[Tensor]
     generator: Any
+
+    @model_validator(mode="after")
+    def _holds_what_it_claims(self) -> Self:
+        claimed = min(self.written, self.capacity)
+        if any(part.shape[:1] != (claimed,) for part in self.transitions) or not self.transitions:
+            raise ValueError(f"claims {claimed} transitions that it does not hold")
+        return self
 
 
 class _Learner(BaseModel):
@@ -136,12 +131,13 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
         if head != HEAD + hashlib.sha256(content).hexdigest().encode() + b"\n":
             raise ValueError("its checksum is wrong or missing")
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            for part in archive.filelist:
-                if part.compress_type != zipfile.ZIP_STORED or part.file_size > len(content):
+            for packed in archive.filelist:
+                if packed.compress_type != zipfile.ZIP_STORED or packed.file_size > len(content):
                     raise ValueError("its parts are compressed or larger than the file")
         state: dict[str, Any] = torch.load(io.BytesIO(content), weights_only=True)
         _State.model_validate(state)
-        _require_sound(state["learner"]["agent"], "agent", len(content))
+        for part in ("agent", "replay"):
+            _require_sound(state["learner"][part], part, len(content))
     except ValidationError as error:
         raise InputError(f"{path}: damaged checkpoint ({describe(error)})") from error
     except Exception as error:  # torch raises half a dozen kinds for damaged files

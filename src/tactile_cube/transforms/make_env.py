@@ -117,7 +117,13 @@ class EnvConfig:
             if not isinstance(getattr(self, key), kinds):
                 names = " or ".join(kind.__name__ for kind in kinds)
                 raise InputError(f"env.{key} is {str(getattr(self, key))[:60]}; give a {names}")
-        effects = [one for effect in self.effects for one in _placed_effects(effect, self.hand)]
+        effects = list[Effect]()
+        for effect in self.effects:
+            if isinstance(effect, Effect):
+                effects.append(effect)
+            else:  # a text names one for each joint that matches
+                name, values = parse_effect(effect)
+                effects += [kind(joint, **values) for kind, joint in resolve([name], self.hand.joint_names)]
         if self.constants.joints != self.hand.joints:
             raise InputError(
                 f"env.constants are of {self.constants.joints} joints, hand '{self.hand.name}' has {self.hand.joints}; "
@@ -201,14 +207,6 @@ def transforms(config: EnvConfig, explore: bool) -> list[Transform]:
         size = (len(hand.fingers), hand.joints_per_finger)
         chain.append(FingerExploration(config.exploration, _demonstrated_gaits(config), *size))
     return chain
-
-
-def _placed_effects(effect: Effect | str, hand: Hand) -> list[Effect]:
-    """The effects that a text such as `backlash@q2: play=0.02` names, one for each joint that matches."""
-    if isinstance(effect, Effect):
-        return [effect]
-    name, values = parse_effect(effect)
-    return [kind(joint, **values) for kind, joint in resolve([name], hand.joint_names)]
 
 
 def _demonstrated_gaits(config: EnvConfig) -> torch.Tensor | None:
