@@ -72,7 +72,7 @@ def test_line_says_steps_rates_angle_curriculum_and_time_left(monkeypatch: pytes
     clock = iter([100.0, 101.0, 110.0, 115.0, 120.0, 1000.0, 1005.0])
     monkeypatch.setattr(loggers.time, "perf_counter", lambda: next(clock))
     stream = io.StringIO()
-    reference = {2000: (0.5, 1.0), 7000: (2.0, 4.0)}
+    reference = ((2000, 0.5, 1.0), (7000, 2.0, 4.0))
     line = ProgressLine(total=10_000, steps=1000, updates=50, reference=reference, stream=stream)
     summary = {"final_angle": 1.234, "episode_length": 88.0, "ended_time_limit": 0.9}
     line.stage, line.later = "stage 1 of 2", 3000

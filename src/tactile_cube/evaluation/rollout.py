@@ -110,7 +110,7 @@ class Recorder:
         """Return the episode so far."""
         task, samples = self._task, {name: np.array(rows) for name, rows in self._samples.items()}
         weights = task.reward.weights(task.conditions.penalty_scale)
-        terms = np.array(self._steps["terms"]).reshape(-1, len(weights)) * weights
+        terms: Array = np.array(self._steps["terms"]).reshape(-1, len(weights)) * weights
         table: dict[str, Any] = {field.name: [] for field in dataclasses.fields(ContactTable)}
         for name in table:
             column = np.array([one[name] for one in self._contacts], dtype=CONTACT_KINDS.get(name, np.float64))

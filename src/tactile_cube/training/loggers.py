@@ -41,10 +41,8 @@ class ProgressLine:
         later: environment steps that the stages after it usually take.
     """
 
-    def __init__(
-        self, total: int, steps: int, updates: int, reference: Reference | None = None, stream: TextIO | None = None
-    ):
-        self._total, self._reference, self._stream = total, reference or {}, stream or sys.stdout
+    def __init__(self, total: int, steps: int, updates: int, reference: Reference = (), stream: TextIO | None = None):
+        self._total, self._reference, self._stream = total, reference, stream or sys.stdout
         self.stage, self.later = "", 0
         self._printed = time.perf_counter()
         self._past = deque([(self._printed, steps, updates)])
@@ -81,15 +79,15 @@ class ProgressLine:
 
     def _band(self, steps: int) -> str:
         """What recorded runs had at so many steps, in words; "" where none got there."""
-        known = sorted(self._reference)
+        known, *edges = zip(*self._reference, strict=True) if self._reference else ((),)
         if not known or not known[0] <= steps <= known[-1]:
             return ""
-        low, high = (np.interp(steps, known, [self._reference[at][edge] for at in known]) for edge in (0, 1))
+        low, high = (np.interp(steps, known, edge) for edge in edges)
         return f" (recorded runs {low:.2f} to {high:.2f})"
 
     def _left(self, steps: int, rate: float) -> str:
         """The time left, in words: to where recorded runs ended, beyond that to the last step."""
-        usual = min(max(self._reference, default=self._total), self._total)
+        usual = self._reference[-1][0] if self._reference else self._total
         sooner = steps < usual < self._total
         ahead = max((usual if sooner else self._total) - steps, 0) + self.later  # the last barrier may lie beyond
         if rate <= 0.0:

@@ -5,8 +5,8 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
-Reference = dict[int, tuple[float, float]]
-"""What recorded runs came to: environment steps -> lowest and highest mean final angle [rad]; the last is their end."""
+Reference = tuple[tuple[int, float, float], ...]
+"""Of recorded runs: environment steps, lowest and highest mean final angle [rad] after them; the last is their end."""
 
 
 class RunSettings(BaseModel):
@@ -66,7 +66,7 @@ class TrainingSettings(BaseModel):
     random_steps: NonNegativeInt = 10_000
     replay_size: PositiveInt = 150_000
     barrier_iterations: PositiveInt = 25
-    reference: Reference = {}
+    reference: Reference = ()
     policy_every: NonNegativeInt = 0
     trial_every: NonNegativeInt = 25_000
     trial_episodes: PositiveInt = 4
@@ -84,7 +84,7 @@ class TrainingSettings(BaseModel):
     @property
     def usual_steps(self) -> int:
         """Environment steps after which recorded runs were done; all where there are none."""
-        return min(max(self.reference, default=self.steps), self.steps)
+        return min(self.reference[-1][0] if self.reference else self.steps, self.steps)
 
     @property
     def goal(self) -> str:
