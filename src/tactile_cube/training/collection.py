@@ -215,17 +215,19 @@ class MultiSyncCollection:
         asked = range(len(self._pipes)) if worker is None else [worker]
         try:
             for index in asked:
-                pipe, process = self._pipes[index], self._processes[index]
-                if not wait([pipe, *(one.sentinel for one in self._processes)], max(until - time.monotonic(), 0.0)):
+                pipe, sentinels = self._pipes[index], [one.sentinel for one in self._processes]
+                ready = wait([pipe, *sentinels], max(until - time.monotonic(), 0.0))
+                if not ready:
                     limit = f"collector.{name}={seconds:g} s (to {doing})"
                     raise CollectionError(f"no simulation worker answered within {limit}")
-                if not pipe.poll():  # another one, or this one, ended
-                    gone = next(one for one in (process, *self._processes) if one.exitcode is not None)
-                    raise CollectionError(f"simulation worker failed to {doing}: exit code {gone.exitcode}")
+                if pipe not in ready:  # this worker or another one ended
+                    ended = self._processes[sentinels.index(ready[0])]  # type: ignore[arg-type]
+                    ended.join(1.0)
+                    raise CollectionError(f"simulation worker failed to {doing}: exit code {ended.exitcode}")
                 answers.append(pickle.loads(pipe.recv_bytes()))
                 if isinstance(answers[-1], CollectionError):
                     raise CollectionError(f"simulation worker failed to {doing}: {answers[-1]}")
-        except EOFError:
+        except (EOFError, OSError):
             self._kill()
             raise CollectionError(f"simulation worker failed to {doing}: it ended") from None
         except BaseException:  # Ctrl-C: workers ignore it, and would be waited for
