@@ -7,7 +7,7 @@ import torch
 from tensordict import TensorDict
 from torchrl.modules import TanhNormal
 
-from tactile_cube.agent.networks import Actor, Critic, Sizes, squashed_log_prob
+from tactile_cube.agent.networks import Actor, Sizes, squashed_log_prob
 from tactile_cube.agent.sac import stochastic_actor
 from tactile_cube.training.collection import Behaviour
 
@@ -24,12 +24,6 @@ def test_actor_reads_the_observation_and_nothing_else() -> None:
     assert Behaviour(Actor(SIZES, (8,))).in_keys == ["observation"]
     assert list(inspect.signature(Actor.forward).parameters) == ["self", "observation"]
     assert next(Actor(SIZES, (8,)).parameters()).shape[1] == SIZES.observation
-
-
-def test_critic_depends_on_privileged_state() -> None:
-    critic = Critic(SIZES, (64,))
-    o, a = torch.randn(1, 10), torch.randn(1, 3)
-    assert critic(o, torch.zeros(1, 4), a) != critic(o, torch.ones(1, 4), a)
 
 
 def test_log_prob_is_that_of_torchrl() -> None:

@@ -83,21 +83,6 @@ def test_changed_settings_are_not_mixed_into_a_run(tmp_path: Path) -> None:
     assert fresh.learner.steps == 0
 
 
-def test_learner_uses_the_replay_of_the_iteration_before(tmp_path: Path) -> None:
-    run = tiny_run(tmp_path, learning_starts=0, random_steps=0)
-    run.learner.replay.extend({key: torch.zeros(1, width) for key, width in run.learner.replay.widths.items()})
-    seen = []
-    sample = run.learner.replay.sample
-
-    def watched(*args: Any) -> Any:
-        seen.append(run.learner.replay.buffer.write_count)
-        return sample(*args)
-
-    run.learner.replay.sample = watched  # type: ignore[method-assign]
-    run.train()
-    assert seen[:6] == [1, 1, 1, 21, 21, 21]
-
-
 def test_run_gives_up_without_regrasping_and_finishes_early_when_good(tmp_path: Path) -> None:
     assert "no regrasping" in tiny_run(tmp_path / "a", stop_if_no_regrasp_by=80).train()
     good = tiny_run(tmp_path / "b", stop_when_angle_above=0.0001, random_steps=0)

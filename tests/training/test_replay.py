@@ -33,16 +33,6 @@ def test_rewards_are_weighed_when_sampled() -> None:
     assert replay.sample(4, torch.tensor([0.0, -1.0]))["next", "reward"].flatten().tolist() == [-5.0] * 4
 
 
-def test_parts_come_back_under_their_names() -> None:
-    replay = Replay(10, SIZES, 1, seed=0)
-    parts = {key: torch.full((1, width), float(i)) for i, (key, width) in enumerate(replay.widths.items())}
-    replay.extend(TensorDict(parts, [1]))
-    batch = replay.sample(2, torch.ones(1))
-    for key, value in parts.items():
-        got = batch["next", "reward"] if key == ("next", "reward_terms") else batch[key]
-        assert (got == value[0, 0].to(got.dtype)).all()
-
-
 @pytest.mark.parametrize("count", [3, 12])
 def test_restored_replay_samples_the_same(count: int) -> None:
     first, second = Replay(10, SIZES, 2, seed=0), Replay(10, SIZES, 2, seed=9)

@@ -13,8 +13,7 @@ from typing import Any, Literal, NamedTuple
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
 
-from tactile_cube.agent.averaging import averaged, kept_policies
-from tactile_cube.agent.policy_file import save_policy
+from tactile_cube.agent.policy_file import averaged, kept_policies, save_policy
 from tactile_cube.api.environment import grasps_of
 from tactile_cube.api.evaluation import run_evaluation
 from tactile_cube.api.job import Job, PathLike, as_input_errors, as_word, called_job, worded_job

@@ -5,13 +5,4 @@ from tactile_cube.env.reward import Reward
 from tactile_cube.env.rotation import RotationEnv, TimeStep
 from tactile_cube.env.task import OUTCOMES, Conditions, Task
 
-__all__ = [
-    "OUTCOMES",
-    "Conditions",
-    "CubePose",
-    "Reward",
-    "RotationEnv",
-    "Task",
-    "TimeStep",
-    "cube_pose",
-]
+__all__ = ["OUTCOMES", "Conditions", "CubePose", "Reward", "RotationEnv", "Task", "TimeStep", "cube_pose"]

@@ -6,14 +6,6 @@ from tactile_cube.transforms.finger_exploration import Exploration, FingerExplor
 from tactile_cube.transforms.make_env import EnvConfig, make_env, rotation_env
 
 __all__ = [
-    "Curriculum",
-    "EnvConfig",
-    "Exploration",
-    "FingerExploration",
-    "JointOffset",
-    "Ramps",
-    "SensorNoise",
-    "StickyAction",
-    "make_env",
-    "rotation_env",
-]
+    "Curriculum", "EnvConfig", "Exploration", "FingerExploration", "JointOffset", "Ramps", "SensorNoise",
+    "StickyAction", "make_env", "rotation_env",
+]  # fmt: skip
