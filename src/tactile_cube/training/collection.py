@@ -221,7 +221,7 @@ class MultiSyncCollection:
                     limit = f"collector.{name}={seconds:g} s (to {doing})"
                     raise CollectionError(f"no simulation worker answered within {limit}")
                 if pipe not in ready:  # this worker or another one ended
-                    ended = self._processes[sentinels.index(ready[0])]  # type: ignore[arg-type]
+                    ended = self._processes[sentinels.index(ready[0])]
                     ended.join(1.0)
                     raise CollectionError(f"simulation worker failed to {doing}: exit code {ended.exitcode}")
                 answers.append(pickle.loads(pipe.recv_bytes()))
