@@ -1,6 +1,5 @@
 """Where metrics go: the line on the terminal, metrics.csv, and one of TorchRL's loggers."""
 
-import contextlib
 import csv
 import hashlib
 import io
@@ -180,10 +179,13 @@ def open_logger(
 
 
 def log_film(logger: Logger, film: Path, steps: int) -> None:
-    """Show a GIF in a logger that can: Weights & Biases, with moviepy; TensorBoard's needs a moviepy of before 2."""
+    """Show a GIF in Weights & Biases, where moviepy is installed; TensorBoard's films need a moviepy of before 2."""
     if type(logger).__name__ != "WandbLogger":
         return
     with Image.open(film) as opened:
         frames = np.stack([np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(opened)])
-    with contextlib.suppress(ImportError):
-        logger.log_video("trial", torch.from_numpy(frames).permute(0, 3, 1, 2)[None], step=steps, fps=5, format="gif")
+    video = torch.from_numpy(frames).permute(0, 3, 1, 2)[None]
+    try:
+        logger.log_video("trial", video, step=steps, fps=5, format="gif")
+    except Exception as error:
+        print(f"{film}: not sent to Weights & Biases ({error})")
