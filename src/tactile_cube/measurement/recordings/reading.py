@@ -1,5 +1,6 @@
 """A recording on disk: recording.yaml, the rig's URDF and one table a trial, read and checked."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -37,8 +38,12 @@ def read_recording(folder: str | Path) -> Recording:
         InputError: naming file, column, row and value of what cannot be used.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"recording={folder}: no such folder; a recording is a folder with {DESCRIPTION} in it")
+    if not os.path.lexists(folder / DESCRIPTION):
+        what = "no such folder" if not folder.exists() else f"{DESCRIPTION}: no such file"
+        raise InputError(
+            f"recording={folder}: {what}; record makes a recording of logs: source=csv source.files={folder} "
+            "source.urdf=FILE out=FOLDER"
+        )
     file = below(folder, DESCRIPTION, f"recording={folder}")
     description = read_schema(file, Description)
     path = below(folder, description.rig, f"{file}: key 'rig'")
@@ -99,6 +104,7 @@ def _trial(path: Path, most: int, entry: TrialEntry, description: Description, r
     stamps = (columns.time[outlying] - columns.time[0]) * rate
     beside = np.concatenate([np.floor(stamps), np.ceil(stamps)]).astype(np.int64)
     valid[np.minimum(beside, len(valid) - 1)] = False
+    valid &= grid.time >= entry.unjudged
     return Trial(
         name=path.stem,
         **{key: getattr(entry, key) for key in ("file", "kind", "initialisation", "force", "clamped", "touch")},

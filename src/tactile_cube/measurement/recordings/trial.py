@@ -64,7 +64,7 @@ class Trial(TrialColumns):
         file: path inside the recording's folder.
         kind: kind of excitation; trials of one kind repeat one command.
         initialisation: robot initialisation it belongs to; each has joint offsets of its own.
-        valid: (n,) False where a dropped sample was interpolated; such samples count in no error.
+        valid: (n,) False where a sample counts in no error: it was interpolated, or follows commands before the log.
         gains: the controller in this trial.
         force: a known force on a link, or None.
         clamped: the links were held still.
