@@ -21,7 +21,7 @@ from tactile_cube.identification.search.candidates import (
     with_details,
     without_effect,
 )
-from tactile_cube.identification.search.evidence import segment_errors
+from tactile_cube.identification.search.evidence import joint_errors
 from tactile_cube.identification.search.explanation import Proposal, named_by
 from tactile_cube.identification.search.residual_starts import residual_candidates
 from tactile_cube.identification.search.search import Search, some
@@ -59,15 +59,10 @@ def off(search: Search, one: Fit) -> list[int]:
     Of a set that has explained nearly all of a joint's error, above what is tolerated: a law differs in detail from the
     real thing, and no other law is called for by that.
     """
-    criteria, before = search.criteria, joint_errors(search.problem, search.base.fit)
-    errors = joint_errors(search.problem, one)
+    criteria, before = search.criteria, joint_errors(search.problem, search.base.fit.residual)
+    errors = joint_errors(search.problem, one.residual)
     detail = errors**2 - 1.0 <= (1.0 - criteria.nearly_whole) * (before**2 - 1.0)
     return [int(j) for j in np.flatnonzero(errors > np.where(detail, criteria.tolerated, criteria.floor))]
-
-
-def joint_errors(problem: Problem, one: Fit) -> Array:
-    """RMS error (n,) of a fit at each joint, in units of the sensor noise."""
-    return np.asarray(np.sqrt(np.nanmean(segment_errors(problem, one.residual) ** 2, axis=0)))
 
 
 def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
@@ -159,7 +154,7 @@ def refitted(search: Search, looks: Looks, laws: Sequence[tuple[Candidate, Fit]]
     terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
     model = replace(looks.frozen.model, terms=(*looks.frozen.model.terms, *terms))
     one = Proposal((*looks.parent.effects, *(candidate for candidate, _ in laws)), search.refitted(model))
-    search.say(f"  {search.over_noise(one.fit):8.3f}  {' & '.join(c.label for c in one.effects)}")
+    search.say(f"  {search.over_noise(one.fit):8.3f}  {one.label}")
     return one
 
 
