@@ -153,6 +153,11 @@ class Effect:
             lacks = ["a static method configure(view, place, p)"]
         if not lacks and cls.stage is not Stage.MECHANISM and not cls.defines("law"):
             lacks = ["a static method law(x, j, p, s, dt)"]
+        if not isinstance(cls.contains, Mapping):
+            raise InputError(
+                f"effect class {cls.__module__}.{cls.__qualname__}: contains is {cls.contains!r}; give the values at which "
+                "it becomes each simpler effect, such as {'coulomb_friction': {'change': 0.0}}"
+            )
         if lacks:
             raise InputError(f"effect class {cls.__module__}.{cls.__qualname__} lacks {', '.join(lacks)}")
 
