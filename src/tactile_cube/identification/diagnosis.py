@@ -122,8 +122,9 @@ def diagnose_recording(
     recording = in_steps(recording, effects, known, say)
     whole = Inquiry(recording, effects, seed, say, known, criteria)
     standard = fit_standard_model(*whole.parts[:2], noise_with_links(recording), known, effects)
-    say.answer, say.following = standard.sentence(common_unit(recording.units.values())), "its constants alone"
-    say(say.answer)
+    first = standard.sentence(common_unit(recording.units.values()))
+    say.answer, say.following = first.partition(";")[0], "the stated model with its constants refitted"
+    say(first)
     inquiry, left_out, suspected = beside_disturbances(whole)
     search, findings, simulations, verdict = inquiry.answer
     if findings.stopped:

@@ -82,7 +82,5 @@ def test_every_stated_value_is_one_of_a_number_that_a_search_fits() -> None:
 
 
 def test_a_law_of_ones_own_that_names_simpler_ones_without_values_is_refused() -> None:
-    with pytest.raises(
-        InputError, match=r"contains is \('coulomb_friction',\); give the values"
-    ):
+    with pytest.raises(InputError, match=r"contains is \('coulomb_friction',\); give the values where"):
         type("Rubbing", (find_effect("coulomb_friction"),), {"contains": ("coulomb_friction",)})

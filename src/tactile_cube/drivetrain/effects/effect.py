@@ -155,8 +155,8 @@ class Effect:
             lacks = ["a static method law(x, j, p, s, dt)"]
         if not isinstance(cls.contains, Mapping):
             raise InputError(
-                f"effect class {cls.__module__}.{cls.__qualname__}: contains is {cls.contains!r}; give the values at which "
-                "it becomes each simpler effect, such as {'coulomb_friction': {'change': 0.0}}"
+                f"effect class {cls.__module__}.{cls.__qualname__}: contains is {cls.contains!r}; give the values where it "
+                "becomes each simpler effect, such as {'coulomb_friction': {'change': 0.0}}"
             )
         if lacks:
             raise InputError(f"effect class {cls.__module__}.{cls.__qualname__} lacks {', '.join(lacks)}")
