@@ -71,19 +71,15 @@ def look(search: Search, parent: Proposal, at: Sequence[str]) -> Looks:
     problem.linearise_starts(parent.fit.model)
     frozen = renewed(problem, parent.fit, *problem.columns(parent.fit.model, parent.fit.unknowns))
     there = named_by(parent.effects)
+    known = [*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)]
     possible = [
         one
-        for one in wanted(search, problem, frozen)
+        for one in search.new(known)
         if there.isdisjoint(named_by([one])) and (one.joints[0] in at or one.effect.stage is Stage.MECHANISM)
     ]
     scores = screen(problem, frozen, possible)
     tried = sorted((stepped(problem, frozen, one) for one in best_starts(scores)), key=lambda pair: pair[1].cost)
     return Looks(parent, problem, frozen, tried, scores)
-
-
-def wanted(search: Search, problem: Problem, frozen: Fit) -> list[Candidate]:
-    """What may be added to a fit: at starts of its own, or read from what the fit leaves."""
-    return search.new([*search.candidates, *residual_candidates(problem, search.fitted, frozen, search.effects)])
 
 
 def stepped(problem: Problem, frozen: Fit, candidate: Candidate) -> tuple[Candidate, Fit]:
@@ -127,7 +123,8 @@ def whole(search: Search, found: Sequence[Proposal]) -> bool:
 
 def near(search: Search, looks: Looks, fitted: Fit, found: Sequence[Proposal]) -> bool:
     """Whether a law has come near the best set by its own steps, on few windows."""
-    return over_noise(looks.problem, fitted) ** 2 <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2
+    left = fitted.cost / np.count_nonzero(looks.problem.weight)
+    return bool(left <= CLOSE * min(search.over_noise(one.fit) for one in found) ** 2)
 
 
 def explains_most(search: Search, looks: Looks, fitted: Fit) -> bool:
@@ -141,11 +138,6 @@ def further(looks: Looks, fitted: Fit) -> Fit:
     """A law after more steps of its own: a twin is as good only once the constants beside it have moved."""
     own = fitted.unknowns[len(looks.frozen.unknowns) :]
     return fit(looks.problem, fitted.model, own, MORE_STEPS, looks.frozen)
-
-
-def over_noise(problem: Problem, fitted: Fit) -> float:
-    """RMS error of a fit in units of the sensor noise."""
-    return float(np.sqrt(fitted.cost / np.count_nonzero(problem.weight)))
 
 
 def refitted(search: Search, looks: Looks, laws: Sequence[tuple[Candidate, Fit]]) -> Proposal:
@@ -185,15 +177,9 @@ def sets(looks: Looks) -> list[tuple[tuple[Candidate, Fit], ...]]:
         gained = press(gradient[:, rows], gram[part], expected)
         if gained > alone[rows].max():
             found.append((gained, tuple(laws[k] for k in rows)))
-    found.sort(key=lambda one: -one[0])
-    return distinct([one for _, one in found])
-
-
-def distinct(found: Sequence[tuple[tuple[Candidate, Fit], ...]]) -> list[tuple[tuple[Candidate, Fit], ...]]:
-    """The first of those that name the same effects."""
     first: dict[frozenset[tuple[str, str]], tuple[tuple[Candidate, Fit], ...]] = {}
-    for laws in found:
-        first.setdefault(named_by([candidate for candidate, _ in laws]), laws)
+    for _, together in sorted(found, key=lambda one: -one[0]):
+        first.setdefault(named_by([candidate for candidate, _ in together]), together)
     return list(first.values())
 
 
