@@ -95,6 +95,12 @@ class Recording:
         """Joint -> unit of its position: `rad` where it turns, `m` where it slides; torques are N m or N likewise."""
         return {joint: SLIDES if self.rig.joints[joint].prismatic else TURNS for joint in self.joints}
 
+    @property
+    def shown(self) -> dict[str, str]:
+        """Joint -> unit in which people read its position: `deg` where its log has degrees, else as `units`."""
+        said = self.description.shown_in
+        return {joint: said.get(joint, unit) if unit == TURNS else unit for joint, unit in self.units.items()}
+
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
         values: Array | None = getattr(self.gains, constant, self.nominal.get(constant))
