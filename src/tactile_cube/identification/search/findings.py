@@ -124,8 +124,7 @@ def proposed(search: Search) -> tuple[list[Proposal], Looks | None]:
         if not tried or tried[0].price(search.criteria) >= parent.price(search.criteria):
             break
         parent = tried[0]
-        left = f"{parent.label} ({search.over_noise(parent.fit):.2f} x sensor noise on fitted trials)"
-        search.stand(left, "one effect more, and each one taken out")
+        search.say.following = "one effect more, and each one taken out"
     return [*found, *reduced(search, parent)], first
 
 

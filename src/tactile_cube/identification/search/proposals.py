@@ -146,7 +146,11 @@ def refitted(search: Search, looks: Looks, laws: Sequence[tuple[Candidate, Fit]]
     terms = [term for _, fitted in laws for term in fitted.model.terms[known:]]
     model = replace(looks.frozen.model, terms=(*looks.frozen.model.terms, *terms))
     one = Proposal((*looks.parent.effects, *(candidate for candidate, _ in laws)), search.refitted(model))
-    search.say(f"  {search.over_noise(one.fit):8.3f}  {one.label}")
+    left = search.over_noise(one.fit)
+    if left < search.least:
+        search.least = left
+        search.stand(f"{one.label} ({left:.2f} x sensor noise on fitted trials)", "other laws and pairs of them")
+    search.say(f"  {left:8.3f}  {one.label}")
     return one
 
 
