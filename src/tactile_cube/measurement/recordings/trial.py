@@ -70,6 +70,7 @@ class Trial(TrialColumns):
         clamped: the links were held still.
         touch: the link ended at a known place, or None.
         load: the object that the hand held, or None.
+        begun: when it began, from the start of its initialisation [s]; 0 where the stamps of its file do not tell.
     """
 
     name: str
@@ -83,6 +84,7 @@ class Trial(TrialColumns):
     touch: Touch | None = None
     warnings: tuple[str, ...] = field(default=(), repr=False)
     load: Load | None = None
+    begun: float = 0.0
 
     @property
     def linked(self) -> NDArray[np.int64]:
