@@ -39,6 +39,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "error": {key: errors[key] for key in ("nominal", "refitted", "with_effects", "noise_floor")},
         "error_joints": errors["joints"],
         "noise_floor_source": diagnosis.floor.source,
+        "drift": [asdict(one) for one in diagnosis.floor.drift],
         "standard_model": {
             "otherwise": list(diagnosis.standard.otherwise),
             "error": diagnosis.standard.error,
@@ -59,6 +60,7 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "inseparable": [list(pair) for pair in experiment.inseparable] if experiment else [],
         "held_out": diagnosis.held_out,
         "tested": diagnosis.tested,
+        "stopped_early": diagnosis.findings.stopped,
         "seconds": round(seconds, 2),
     }
 
@@ -96,7 +98,7 @@ def ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "gain": round(one.gain, 5),
             "p_value": one.p_value,
         }
-        for one in (*(e for level in diagnosis.findings.levels for e in level), *diagnosis.findings.surpassed)
+        for one in diagnosis.findings.proven(diagnosis.criteria)
     ]
     judged = {row["effects"] for row in rows}
     for score in diagnosis.findings.scores[:RANKED]:

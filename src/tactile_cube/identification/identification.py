@@ -87,7 +87,7 @@ def identify_effects(
         _check_parameters(effect, joint, parameters)
     classes = tuple(dict.fromkeys(effect for effect, *_ in wanted))
     search, floor = divided(recording, classes, seed, say)
-    held_out, base = search.held_out, search.fit_base()
+    held_out, base = search.held_out, search.base
     stages = {"nominal": search.start_held_out, "refitted": base.judgement.model}
     current, judgement = base.fit, base.judgement
     for effect, joint, parameters in wanted:

@@ -25,13 +25,12 @@ from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.identification import with_effect
 from tactile_cube.identification.model_files import UNITS, model_file
 from tactile_cube.identification.next_experiment import Experiment, next_experiment
-from tactile_cube.identification.search.candidates import Candidate
-from tactile_cube.identification.search.division import some
+from tactile_cube.identification.search.candidates import Candidate, Screen, screen
 from tactile_cube.identification.search.evidence import Judgement
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.proposals import LOOKED_AT, best_starts, stepped, wanted
 from tactile_cube.identification.search.residual_shape import Missing, black_box
-from tactile_cube.identification.search.screening import Screen, screen
+from tactile_cube.identification.search.search import some
 from tactile_cube.identification.verdict import Simulations
 from tactile_cube.measurement.bench import without_touches
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, describe_comparison
