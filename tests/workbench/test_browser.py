@@ -323,7 +323,8 @@ def test_a_diagnosis_is_stopped_in_the_middle_and_another_one_answers(
 ) -> None:
     open_recording(window, measured)
     window.get_by_role("button", name="Diagnose").click()
-    window.get_by_text("nothing yet; the refitted model leaves").wait_for()
+    window.get_by_text("best so far: ").wait_for()
+    window.get_by_text("% done in").wait_for()
     window.get_by_role("button", name="Stop").click()
     window.get_by_text("stopped", exact=True).wait_for()
     assert window.get_by_role("button", name="Add what it found").is_disabled()
