@@ -11,7 +11,7 @@ from tactile_cube.api.comparison import modelled, opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
-from tactile_cube.identification.contact.diagnosis import ContactDiagnosis, diagnose_contact, with_contact
+from tactile_cube.identification.contact.identification import ContactDiagnosis, diagnose_contact, with_contact
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis, diagnose_recording, write_experiment
 from tactile_cube.identification.diagnosis_json import as_json
@@ -141,7 +141,7 @@ def run_diagnosis(
 
 def _of_grasps(job: Job, recording: Recording, known: ModelFile | None, say: Say) -> DiagnosisResult:
     config = job.config
-    contact = diagnose_contact(recording, known, config.step, config.seed, say)
+    contact = diagnose_contact(recording, known, config.step, config.seed, say, Criteria(**config.criteria))
     model = stated_model(recording, job.command, config.seed)
     if known is not None:
         model = known.model_copy(update={"provenance": model.provenance})
@@ -166,7 +166,7 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
         data["known_effects"] += [one.effect for one in known.object_effects]
     contact = None
     if with_object(recording).trials:
-        contact = diagnose_contact(recording, model, config.step, config.seed, say)
+        contact = diagnose_contact(recording, model, config.step, config.seed, say, criteria)
         model, data = contact.into(model, alone=False), with_contact(data, contact)
         data["seconds"] = job.seconds
     return DiagnosisResult(recording, known, found, contact, model, data, job)

@@ -50,7 +50,7 @@ class IdentificationResult:
     def text(self) -> str:
         """The error after each stage, and the values with their intervals."""
         lines = [errors_by_stage(self.data["error"], self.model, self.recording.units)]
-        for parameter in self.contact.as_json()["silent"] if self.contact else []:
+        for parameter in self.contact.silent if self.contact else []:
             lines.append(f"warning: {parameter}: no trial shows it; its interval is the whole range that was searched")
         return "\n".join(lines)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactile_cube.identification.in_words import GAIN_OF, joint_rows, proposal, watch_for
+from tactile_cube.identification.in_words import joint_rows, proposal, watch_for
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
@@ -83,8 +83,8 @@ def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str
             intervals.append(Interval(label, one["value"], one["low"], one["high"], unit))
         if "heldout_gain" in effect:
             lines.append(
-                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off "
-                f"{GAIN_OF[effect.get('gain_of', 'error')]} (p {probability(effect['p_value'])})"
+                f"{effect['name']}@{place} takes {100 * effect['heldout_gain']:.0f} % off the held-out squared error "
+                f"(p {probability(effect['p_value'])})"
                 + (f"; cannot be told from {', '.join(effect['rivals'])}" if effect["rivals"] else "")
             )
     blocks: list[Block] = [Listing(lines)] if lines else []

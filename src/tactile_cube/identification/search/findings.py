@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.search.evidence import Judgement, worse
 from tactile_cube.identification.search.explanation import (
     Explanation,
@@ -74,7 +75,7 @@ def find(search: Search) -> Findings:
         others = [search.explained(one, looked) for one in twins(search, chosen, first, judged)]
         judged = [*judged, *others]
         good = [one for one in judged if proven(one, search.criteria)]
-    return arranged(base, nominal, judged, good, first.scores if first else [], search)
+    return arranged(base, nominal, judged, good, first.scores if first else [], search.criteria)
 
 
 def arranged(
@@ -83,15 +84,15 @@ def arranged(
     judged: Sequence[Explanation],
     good: Sequence[Explanation],
     scores: Sequence[Score],
-    search: Search,
+    criteria: Criteria,
 ) -> Findings:
     """What was judged, by what came of it."""
     ordered = sorted(good, key=lambda one: one.judgement.costs.sum())
-    kept = [one for one in ordered if not worse(one.judgement, ordered[0].judgement, search.criteria)]
+    kept = [one for one in ordered if not worse(one.judgement, ordered[0].judgement, criteria)]
     sizes = sorted({len(one.effects) for one in kept})
     levels = tuple(tuple(one for one in kept if len(one.effects) == size) for size in sizes)
     unclear = tuple(one for one in judged if one not in good)
-    doubtful = tuple(sorted((e for e in unclear if unproven(e, search.criteria)), key=lambda e: e.error))
+    doubtful = tuple(sorted((e for e in unclear if unproven(e, criteria)), key=lambda e: e.error))
     surpassed = tuple(one for one in ordered if one not in kept)
     return Findings(base, nominal, levels, tuple(scores), doubtful if not kept else (), surpassed, unclear)
 
