@@ -11,9 +11,8 @@ from tactile_cube.api.comparison import opened
 from tactile_cube.api.job import Job, PathLike, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile, as_model
 from tactile_cube.errors import InputError
-from tactile_cube.identification.export.bam import as_bam
-from tactile_cube.identification.export.mjcf import as_mjcf
-from tactile_cube.identification.export.urdf import as_urdf
+from tactile_cube.identification.export.joint_drive import as_bam
+from tactile_cube.identification.export.robot_file import as_mjcf, as_urdf
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import nominal_model, require_same_joints
 from tactile_cube.untrusted_file import below

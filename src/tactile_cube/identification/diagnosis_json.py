@@ -13,7 +13,7 @@ from tactile_cube.identification.next_experiment import FILE, Experiment
 from tactile_cube.identification.search.candidates import Candidate
 from tactile_cube.identification.search.explanation import Explanation
 from tactile_cube.identification.search.findings import Findings
-from tactile_cube.identification.verdict import unexplained_joints
+from tactile_cube.identification.verdict import Unexplained, unexplained_joints
 from tactile_cube.measurement.replay.model import effect_label, effect_path
 
 RANKED = 20
@@ -44,7 +44,15 @@ def as_json(diagnosis: Diagnosis, seconds: float) -> dict[str, Any]:
         "error_over_noise": diagnosis.over_noise,
         "unexplained": [_unexplained(one) for one in diagnosis.unexplained],
         "partial_effects": effects if verdict.kind == "unknown_effect" else [],
-        "unproven_effects": _unproven(diagnosis),
+        "unproven_effects": [
+            {
+                "effects": names_of(one),
+                "heldout_gain": round(one.gain, 6),
+                "p_value": one.p_value,
+                "segments": int((one.judgement.samples > 0).sum()),
+            }
+            for one in diagnosis.unproven
+        ],
         "known_effects": list(diagnosis.known),
         "common_offsets": [asdict(one) for one in diagnosis.common],
         "left_out": [asdict(one) for one in diagnosis.left_out],
@@ -97,18 +105,6 @@ def ranking(findings: Findings) -> list[dict[str, Any]]:
     return list(rows.values())
 
 
-def _unproven(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    return [
-        {
-            "effects": names_of(one),
-            "heldout_gain": round(one.gain, 6),
-            "p_value": one.p_value,
-            "segments": int((one.judgement.samples > 0).sum()),
-        }
-        for one in diagnosis.unproven
-    ]
-
-
 def _label(candidate: Candidate) -> list[str]:
     return [effect_label(candidate.effect, joint) for joint in candidate.joints]
 
@@ -139,7 +135,7 @@ def effect_entries(explanations: Sequence[tuple[Explanation, Fitted]]) -> list[d
     return entries
 
 
-def _unexplained(one: Any) -> dict[str, Any]:
+def _unexplained(one: Unexplained) -> dict[str, Any]:
     best = one.shapes[0] if one.shapes else None
     return {
         "joint": one.joint,

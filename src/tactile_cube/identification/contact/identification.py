@@ -30,6 +30,7 @@ from tactile_cube.identification.search.candidates import Candidate, model_unkno
 from tactile_cube.identification.search.evidence import gain, p_value, worse
 from tactile_cube.identification.search.explanation import Explanation, Proposal, named_by, proven
 from tactile_cube.identification.search.findings import Findings, arranged
+from tactile_cube.identification.search.proposals import CLOSE
 from tactile_cube.identification.verdict import Kind, Verdict, decide, unexplained_joints
 from tactile_cube.measurement.bench import with_object
 from tactile_cube.measurement.comparing.error import ErrorSummary
@@ -40,8 +41,9 @@ from tactile_cube.simulation.contact_effects import ContactEffect, contact_catal
 
 Array = NDArray[np.float64]
 Say = Callable[[str], None]
-LOOKED = 2  # trials of each kind on which every law gets its first step
-STEPS, LAST_STEPS = 3, 6  # of Gauss-Newton, of a set in a search and of the last fit
+LOOKED = 1  # trials of each kind on which every law gets its first step
+STEPS, LAST_STEPS = 3, 2  # of Gauss-Newton, of a set in a search and of the last fit
+FINER = 2  # trials of each kind that tell what shorter steps of the world change
 SINGLES, MOST = 3, 3  # laws of each round that are refitted on more trials; effects of a set
 SURER: tuple[Kind, ...] = ("unknown_effect", "partly_explained", "ambiguous", "missing_effect", "adequate")
 """Verdicts, the one that leaves most open first."""
@@ -68,10 +70,11 @@ def final(grasps: OpenGrasps, model: Model) -> Fitted:
     if not fitted.unknowns:
         return Fitted(fitted.model, fitted, np.zeros(0), np.zeros(0))
     scales = np.array([u.scale for u in fitted.unknowns])
-    finer = grasps.finer(problem).prediction(fitted.model)
-    moved = problem.limited(finer - problem.prediction(fitted.model)) * problem.weight
-    pull = np.einsum("grp,gr->p", problem.free(fitted.columns), moved, optimize=True)
-    shift = -scales * np.linalg.solve(fitted.information + np.diag(precision(fitted.unknowns)), pull)
+    few = some_of_each_kind(problem, FINER)
+    base, columns = few.columns(fitted.model, fitted.unknowns)
+    moved = few.limited(grasps.finer(few).prediction(fitted.model) - base) * few.weight
+    pull, information = columns.reshape(-1, len(scales)).T @ moved.ravel(), np.einsum("grp,grq->pq", columns, columns)
+    shift = -scales * np.linalg.solve(information + np.diag(precision(fitted.unknowns)), pull)
     return Fitted(fitted.model, fitted, NORMAL_95 * scales * standard_errors(problem, fitted), shift)
 
 
@@ -242,6 +245,7 @@ class ContactSearch:
         left = [effect for effect in contact_catalogue().values() if effect not in known]
         laws = sorted((stepped(self.few, parent.fit.model, effect) for effect in left), key=lambda one: one[1].cost)
         worth = (1.0 - self.criteria.least_gain) * self.few.squares(parent.fit.model)
+        worth = min(worth, CLOSE * laws[0][1].cost)
         laws = [one for one in laws if one[1].cost < worth][:SINGLES]
         return [self.refitted((*parent.effects, law), fitted.model) for law, fitted in laws]
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+import json
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import inf, isfinite
 from typing import Any
 
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile
+from tactile_cube.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -97,22 +99,21 @@ CONSTANTS = {
 OTHERS = {"friction_creep": 0.0, "reading_delay": 0.0}
 """Other constants of a model, and the values that say nothing."""
 
-Values = Mapping[str, float]
-Law = Callable[[JointDrive, Values], JointDrive]
-HELD: dict[str, tuple[tuple[str, ...], Law]] = {
-    "reflected_inertia": (("excess",), lambda d, p: replace(d, armature=d.armature + p["excess"])),
-    "coulomb_friction": (("friction",), lambda d, p: replace(d, friction=d.friction + p["friction"])),
-    "asymmetric_friction": (("friction",), lambda d, p: replace(d, friction=d.friction + p["friction"])),
-    "viscous_friction": (("damping",), lambda d, p: replace(d, damping=d.damping + p["damping"])),
-    "torque_gain": (("error",), lambda d, p: _stronger(d, 1.0 + p["error"])),
-    "torque_bias": (("bias",), lambda d, p: replace(d, bias=d.bias + p["bias"])),
-    "command_delay": (("delay",), lambda d, p: replace(d, delay=d.delay + p["delay"])),
-    "rate_limit": (("speed",), lambda d, p: replace(d, rate=min(d.rate, p["speed"]))),
-    "torque_saturation": (("limit",), lambda d, p: replace(d, torque_limit=min(d.torque_limit, p["limit"]))),
-    "back_emf": (("stall", "no_load"), lambda d, p: replace(d, stall=p["stall"], no_load=p["no_load"])),
-    "stribeck_friction": (("excess", "velocity", "exponent"), lambda d, p: _sticking(d, p)),
+ADDED = {
+    "reflected_inertia": ("excess", "armature"),
+    "coulomb_friction": ("friction", "friction"),
+    "asymmetric_friction": ("friction", "friction"),
+    "viscous_friction": ("damping", "damping"),
+    "torque_bias": ("bias", "bias"),
+    "command_delay": ("delay", "delay"),
 }
-"""Effects that attributes hold: by which parameters, and how."""
+"""Effects whose parameter is added to an attribute."""
+LOWERED = {"rate_limit": ("speed", "rate"), "torque_saturation": ("limit", "torque_limit")}
+"""Effects whose parameter is an attribute's bound."""
+TAKEN = {"back_emf": ("stall", "no_load"), "stribeck_friction": ("excess", "velocity", "exponent")}
+"""Effects whose parameters are attributes."""
+OF_LOOP = ("kp", "kd", "torque_limit", "gain")
+"""What grows with the torque's gain."""
 
 
 def drives_of(model: ModelFile) -> list[JointDrive]:
@@ -132,9 +133,9 @@ def _drive(model: ModelFile, joint: str, effects: list[EffectEstimate]) -> Joint
     for effect in effects:
         known, given = catalogue().get(effect.name), effect.parameters
         left = {key: Estimate.model_validate(v) for key, v in known.defaults(given).items()} | given if known else given
-        names, law = HELD.get(effect.name, ((), lambda drive, _: drive))
-        drive = law(drive, {key: left[key].value for key in names})
-        left = {key: one for key, one in left.items() if key not in names}
+        held = _held(drive, effect.name, {key: one.value for key, one in left.items()})
+        drive = replace(drive, **held[1])
+        left = {key: one for key, one in left.items() if key not in held[0]}
         neutral = {p.name: p.neutral for p in known.parameters} if known else {}
         texts = [f"{key} {text}" for key, one in left.items() if (text := _told(one, neutral.get(key)))]
         beyond |= {effect.name: ", ".join(texts)} if texts else {}
@@ -148,10 +149,57 @@ def _told(estimate: Estimate, neutral: float | None) -> str:
     return f"{estimate.value:.6g} {estimate.unit}".rstrip()
 
 
-def _sticking(drive: JointDrive, law: Values) -> JointDrive:
-    return replace(drive, excess=law["excess"], velocity=law["velocity"], exponent=law["exponent"])
+def _held(drive: JointDrive, effect: str, p: Mapping[str, float]) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """The parameters of an effect that attributes hold, and these attributes then."""
+    if effect in ADDED:
+        key, name = ADDED[effect]
+        return (key,), {name: getattr(drive, name) + p[key]}
+    if effect in LOWERED:
+        key, name = LOWERED[effect]
+        return (key,), {name: min(getattr(drive, name), p[key])}
+    if effect == "torque_gain":
+        return ("error",), {name: (1.0 + p["error"]) * getattr(drive, name) for name in OF_LOOP}
+    keys = TAKEN.get(effect, ())
+    return keys, {key: p[key] for key in keys}
 
 
-def _stronger(drive: JointDrive, times: float) -> JointDrive:
-    grown = {key: times * getattr(drive, key) for key in ("kp", "kd", "torque_limit", "gain")}
-    return replace(drive, **grown)
+def as_bam(model: ModelFile, joint: str | None, actuator: str | None, volts: float | None) -> tuple[str, list[str]]:
+    """Return a joint's parameter file of BAM (better actuator models), and what it does not hold, a line each.
+
+    Source: Rhoban/bam, model.py (friction models M1 to M6, command_delay) and actuator.py (kt, R, armature).
+
+    Args:
+        model: as identified.
+        joint: of the model; None: its only one.
+        actuator: BAM's name of the servo, such as sts3215.
+        volts: that its controller sets for an error of 1 rad: vin * kp * error_gain of BAM's actuator [V/rad].
+
+    Raises:
+        InputError: no such joint, no name of a servo.
+    """
+    names = list(model.joints)
+    if joint is None and len(names) > 1:
+        raise InputError(
+            f"format=bam: a file is of one joint; give bam.joint={names[0]}, or one of {', '.join(names[1:])}"
+        )
+    if joint not in (None, *names):
+        raise InputError(f"bam.joint={joint}: no joint of the model; it has {', '.join(names)}")
+    drive = drives_of(model)[0 if joint is None else names.index(joint)]
+    if not actuator:
+        raise InputError("format=bam: give bam.actuator=NAME, the servo's name in BAM, such as sts3215 or xl330")
+    law = "m2" if drive.excess else "m1"
+    data: dict[str, object] = {"model": law, "actuator": actuator, "armature": drive.armature}
+    data |= {"friction_base": drive.friction, "friction_viscous": drive.damping, "command_delay": drive.delay}
+    if drive.excess:
+        data |= {"friction_stribeck": drive.excess, "dtheta_stribeck": drive.velocity, "alpha": drive.exponent}
+    held: tuple[str, ...] = ("armature", "friction", "damping", "delay", "excess")
+    if isfinite(drive.rate) and actuator.startswith("sts"):  # others follow any command
+        data["max_velocity"], held = drive.rate, (*held, "rate")
+    if volts is not None and drive.kp > 0.0 and drive.kd > 0.0:
+        constant = drive.kd / drive.kp * volts  # kp = kt volts / R, kd = kt^2 / R
+        data |= {"kt": constant, "R": constant * volts / drive.kp}
+        held = (*held, "kp", "kd")
+    left = drive.not_in(held)
+    if "kp" not in held:
+        left.append("kt and R: give bam.volts, the volts an error of 1 rad makes (vin * kp * error_gain in BAM)")
+    return json.dumps(data | {"not_held": left}, indent=2) + "\n", left
