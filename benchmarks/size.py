@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from tactile_cube.command_help import commands
+from tactile_cube.composition import commands
 
 ROOT = Path(__file__).parents[1]
 

@@ -16,7 +16,7 @@ import yaml
 
 import tactile_cube
 from tactile_cube.api.effects import COLUMNS, effects
-from tactile_cube.command_help import CONFIG, commands
+from tactile_cube.composition import CONFIG, commands
 from tactile_cube.drivetrain.effects import catalogue
 from tactile_cube.errors import InputError
 

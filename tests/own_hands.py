@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import CONFIG
 from tactile_cube.hand import Hand, hand_from_urdf
 
 

@@ -17,10 +17,8 @@ from tactile_cube import cli
 from tactile_cube.agent.networks import Sizes
 from tactile_cube.agent.sac import Sac
 from tactile_cube.api.environment import env_config
-from tactile_cube.command_help import help_text
-from tactile_cube.composition import composed, refuse_unknown_keys
+from tactile_cube.composition import composed, help_text, refuse_unknown_keys, suggestion
 from tactile_cube.curriculum import NoCurriculum
-from tactile_cube.did_you_mean import suggestion
 from tactile_cube.errors import InputError
 from tactile_cube.sweep import sweep_folder
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings

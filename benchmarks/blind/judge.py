@@ -25,7 +25,7 @@ from typing import Any
 from benchmarks.blind.generator import WORLDS, play, write
 from benchmarks.blind.page import FIRST_SEED, GOAL, markdown, picture, round_row
 from benchmarks.blind.scoring import pushes_found, score
-from tactile_cube.api.batch import each
+from tactile_cube.api.diagnosis import each
 
 
 def commit() -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactile_cube.api import deployment
-from tactile_cube.deploy import main
+from tactile_cube.cli import command_line
 from tactile_cube.deployment.controller import PolicyController
 from tactile_cube.deployment.robot import Reading
 from tactile_cube.hand import DLR_HAND2
@@ -107,4 +107,4 @@ class _Raising(PolicyController):
 
 if __name__ == "__main__":
     vars(deployment)["PolicyController"] = _Raising
-    main()
+    command_line("deploy")()

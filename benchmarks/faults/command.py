@@ -103,7 +103,7 @@ def be_ready() -> None:
 
 
 def _train(words: list[str], console: Path, wish: Path) -> None:
-    from tactile_cube.train import main
+    from tactile_cube.cli import command_line
 
     os.setsid()
     with console.open("a") as file:
@@ -113,7 +113,7 @@ def _train(words: list[str], console: Path, wish: Path) -> None:
     sys.argv = ["train", *words]
     status = 0
     try:
-        main()
+        command_line("train")()
     except SystemExit as ended:
         status = ended.code if isinstance(ended.code, int) else int(bool(ended.code))
     except BaseException:

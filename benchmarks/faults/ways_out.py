@@ -26,7 +26,7 @@ import psutil
 
 from benchmarks.faults.blocked_hand import FILE, OWN, shared, torque
 from tactile_cube.agent.policy_file import current_commit
-from tactile_cube.deployment.limits import StopRules
+from tactile_cube.deployment.robot import StopRules
 
 SIGNALS = {"SIGINT twice": ("SIGINT", "SIGINT")} | {
     name: (name,) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")

@@ -15,7 +15,7 @@ def table_config() -> EnvConfig:
     from hydra.core.global_hydra import GlobalHydra
     from hydra.utils import instantiate
 
-    from tactile_cube.command_help import CONFIG
+    from tactile_cube.composition import CONFIG
 
     GlobalHydra.instance().clear()  # of the command that runs this, which has its configuration already
     with initialize_config_dir(str(CONFIG.resolve()), version_base="1.3"):

@@ -10,83 +10,64 @@ from __future__ import annotations
 
 import importlib
 import sys
+from importlib.abc import InspectLoader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
+from tactile_cube.composition import CONFIG
 from tactile_cube.errors import InputError
 
 if TYPE_CHECKING:
-    from tactile_cube.api.batch import diagnose_each
-    from tactile_cube.api.comparison import compare
-    from tactile_cube.api.deployment import deploy, export, load_policy
-    from tactile_cube.api.diagnosis import diagnose
-    from tactile_cube.api.effects import effects
-    from tactile_cube.api.environment import env_config, make_env, search_grasps
-    from tactile_cube.api.evaluation import evaluate
-    from tactile_cube.api.identification import identify
-    from tactile_cube.api.model_export import export_model
-    from tactile_cube.api.monitoring import monitor
-    from tactile_cube.api.recording import record
-    from tactile_cube.api.training import average, train
-    from tactile_cube.api.view import view
-    from tactile_cube.drivetrain.model_file import read_model
-    from tactile_cube.measurement.recordings.arrays import TrialArrays, recording_from_arrays
-    from tactile_cube.measurement.recordings.reading import read_recording
+    from tactile_cube.api.comparison import compare as compare
+    from tactile_cube.api.comparison import record as record
+    from tactile_cube.api.deployment import deploy as deploy
+    from tactile_cube.api.deployment import export as export
+    from tactile_cube.api.deployment import load_policy as load_policy
+    from tactile_cube.api.diagnosis import diagnose as diagnose
+    from tactile_cube.api.diagnosis import diagnose_each as diagnose_each
+    from tactile_cube.api.effects import effects as effects
+    from tactile_cube.api.environment import env_config as env_config
+    from tactile_cube.api.environment import make_env as make_env
+    from tactile_cube.api.environment import search_grasps as search_grasps
+    from tactile_cube.api.evaluation import evaluate as evaluate
+    from tactile_cube.api.evaluation import view as view
+    from tactile_cube.api.identification import export_model as export_model
+    from tactile_cube.api.identification import identify as identify
+    from tactile_cube.api.monitoring import monitor as monitor
+    from tactile_cube.api.training import average as average
+    from tactile_cube.api.training import train as train
+    from tactile_cube.drivetrain.model_file import read_model as read_model
+    from tactile_cube.measurement.recordings.arrays import TrialArrays as TrialArrays
+    from tactile_cube.measurement.recordings.arrays import recording_from_arrays as recording_from_arrays
+    from tactile_cube.measurement.recordings.reading import read_recording as read_recording
 
 _PLACES = {
-    "api.batch": ["diagnose_each"],
-    "api.comparison": ["compare"],
-    "api.deployment": ["deploy", "export", "load_policy"],
-    "api.model_export": ["export_model"],
-    "api.diagnosis": ["diagnose"],
-    "api.effects": ["effects"],
-    "api.environment": ["env_config", "make_env", "search_grasps"],
-    "api.evaluation": ["evaluate"],
-    "api.identification": ["identify"],
-    "api.monitoring": ["monitor"],
-    "api.recording": ["record"],
-    "api.training": ["average", "train"],
-    "api.view": ["view"],
-    "drivetrain.model_file": ["read_model"],
-    "measurement.recordings.arrays": ["TrialArrays", "recording_from_arrays"],
-    "measurement.recordings.reading": ["read_recording"],
+    "api.comparison": "compare record",
+    "api.deployment": "deploy export load_policy",
+    "api.diagnosis": "diagnose diagnose_each",
+    "api.effects": "effects",
+    "api.environment": "env_config make_env search_grasps",
+    "api.evaluation": "evaluate view",
+    "api.identification": "export_model identify",
+    "api.monitoring": "monitor",
+    "api.training": "average train",
+    "drivetrain.model_file": "read_model",
+    "measurement.recordings.arrays": "TrialArrays recording_from_arrays",
+    "measurement.recordings.reading": "read_recording",
 }
 """Module -> what the package takes from it, as for type checkers above."""
-__all__ = [
-    "InputError",
-    "TrialArrays",
-    "average",
-    "compare",
-    "deploy",
-    "diagnose",
-    "diagnose_each",
-    "effects",
-    "env_config",
-    "evaluate",
-    "export",
-    "export_model",
-    "identify",
-    "load_policy",
-    "make_env",
-    "monitor",
-    "read_model",
-    "read_recording",
-    "record",
-    "recording_from_arrays",
-    "search_grasps",
-    "train",
-    "view",
-]
+_MODULES = {name: module for module, names in _PLACES.items() for name in names.split()}
+__all__ = ["InputError", *_MODULES]
 
 
 def __getattr__(name: str) -> Any:
-    for module, names in _PLACES.items():
-        if name in names:
-            globals()[name] = getattr(importlib.import_module(f"{__name__}.{module}"), name)
-            return globals()[name]
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
+    return globals()[name]
 
 
 class _Package(ModuleType):
@@ -97,6 +78,20 @@ class _Package(ModuleType):
             super().__setattr__(name, value)
 
 
+class _Commands(MetaPathFinder, InspectLoader):
+    """Gives each command of conf/ a module, for `python -m tactile_cube.train`."""
+
+    def find_spec(self, fullname: str, path: Any = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        package, _, name = fullname.rpartition(".")
+        known = package == __name__ and (CONFIG / f"{name}.yaml").is_file()
+        return ModuleSpec(fullname, self, origin="command") if known else None
+
+    def get_source(self, fullname: str) -> str:
+        made = f"from tactile_cube.cli import command_line\nmain = command_line({fullname.rpartition('.')[2]!r})\n"
+        return f"{made}if __name__ == '__main__':\n    main()\n"
+
+
+sys.meta_path.append(_Commands())
 sys.modules[__name__].__class__ = _Package
 
 # Gymnasium 1 loads no entry points of other packages

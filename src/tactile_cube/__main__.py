@@ -1,12 +1,9 @@
 """`tactile-cube COMMAND ...` and `python -m tactile_cube COMMAND ...`: as `python -m tactile_cube.COMMAND ...`."""
 
-from __future__ import annotations
-
 import sys
 
 from tactile_cube.cli import command_line, fail, quiet_when_nobody_reads
-from tactile_cube.command_help import commands
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import commands, suggestion
 from tactile_cube.run_folder import USAGE_ERROR
 
 

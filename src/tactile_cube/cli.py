@@ -15,16 +15,14 @@ from typing import TYPE_CHECKING, NoReturn
 
 from tactile_cube import commands
 from tactile_cube.api.job import typed_job
-from tactile_cube.command_help import CONFIG, help_text
-from tactile_cube.composition import refuse_unknown_keys, with_recipe
+from tactile_cube.composition import CONFIG, help_text, refuse_unknown_keys, with_recipe
 from tactile_cube.run_folder import INTERRUPTED, USAGE_ERROR, configuration_in, console_kept_in
 from tactile_cube.usage_error import usage_error
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-PIPE_CLOSED = 141
-"""Exit status of a program that writes to a closed pipe, as shells count it: 128 + SIGPIPE."""
+PIPE_CLOSED = 141  # exit status of a program that writes to a closed pipe, as shells count it: 128 + SIGPIPE
 
 
 def command_line(name: str) -> Callable[[], None]:

@@ -91,7 +91,7 @@ def evaluate(job: Job) -> float:
 def export(job: Job) -> None:
     """Write a policy for a robot, or an identified model for another simulator."""
     if job.config.model is not None or job.config.format is not None:
-        from tactile_cube.api.model_export import run_model_export
+        from tactile_cube.api.identification import run_model_export
 
         print(run_model_export(job).text)
         return
@@ -121,7 +121,7 @@ def monitor(job: Job) -> None:
 
 def record(job: Job) -> None:
     """Write a recording, from a simulated rig with hidden effects or from files of other programs."""
-    from tactile_cube.api.recording import run_recording
+    from tactile_cube.api.comparison import run_recording
 
     run_recording(job)
     print(f"next: python -m tactile_cube.compare recording={job.config.out}")
@@ -157,8 +157,8 @@ def train(job: Job) -> float:
 
 def view(job: Job) -> None:
     """See the best and the worst episode of a run side by side, and its learning curves."""
+    from tactile_cube.api.evaluation import run_view
     from tactile_cube.api.job import shown_at_once
-    from tactile_cube.api.view import run_view
 
     print(run_view(job, shown_at_once).text)
 

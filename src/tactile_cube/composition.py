@@ -1,30 +1,102 @@
-"""A configuration out of conf/, composed as a command line would, from within any program."""
+"""The configuration in conf/: what `--help` says of it, composed as a command line would, names that are nearly right.
+
+Nothing is imported to answer `--help`.
+"""
 
 from __future__ import annotations
 
+import ast
+import difflib
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from tactile_cube.command_help import CONFIG, RECIPE
-from tactile_cube.did_you_mean import near_key
 from tactile_cube.errors import InputError
+
+CONFIG = Path(__file__).parent / "conf"  # the configuration tree; in a checkout a link to conf/ at the top
+
+ADDED = ("experiment", "without")
+"""Groups of training that no default chooses from: `+experiment=option`, and `without=option` beside ablations."""
+
+RECIPE = {"train": "curriculum"}  # the experiment that a command takes where the command line names none
+
+
+def help_text(name: str) -> str:
+    """What `--help` prints of a command: its groups and keys."""
+    path = CONFIG / f"{name}.yaml"
+    return "\n".join(
+        [
+            f"python -m tactile_cube.{name}: {commands()[name]}",
+            *("", "Groups (choose with group=option):", *_group_lines(path)),
+            *("", "Keys (set with key=value):", *_key_lines(path), ""),
+            "--cfg job shows the configuration; -m runs every combination of comma-separated values; "
+            "--hydra-help shows Hydra's own options; tactile-cube --help lists the other commands.",
+        ]
+    )
+
+
+def commands() -> dict[str, str]:
+    """Commands of the package and the first line of what they say about themselves, without importing them."""
+    table = ast.parse((Path(__file__).parent / "commands.py").read_text(encoding="utf-8"))
+    said = {part.name: ast.get_docstring(part) or "" for part in table.body if isinstance(part, ast.FunctionDef)}
+    return {name: said[name].partition("\n")[0] for name in sorted(path.stem for path in CONFIG.glob("*.yaml"))}
+
+
+def _group_lines(path: Path) -> list[str]:
+    lines, groups = [], _groups(path)
+    for group, default in groups.items():
+        for index, file in enumerate(sorted((CONFIG / group).glob("*.yaml"))):
+            mark = "*" if file.stem == default else " "
+            head = f"{group}=" if index == 0 else ""
+            lines.append(f"  {head:<16}{mark}{file.stem:<17} {_summary(file)}")
+    if "without" not in groups:
+        return [*lines, "  (* is the default)"]
+    return [
+        *lines,
+        "  (* is the default, before what the experiment changes)",
+        "  (+experiment=option changes several choices at once; to ablations: without=option)",
+    ]
+
+
+def _summary(file: Path) -> str:
+    """The first sentence of the comment that a configuration file begins with."""
+    comment = []
+    for line in file.read_text().splitlines():
+        if not line.startswith("#"):
+            break
+        if "@package" not in line:
+            comment.append(line.lstrip("# ").strip())
+    return re.split(r"(?<=[.:;]) ", " ".join(comment))[0].rstrip(":;")
+
+
+def _groups(path: Path) -> dict[str, str | None]:
+    groups: dict[str, str | None] = {}
+    for entry in yaml.safe_load(path.read_text())["defaults"]:
+        if isinstance(entry, dict) and "@" not in next(iter(entry)):  # "@": not a choice of its own
+            ((group, option),) = entry.items()
+            if (CONFIG / group).is_dir() and group != "hydra":
+                groups[group] = option
+    added = dict.fromkeys(ADDED) | {"experiment": RECIPE["train"]}
+    return groups | (added if path.stem == "train" else {})
+
+
+def _key_lines(path: Path) -> list[str]:
+    lines = [line for line in path.read_text().splitlines() if line and line[0] not in " #-"]
+    return [f"  {line}" for line in lines if not line.startswith("defaults:")]
+
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
 
 def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False) -> DictConfig:
-    """The configuration of a command with some of its settings chosen.
+    """The configuration of a command with some of its settings chosen, e.g. "task=table", "seed=1".
 
-    A Hydra application that calls this keeps its own configuration.
-
-    Args:
-        name: of the command whose conf/<name>.yaml it is; None: nothing but what `settings` add.
-        settings: choices and values as on the command line, e.g. "task=table", "seed=1".
-        with_hydra: also give Hydra's own part, which names run folder and choices.
+    A Hydra application that calls this keeps its own. Without a name it is nothing but what `settings` add;
+    `with_hydra` also gives Hydra's own part, which names run folder and choices.
 
     Raises:
         hydra.errors.HydraException: a setting that there is not.
@@ -43,10 +115,6 @@ def composed(name: str | None, settings: Sequence[str], with_hydra: bool = False
 
 def refuse_unknown_keys(name: str, config: DictConfig) -> None:
     """Refuse top-level keys that a command does not read: a mistyped `+experiment=` would start another run.
-
-    Args:
-        name: of the command.
-        config: as composed.
 
     Raises:
         InputError: a key that is none of the command's and no group of conf/.
@@ -71,3 +139,58 @@ def with_recipe(name: str, words: list[str]) -> list[str]:
         return words
     first = next((at for at, word in enumerate(words) if re.match(r"[+~]*[\w./@]+=", word)), len(words))
     return [*words[:first], f"+experiment={RECIPE[name]}", *words[first:]]
+
+
+SHORTEST = 5  # letters of the beginning of a name that tell it
+
+
+def suggestion(word: str, known: Iterable[str], prefix: str = "") -> str:
+    """Return the end of an error message: "; did you mean ...?", or nothing if no known name is near.
+
+    Example:
+        >>> suggestion("evalute", ["evaluate", "export"])
+        '; did you mean evaluate?'
+    """
+    names = [*known]
+    beginnings = {name[: len(word) + 1]: name for name in reversed(names) if len(word) >= SHORTEST}
+    near = difflib.get_close_matches(word, names, 1, 0.75) or [name for name in names if word and word in name]
+    near = near or [beginnings[one] for one in difflib.get_close_matches(word, beginnings, 1, 0.75)]
+    return f"; did you mean {prefix}{near[0]}?" if near else ""
+
+
+def meaning(key: str) -> str:
+    """Return what the configuration says in brackets of a key that must be set, or nothing."""
+    line = re.compile(rf"^ *{re.escape(key.rpartition('.')[2])}: \?\?\? *# *(.*)$", re.MULTILINE)
+    files = sorted(CONFIG.rglob("*.yaml"), key=lambda path: len(path.parts))
+    found = next((match for file in files if (match := line.search(file.read_text(encoding="utf-8")))), None)
+    return f" ({found[1]})" if found else ""
+
+
+def near_key(name: str) -> str:
+    """Return the suggestion for a key of the configuration that does not exist, e.g. `agent.gama`."""
+    keys = sorted(_keys())
+    if name in keys:  # another command may have that very key
+        return ""
+    last = name.rpartition(".")[2]
+    same_name = [known for known in keys if known.rpartition(".")[2] == last]
+    near = difflib.get_close_matches(name, keys, 1, 0.75) or difflib.get_close_matches(name, same_name, 1, 0.0)
+    return suggestion(near[0], near) if near else ""
+
+
+def _keys() -> set[str]:
+    """Dotted keys and groups of the configuration, as far as its files name them."""
+    keys = {folder.name for folder in CONFIG.iterdir() if folder.is_dir()}
+    for path in CONFIG.rglob("*.yaml"):
+        text = path.read_text(encoding="utf-8")
+        groups = () if "@package _global_" in text else path.relative_to(CONFIG).parent.parts
+        keys.update(_dotted(yaml.safe_load(text), ".".join(groups)))
+    return keys
+
+
+def _dotted(value: Any, prefix: str) -> Iterator[str]:
+    if prefix:
+        yield prefix
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if key not in ("defaults", "_target_", "hydra"):
+                yield from _dotted(inner, f"{prefix}.{key}" if prefix else str(key))

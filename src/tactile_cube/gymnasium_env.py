@@ -1,7 +1,5 @@
 """The same environment, transforms included, for learners that speak Gymnasium."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,10 +19,8 @@ from tactile_cube.visualization.scene import BELOW, SIDE, Scene
 
 Observation = NDArray[np.float32]
 Picture = NDArray[np.uint8]
-FULL_TURN = 2.0 * np.pi
-"""Bound of the readings: no joint of a hand turns that far [rad]."""
-VIEW = 256
-"""Edge of each of the two views in a picture [pixels]."""
+FULL_TURN = 2.0 * np.pi  # bound of the readings: no joint of a hand turns that far [rad]
+VIEW = 256  # edge of each of the two views in a picture [pixels]
 
 
 class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
@@ -43,15 +39,10 @@ class GymnasiumRotation(gymnasium.Env[Observation, Observation]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 - Gymnasium's own declaration
 
     def __init__(self, config: EnvConfig, render_mode: str | None = None, judged: bool = True) -> None:
-        """Builds the world.
-
-        Args:
-            config: what the environment is.
-            render_mode: "rgb_array", or None for no pictures.
-            judged: whether episodes are recorded for "is_success".
+        """Builds the world; with `judged` episodes are recorded for "is_success".
 
         Raises:
-            InputError: another render mode.
+            InputError: another render mode than "rgb_array", or None for no pictures.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"render_mode is {render_mode!r}; choose 'rgb_array' or None")

@@ -18,23 +18,16 @@ if TYPE_CHECKING:
     from omegaconf import DictConfig
 
 CONFIGURATION = ".hydra"
-USAGE_ERROR = 2
-"""Exit status of a command that was refused."""
-INTERRUPTED = 130
-"""Exit status after Ctrl-C."""
+USAGE_ERROR = 2  # exit status of a command that was refused
+INTERRUPTED = 130  # exit status after Ctrl-C
 
 
 @contextlib.contextmanager
 def configuration_in(folder: Path, config: DictConfig, log: str) -> Iterator[None]:
     """Write the configuration of a command into its folder, and take it back if the command is refused.
 
-    Hydra would write it over that of an earlier run before anybody can refuse. A folder in which nothing else was
-    written goes altogether.
-
-    Args:
-        folder: of the run.
-        config: of the command.
-        log: name of the file in the folder that keeps what the console showed.
+    Hydra would write it over that of an earlier run before anybody can refuse. A folder in which nothing else than
+    `log` was written goes altogether.
     """
     place = folder / CONFIGURATION
     before = {path: path.read_bytes() for path in place.glob("*.yaml")}
@@ -53,7 +46,6 @@ def configuration_in(folder: Path, config: DictConfig, log: str) -> Iterator[Non
 
 
 def _configuration(config: DictConfig) -> dict[str, str]:
-    """The files that Hydra would write, and their content."""
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf
 
@@ -85,7 +77,6 @@ class KeptStream:
         self._stream, self._file, self._begun = stream, file, ""
 
     def __getattr__(self, name: str) -> Any:
-        """All else is the stream's."""
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:

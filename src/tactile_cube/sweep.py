@@ -1,7 +1,5 @@
 """The jobs of a sweep, in this process or wherever a launcher runs them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import secrets
@@ -16,8 +14,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from tactile_cube.run_folder import INTERRUPTED
 
-LONGEST = 180
-"""Characters of a folder's name that stand for overrides; file systems allow 255 in all."""
+LONGEST = 180  # characters of a folder's name that stand for overrides; file systems allow 255 in all
 
 
 class SweepFolder(Callback):
@@ -44,7 +41,6 @@ class Jobs:
         register_sweep_folder()
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Arrive in another process, which knows nothing of this package yet."""
         self.__dict__.update(state)
         register_sweep_folder()
 

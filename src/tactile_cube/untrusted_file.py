@@ -17,13 +17,10 @@ KINDS = (("a folder", stat.S_ISDIR), ("a pipe", stat.S_ISFIFO), ("a socket", sta
 
 
 def below(folder: Path, name: str, where: str, root: Path | None = None) -> Path:
-    """Return the place of a file that another file names; there may be nothing there.
+    """Return the place of a file that another file names, relative to `folder`; there may be nothing there.
 
-    Args:
-        folder: that the name is relative to.
-        name: as the other file has it; `file://` before it means nothing.
-        where: what an error begins with: the other file, and the key in it.
-        root: what it must lie below once all links are followed; None: `folder`.
+    It must lie below `root` (None: `folder`) once all links are followed. An error begins with `where`: the other file,
+    and the key in it.
 
     Raises:
         InputError: it lies elsewhere.
@@ -39,15 +36,10 @@ def below(folder: Path, name: str, where: str, root: Path | None = None) -> Path
 
 
 def regular(path: Path, most: int = limits.TABLE, lacking: str = "") -> Path:
-    """Return `path` if it is a file that can be read to its end.
-
-    Args:
-        path: where it should be.
-        most: size that is read [bytes].
-        lacking: what an error adds where there is no such file.
+    """Return `path` if it is a file of `most` bytes that can be read to its end.
 
     Raises:
-        InputError: there is none, it is a folder, a pipe or a device, or too large.
+        InputError: there is none (with `lacking` after it), it is a folder, a pipe or a device, or too large.
     """
     try:
         status = path.stat()
@@ -78,11 +70,7 @@ def read_text(path: Path, lacking: str = "") -> str:
 
 
 def read_npz(path: Path, most: int = limits.NUMBERS) -> dict[str, NDArray[Any]]:
-    """Return all arrays of an NPZ file.
-
-    Args:
-        path: of the file.
-        most: numbers of 8 bytes that its arrays may have together.
+    """Return all arrays of an NPZ file, of `most` numbers of 8 bytes together.
 
     Raises:
         InputError: there is no such file, it is no complete NPZ file of plain arrays, or claims to hold too much.
@@ -108,7 +96,6 @@ def read_npz(path: Path, most: int = limits.NUMBERS) -> dict[str, NDArray[Any]]:
 
 
 def _sizes(archive: ZipFile) -> Iterator[tuple[str, int]]:
-    """Name and bytes of each array, by its header."""
     for member in archive.namelist():
         with archive.open(member) as stream:
             if np.lib.format.read_magic(stream) != (1, 0):  # others may have gigabytes of header

@@ -1,13 +1,11 @@
 """What a user did wrong, in one line, from the errors of this package, of pydantic, of Hydra and of the disk."""
 
-from __future__ import annotations
-
 import errno
 import traceback
 from collections.abc import Iterator
 from typing import Any
 
-from tactile_cube.did_you_mean import meaning, near_key, suggestion
+from tactile_cube.composition import meaning, near_key, suggestion
 from tactile_cube.errors import InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -11,11 +11,7 @@ from typing import Any, BinaryIO
 
 
 def write_whole(path: Path, *parts: bytes | memoryview) -> None:
-    """Write a file aside, bring it to the disk, then give it its name; its mode follows the umask.
-
-    Args:
-        path: file to write; one of that name is replaced.
-        parts: its contents, one after the other.
+    """Write parts, one after the other, aside, bring them to the disk, then name the file; its mode follows the umask.
 
     Raises:
         OSError: as of `whole_file`.
@@ -67,11 +63,8 @@ def write_npz(path: Path, arrays: Mapping[str, Any], compressed: bool = True) ->
 def written_together(folder: Path, index: str) -> Iterator[Path]:
     """Give a folder to write into, whose files appear in `folder` when all are written; `index` appears last.
 
-    While the names change, a few system calls, there is no index: where there is one, all files are of one writing.
-
-    Args:
-        folder: where they belong; made if it is not there. Its other files stay.
-        index: the file by which a reader knows that the others are there.
+    While the names change, a few system calls, there is no index: where there is one, all files are of one writing. The
+    folder is made if it is not there; its other files stay.
 
     Raises:
         OSError: what the body raises, and then `folder` stays as it was; or a name that something else has.

@@ -9,7 +9,7 @@ import pytest
 
 import tactile_cube
 from tactile_cube import InputError
-from tactile_cube.api import batch
+from tactile_cube.api import diagnosis
 from tests.api.test_measuring import RIG
 from tests.measurement.small_rig import URDF
 
@@ -25,9 +25,9 @@ def one_after_the_other(work: Callable, over: Sequence, jobs: int) -> Iterator[t
 
 def test_each_is_done_once_and_an_error_comes_through() -> None:
     numbers = [1.0, 4.0, 9.0, 16.0]
-    assert sorted(batch.each(math.sqrt, numbers, 2)) == [(x, math.sqrt(x)) for x in numbers]
+    assert sorted(diagnosis.each(math.sqrt, numbers, 2)) == [(x, math.sqrt(x)) for x in numbers]
     with pytest.raises(InputError, match="this one: refused"):
-        list(batch.each(refused, ["this one"]))
+        list(diagnosis.each(refused, ["this one"]))
 
 
 def test_recordings_are_diagnosed_into_folders_of_their_names_and_one_that_cannot_be_read_is_told(
@@ -37,7 +37,7 @@ def test_recordings_are_diagnosed_into_folders_of_their_names_and_one_that_canno
     sound = tmp_path / "sound"
     rig = RIG | {"source.urdf": tmp_path / "two.urdf", "source.validation": False}
     tactile_cube.record(sound, source="rig", values=rig)
-    monkeypatch.setattr(batch, "each", one_after_the_other)
+    monkeypatch.setattr(diagnosis, "each", one_after_the_other)
     anything_will_do = {"criteria.floor": 1e8, "criteria.adequate": 1e9}
     folders = [sound, tmp_path / "gone"]
     found = dict(tactile_cube.diagnose_each(folders, out=tmp_path / "out", values=anything_will_do))

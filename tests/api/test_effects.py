@@ -29,12 +29,7 @@ def test_a_description_shows_law_parameters_signature_and_source() -> None:
     (stiction,) = tactile_cube.effects("stribeck_friction")
     assert "F += excess * exp(-|v / velocity|^exponent)" in stiction.law
     assert stiction.rows[1] == ("velocity", "rad/s", "0.15", "0.15", "0.01 to 3", "0.05-0.3 rad/s")
-    for part in (
-        stiction.summary,
-        stiction.law,
-        "In data: spikes after standstill",
-        "Source: Armstrong",
-    ):
+    for part in (stiction.summary, stiction.law, "In data: spikes after standstill", "Source: Armstrong"):
         assert part in stiction.text
 
 

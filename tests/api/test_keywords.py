@@ -11,7 +11,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 
 import tactile_cube
 from tactile_cube.api.job import NO_KEYS, as_word, called_job
-from tactile_cube.command_help import ADDED, CONFIG, commands
+from tactile_cube.composition import ADDED, CONFIG, commands
 from tactile_cube.errors import InputError
 
 FOLDERS_AND_FILES = {"name", "hydra", "film", "rerun"}

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import tactile_cube
-from tactile_cube.command_help import commands
+from tactile_cube.composition import commands
 
 
 def test_importing_the_package_imports_nothing_slow() -> None:

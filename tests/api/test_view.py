@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 import tactile_cube
-from tactile_cube.api.view import learning_curve
+from tactile_cube.api.evaluation import learning_curve
 from tactile_cube.errors import InputError
 from tests.visualization.test_episode_recording import listed, rows
 

@@ -10,8 +10,7 @@ import pytest
 import yaml
 from omegaconf import OmegaConf
 
-from tactile_cube.command_help import CONFIG
-from tactile_cube.composition import composed
+from tactile_cube.composition import CONFIG, composed
 
 PINNED = Path(__file__).with_name("experiments.yaml")
 EXPERIMENTS = sorted(file.stem for file in (CONFIG / "experiment").glob("*.yaml"))

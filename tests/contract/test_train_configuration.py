@@ -10,7 +10,7 @@ from torchrl.objectives import SACLoss
 
 from tactile_cube import composition
 from tactile_cube.agent.networks import Sizes
-from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import CONFIG
 from tactile_cube.env import Conditions
 from tactile_cube.training.build import as_environment
 from tactile_cube.training.settings import CollectorSettings, RunSettings, TrainingSettings

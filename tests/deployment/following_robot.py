@@ -9,12 +9,11 @@ from unittest import mock
 
 import numpy as np
 
+from tactile_cube.deployment.command_guard import StopError
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
-from tactile_cube.deployment.limits import JointLimits, StopRules
 from tactile_cube.deployment.loop_log import LoopLog
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import JointLimits, Reading, StopRules
 from tactile_cube.deployment.run_loop import LoopRun, run_loop
-from tactile_cube.deployment.stop import StopError
 
 TICK = 1e-3  # [s]
 SMALL = 1e-9
@@ -112,7 +111,7 @@ def drive(
     """Run the robot's loop; however that ends, every command is safe and the last one presses on nothing."""
     presses = False
     try:
-        with mock.patch("tactile_cube.deployment.stop.time", SimpleNamespace(sleep=robot.sleep)):
+        with mock.patch("tactile_cube.deployment.command_guard.time", SimpleNamespace(sleep=robot.sleep)):
             return run_loop(robot.loop, robot, say, log)
     except StopError:
         presses = True

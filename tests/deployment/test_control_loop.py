@@ -15,22 +15,14 @@ from numpy.lib import format as npy
 from tactile_cube.deployment.command_guard import CommandGuard
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog
 from tactile_cube.deployment.loop_log import CHUNK, LoopLog, write_runs
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import JointLimits, Reading, StopRules, Watchdog
 from tactile_cube.deployment.run_loop import LoopRun
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.measurement.recordings import writing
 from tactile_cube.measurement.recordings.reading import read_recording
-from tests.deployment.following_robot import (
-    FollowingRobot,
-    Spoil,
-    change,
-    clock,
-    drive,
-    raising,
-)
+from tests.deployment.following_robot import FollowingRobot, Spoil, change, clock, drive, raising
 
 HOME = np.asarray(DLR_HAND2.start_angles)
 OPEN = HOME - 0.1

@@ -13,7 +13,7 @@ import tactile_cube
 from tactile_cube.composition import composed
 from tactile_cube.deployment import simulated_hand
 from tactile_cube.deployment.control_loop import Homing
-from tactile_cube.deployment.limits import RATE, StopRules
+from tactile_cube.deployment.robot import RATE, StopRules
 from tactile_cube.deployment.simulated_hand import SimulatedHand
 from tactile_cube.hand import DLR_HAND2
 

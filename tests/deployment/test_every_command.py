@@ -13,17 +13,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tactile_cube.deployment.command_guard import StopError
 from tactile_cube.deployment.control_loop import ControlLoop, Homing
-from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.stop import StopError
-from tests.deployment.following_robot import (
-    FollowingRobot,
-    Spoil,
-    change,
-    clock,
-    drive,
-    raising,
-)
+from tactile_cube.deployment.robot import JointLimits, StopRules
+from tests.deployment.following_robot import FollowingRobot, Spoil, change, clock, drive, raising
 
 sequences = settings(
     derandomize=True, max_examples=int(os.environ.get("SEQUENCES", "200")), deadline=None, database=None

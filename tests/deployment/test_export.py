@@ -9,8 +9,7 @@ from tactile_cube.deployment import export
 from tactile_cube.deployment.control_loop import ControlLoop, Homing
 from tactile_cube.deployment.controller import Network, PolicyController
 from tactile_cube.deployment.export import export_policy, interface_contract
-from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import JointLimits, Reading, StopRules
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, tip_positions
 

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,14 +19,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactile_cube.deployment import signals as signals_module
+from tactile_cube.deployment import run_loop
+from tactile_cube.deployment.command_guard import REPEATS, StopError
 from tactile_cube.deployment.control_loop import ControlLoop, Homing, Mode
 from tactile_cube.deployment.controller import PlayedTargets
-from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import JointLimits, Reading, StopRules
 from tactile_cube.deployment.run_loop import LoopRun
 from tactile_cube.deployment.simulated_hand import SimulatedHand
-from tactile_cube.deployment.stop import REPEATS, StopError
 from tests.deployment.following_robot import TICK, FollowingRobot, Spoil, clock, drive, raising, torque
 from tests.deployment.test_every_command import HAND, LOWER, UPPER, sequences
 
@@ -192,7 +192,7 @@ def test_a_signal_breaks_what_hangs_but_neither_the_stop_nor_the_closing(monkeyp
         os.kill(os.getpid(), signal.SIGINT)
 
     now = [0.0]
-    monkeypatch.setattr(signals_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(run_loop, "time", SimpleNamespace(monotonic=lambda: now[0], perf_counter=time.perf_counter))
     for call in ("in_wait", "in_read", "in_send"):
         robot = FollowingRobot(HOME, follow=0.0)
         for tick in (AT, AT + 1, AT + 2, AT + 60):

@@ -12,8 +12,7 @@ import yaml
 from hydra.errors import HydraException
 
 import tactile_cube
-from tactile_cube.command_help import CONFIG, commands
-from tactile_cube.composition import composed, with_recipe
+from tactile_cube.composition import CONFIG, commands, composed, with_recipe
 from tactile_cube.drivetrain.effects import catalogue
 
 ROOT = Path(__file__).parents[2]

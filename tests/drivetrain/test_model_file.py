@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
-from tactile_cube.drivetrain.model_file import (
-    EffectEstimate,
-    Estimate,
-    ModelFile,
-    as_model,
-    read_model,
-    write_model,
-)
+from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, as_model, read_model, write_model
 from tactile_cube.errors import InputError
 
 

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
-from tactile_cube.drivetrain.effects import (
-    ACCELERATION,
-    COMMAND,
-    MOTOR_POSITION,
-    POSITION,
-    TIME,
-    TORQUE,
-    VELOCITY,
-)
+from tactile_cube.drivetrain.effects import ACCELERATION, COMMAND, MOTOR_POSITION, POSITION, TIME, TORQUE, VELOCITY
 from tactile_cube.drivetrain.effects.command import CommandDelay
 from tactile_cube.drivetrain.effects.friction import StribeckFriction
 from tactile_cube.errors import InputError

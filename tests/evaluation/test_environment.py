@@ -2,8 +2,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from tactile_cube.api.job import worded_job
-from tactile_cube.command_help import CONFIG
-from tactile_cube.composition import composed
+from tactile_cube.composition import CONFIG, composed
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.environment import environment, worlds
 from tactile_cube.evaluation.policies import HoldPolicy, PolicySource, find_policy

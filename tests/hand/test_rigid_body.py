@@ -6,12 +6,7 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import Mimic, RigidBodyTree
-from tactile_cube.hand.rigid_body_equations import (
-    WORK_COLUMNS,
-    add_spin_inertia,
-    add_weight,
-    mass_matrix_and_bias,
-)
+from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, add_spin_inertia, add_weight, mass_matrix_and_bias
 
 INERTIAL = (
     '<inertial><origin xyz="{x} 0.01 -0.02" rpy="0.3 -0.2 0.5"/><mass value="{m:.2f}"/>'
@@ -51,10 +46,7 @@ def test_mass_matrix_and_bias_equal_those_of_a_physics_engine(tmp_path) -> None:
     (tmp_path / "rig.urdf").write_text(BRANCHED)
     client = pybullet.connect(pybullet.DIRECT)
     body = pybullet.loadURDF(
-        str(tmp_path / "rig.urdf"),
-        useFixedBase=True,
-        flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-        physicsClientId=client,
+        str(tmp_path / "rig.urdf"), useFixedBase=True, flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
     )
     pybullet.setGravity(*GRAVITY, physicsClientId=client)
     infos = [pybullet.getJointInfo(body, k, physicsClientId=client) for k in range(6)]

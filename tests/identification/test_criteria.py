@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import CONFIG
 from tactile_cube.errors import InputError
 from tactile_cube.identification.criteria import STANDARD, Criteria
 

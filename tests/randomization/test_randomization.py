@@ -2,7 +2,16 @@ import numpy as np
 import pytest
 
 from tactile_cube.errors import InputError
-from tactile_cube.randomization import Constant, Learnability, Randomization, Uniform, drawn_places
+from tactile_cube.randomization import (
+    Choice,
+    Constant,
+    Learnability,
+    LogUniform,
+    Randomization,
+    Uniform,
+    drawn_places,
+    sample,
+)
 from tactile_cube.randomization.randomization import PARTS
 from tactile_cube.simulation import EpisodeConstants
 
@@ -91,3 +100,23 @@ def test_a_place_says_where_in_its_range_a_value_lies_and_only_steered_ranges_ha
     assert steered.constants(nominal, rng, {"cube_mass": 0.25}).cube_mass == pytest.approx(0.2)
     with pytest.raises(InputError, match=r"randomization\.steered is 1"):
         Randomization(steered=1.0)
+
+
+def test_draws_have_the_distribution_they_are_named_after() -> None:
+    rng = np.random.default_rng(0)
+    uniform = sample(Uniform(2.0, 4.0), rng, (4000,))
+    assert uniform.min() >= 2.0
+    assert uniform.max() < 4.0
+    assert uniform.mean() == pytest.approx(3.0, abs=0.05)
+    logarithmic = np.log10(sample(LogUniform(2e-4, 2e-2), rng, (4000,)))
+    assert logarithmic.mean() == pytest.approx(np.log10(2e-3), abs=0.03)
+    chosen = sample(Choice((1.0, -1.0)), rng, (4000,))
+    assert set(chosen.tolist()) == {1.0, -1.0}
+    assert chosen.mean() == pytest.approx(0.0, abs=0.05)
+    assert sample(Constant(7.0), rng, (3,)).tolist() == [7.0] * 3
+
+
+@pytest.mark.parametrize("wrong", [lambda: Uniform(1.0, 0.0), lambda: LogUniform(0.0, 1.0), lambda: Choice(())])
+def test_impossible_bounds_are_refused(wrong: type) -> None:
+    with pytest.raises(InputError):
+        wrong()

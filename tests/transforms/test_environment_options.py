@@ -7,8 +7,7 @@ import pytest
 from hydra.errors import InstantiationException
 from hydra.utils import instantiate
 
-from tactile_cube.command_help import CONFIG
-from tactile_cube.composition import composed
+from tactile_cube.composition import CONFIG, composed
 from tactile_cube.curriculum import LinearCurriculum
 from tactile_cube.env import Reward, Task
 from tactile_cube.errors import InputError

@@ -9,8 +9,8 @@ import polars
 import pytest
 
 import tactile_cube
+from tactile_cube.api.comparison import run_recording
 from tactile_cube.api.job import worded_job
-from tactile_cube.api.recording import run_recording
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.sources.log_file import READERS
 from tactile_cube.workbench import importing

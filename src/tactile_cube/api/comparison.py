@@ -1,11 +1,11 @@
-"""Compare a recording with a model from a program."""
-
-from __future__ import annotations
+"""Make recordings, and compare one with a model, from a program."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from omegaconf import OmegaConf
 
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.model_file import ModelFile, as_model
@@ -15,7 +15,43 @@ from tactile_cube.measurement.bench import has_free_motion, with_object, without
 from tactile_cube.measurement.comparing.comparison import USUAL_STEP, Comparison, compare_recording, comparison_json
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
+from tactile_cube.measurement.recordings.writing import require_free, write_recordings
+from tactile_cube.measurement.sources.source import recording_tables
 from tactile_cube.whole_file import write_json, written_together
+
+
+@as_input_errors
+def record(
+    out: PathLike, *, source: str | None = None, seed: int | None = None, values: Mapping[str, Any] | None = None
+) -> dict[str, Recording]:
+    """Write a recording from a source of conf/source, and read it back as every command would.
+
+    Args:
+        out: folder to write.
+        source: option of conf/source.
+        seed: of everything random.
+        values: keys of the source, e.g. {"source.hidden": ["backlash@q2: play=0.03"]}.
+
+    Returns:
+        Sub-folder of `out` -> recording: "" is the recording itself, "validation" what identification must not see.
+
+    Raises:
+        InputError: `out` holds a recording already, or a file that cannot be used.
+
+    Example:
+        >>> measured = tactile_cube.record("made", source="finger", values={"source.hidden": ["backlash@q2"]})[""]
+    """
+    return run_recording(called_job("record", locals()))
+
+
+def run_recording(job: Job) -> dict[str, Recording]:
+    """Write what a job's source gives."""
+    out = Path(job.config.out)
+    require_free(out)
+    settings: Any = OmegaConf.to_container(job.config.source, resolve=True)
+    tables = recording_tables(settings, str(job.choices["source"]), job.config.seed)
+    write_recordings(out, tables)
+    return {name: read_recording(out / name) for name in tables}
 
 
 @dataclass(frozen=True)

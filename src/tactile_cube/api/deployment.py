@@ -1,7 +1,5 @@
 """Export a policy, and run its control loop on a hand, from a program."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -17,9 +15,8 @@ from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.deployment.control_loop import ControlLoop, open_angles
 from tactile_cube.deployment.controller import Network, PlayedTargets, PolicyController, excited_targets, read_network
 from tactile_cube.deployment.export import export_policy
-from tactile_cube.deployment.limits import JointLimits
 from tactile_cube.deployment.loop_log import LoopLog, Rows, write_runs
-from tactile_cube.deployment.robot import Robot
+from tactile_cube.deployment.robot import JointLimits, Robot
 from tactile_cube.deployment.run_loop import LoopRun, run_loop
 from tactile_cube.deployment.simulated_hand import SimulatedHand
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
@@ -81,16 +78,12 @@ def run_export(job: Job) -> tuple[Path, Path]:
 
 
 def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSetting:
-    """What the policy was trained with, on the hand and with the object that `config` names where its file cannot.
-
-    With `trained`, the hand has to be the policy's; else it is any, as for an excitation in place of a policy.
-    """
     hand: Hand | None = instantiate(config.hand, _convert_="all") if config.get("hand") else None
     if hand is not None and not trained:
         return TrainingSetting.of(hand)
     object_: Any = OmegaConf.to_container(config.object, resolve=True) if config.get("object") else None
     setting = training_setting(network.info, hand, object_, network.label)
-    if hand is None and setting.hand.drive and not _simulated(config):
+    if hand is None and setting.hand.drive and config.get("robot", {}).get("_target_") != SIMULATED:
         name = setting.hand.name
         raise InputError(
             f"{network.label}: what the drives of hand '{name}' bear, and so the limits of every command, would come "
@@ -99,8 +92,7 @@ def _setting(config: Any, network: Network, trained: bool = True) -> TrainingSet
     return setting
 
 
-def _simulated(config: Any) -> bool:
-    return str(config.get("robot", {}).get("_target_")) == f"{SimulatedHand.__module__}.{SimulatedHand.__qualname__}"
+SIMULATED = f"{SimulatedHand.__module__}.{SimulatedHand.__qualname__}"
 
 
 @dataclass(frozen=True)
@@ -200,7 +192,7 @@ def _run_all(job: Job, say: Say, folder: Path) -> DeploymentResult:
     config, network = job.config, load_policy(job.config.policy)
     setting = _setting(config, network, config.motion == "policy")
     limits = robot_limits(setting, config.rate_limit)
-    target, simulated = str(config.robot._target_), _simulated(config)
+    target, simulated = str(config.robot._target_), config.robot._target_ == SIMULATED
     own = {"setting": setting} if simulated else {"hand": setting.hand} if target.startswith("tactile_cube.") else {}
     runs, logs, turned = [], [], []
     for number in range(config.runs):

@@ -1,16 +1,19 @@
 """Diagnose a recording from a program: which physical effect does the model lack?"""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+import multiprocessing
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from tactile_cube.api.comparison import modelled, opened
 from tactile_cube.api.job import Job, PathLike, Say, as_input_errors, called_job
 from tactile_cube.drivetrain.effects import catalogue, find_effect
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
+from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.identification import ContactDiagnosis, diagnose_contact, with_contact
 from tactile_cube.identification.criteria import Criteria
 from tactile_cube.identification.diagnosis import Diagnosis, diagnose_recording, write_experiment
@@ -21,7 +24,7 @@ from tactile_cube.measurement.bench import has_free_motion, with_object, without
 from tactile_cube.measurement.comparing.comparison import compare_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.nominal import require_same_joints
-from tactile_cube.whole_file import write_json, written_together
+from tactile_cube.whole_file import write_json, write_whole, written_together
 
 SHAPES = 3  # of the missing torque of one joint, most telling first
 
@@ -64,20 +67,18 @@ class DiagnosisResult:
 
     def write(self, folder: PathLike) -> None:
         """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""
+        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
         from tactile_cube.visualization.report import write_report
 
-        path = str(Path(folder) / "model.yaml")
+        path, made = str(Path(folder) / "model.yaml"), self.model.provenance
         with written_together(Path(folder), "diagnosis.json") as aside:
             write_model(self.model, aside / "model.yaml")
             write_json(aside / "diagnosis.json", self.data)
-            page = self._contact_page(path) if self.free is None else self._free_page(aside, path, self.free)
+            if self.free is None:
+                page = contact_diagnosis_report(self.data, self.model.rig, made.command, made.recording, path)
+            else:
+                page = self._free_page(aside, path, self.free)
             write_report(page, aside / "report.html")
-
-    def _contact_page(self, path: str) -> Any:
-        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
-
-        made = self.model.provenance
-        return contact_diagnosis_report(self.data, self.model.rig, made.command, made.recording, path)
 
     def _free_page(self, folder: Path, path: str, found: Diagnosis) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
@@ -170,3 +171,86 @@ def _of_free_motion(job: Job, recording: Recording, known: ModelFile | None, say
         model, data = contact.into(model, alone=False), with_contact(data, contact)
         data["seconds"] = job.seconds
     return DiagnosisResult(recording, known, found, contact, model, data, job)
+
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def each(work: Callable[[T], R], over: Sequence[T], jobs: int = 1) -> Iterator[tuple[T, R]]:
+    """What `work` makes of each, in the order in which it is done.
+
+    Args:
+        work: runs in other processes, so it and what it takes and gives can be pickled.
+        over: what it is given, one each.
+        jobs: processes.
+
+    Raises:
+        InputError: what `work` raises.
+    """
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        futures = {pool.submit(work, one): one for one in over}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+
+class Answered(NamedTuple):
+    """What `diagnose` answered, in plain words and as diagnosis.json has it, and the files that it writes."""
+
+    text: str
+    data: dict[str, Any]
+    files: dict[str, bytes]
+
+
+def diagnose_each(
+    recordings: Sequence[PathLike], *, out: PathLike, jobs: int = 1, **settings: Any
+) -> Iterator[tuple[Path, Answered | InputError]]:
+    """Diagnose many recordings at once; the files of each go to a folder of its name in `out`.
+
+    Args:
+        recordings: folders, each with a name of its own.
+        out: folder of the answers.
+        jobs: see `each`.
+        settings: of every diagnosis, see `diagnose`.
+
+    Yields:
+        Folder and answer, or what is wrong with the recording, in the order in which they are done.
+
+    Raises:
+        InputError: two recordings with one name.
+
+    Example:
+        >>> for folder, answer in tactile_cube.diagnose_each(["monday", "friday"], out="outputs/week", jobs=2):
+        ...     print(folder, answer)
+    """
+    folders = {Path(folder).resolve().name: Path(folder) for folder in recordings}
+    if len(folders) < len(recordings):
+        raise InputError(f"recordings={[str(one) for one in recordings]}: give folders that differ in their last name")
+    sound: list[tuple[str, Recording]] = []
+    for name, folder in folders.items():
+        try:
+            sound.append((name, opened(folder)))
+        except InputError as error:
+            yield folder, error
+    for (name, _), found in each(partial(_diagnosed, settings, Path(out)), sound, jobs):
+        if isinstance(found, InputError):
+            yield folders[name], found
+            continue
+        with written_together(Path(out) / name, "diagnosis.json") as aside:
+            for file, content in found.files.items():
+                write_whole(aside / file, content)
+        yield folders[name], found
+
+
+def _diagnosed(settings: Mapping[str, Any], out: Path, named: tuple[str, Recording]) -> Answered | InputError:
+    name, recording = named
+    try:
+        found = diagnose(recording, **settings, say=lambda line: None)
+    except InputError as error:
+        return error
+    with tempfile.TemporaryDirectory() as place:
+        found.write(place)
+        files = {path.name: path.read_bytes() for path in Path(place).iterdir()}
+    # its commands name the model where it will be
+    files["report.html"] = files["report.html"].replace(place.encode(), str(out / name).encode())
+    return Answered(found.text, found.data, files)

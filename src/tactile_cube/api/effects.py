@@ -1,14 +1,12 @@
 """The catalogue of physical effects in words: for the terminal, for a program and for docs/effects.md."""
 
-from __future__ import annotations
-
 import inspect
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.effects import Effect, Parameter, catalogue
 from tactile_cube.errors import InputError
 from tactile_cube.simulation.contact_effects import contact_catalogue
@@ -75,14 +73,11 @@ def effects(name: str | None = None) -> tuple[EffectDescription, ...]:
 
 def effects_table(descriptions: Sequence[EffectDescription]) -> str:
     """Return a few lines on each effect: its summary, and the range of each parameter."""
-    lines = [line for one in descriptions for line in _entry(one)]
+    lines = []
+    for one in descriptions:
+        rows = [(name, reach if unit == "1" else f"{reach} {unit}") for name, unit, _, _, reach, _ in one.rows]
+        lines += [f"{one.name}: {one.summary}", *(f"    {line}" for line in _aligned(rows))]
     return "\n".join([*lines, "", "name=EFFECT shows one in detail: its law, what it looks like in data, its source."])
-
-
-def _entry(effect: EffectDescription) -> Iterator[str]:
-    yield f"{effect.name}: {effect.summary}"
-    rows = [(name, reach if unit == "1" else f"{reach} {unit}") for name, unit, _, _, reach, _ in effect.rows]
-    yield from (f"    {line}" for line in _aligned(rows))
 
 
 def _described(kind: type[Effect]) -> EffectDescription:

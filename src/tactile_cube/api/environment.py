@@ -1,7 +1,5 @@
 """Training environments and grasps from a program."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
@@ -90,9 +88,8 @@ def search_grasps(config: EnvConfig | None = None, *, grasps: int = 2000, seed: 
         >>> found.save(Path("grasps.npz"))  # then start="grasps", values={"start.file": "grasps.npz"}
     """
     env, given = config or env_config(), "config, " if config else ""
-    return grasps_of(
-        env, env.simulation, grasps, seed, f"tactile_cube.search_grasps({given}grasps={grasps}, seed={seed})"
-    )
+    command = f"tactile_cube.search_grasps({given}grasps={grasps}, seed={seed})"
+    return grasps_of(env, env.simulation, grasps, seed, command)
 
 
 def grasps_of(env: EnvConfig, options: SimulationOptions, grasps: int, seed: int, command: str) -> Grasps:

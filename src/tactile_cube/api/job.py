@@ -15,23 +15,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from tactile_cube.command_help import CONFIG
-from tactile_cube.composition import composed, refuse_unknown_keys, with_recipe
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import CONFIG, composed, refuse_unknown_keys, suggestion, with_recipe
 from tactile_cube.errors import InputError
 from tactile_cube.usage_error import usage_error
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-Say = Callable[[str], None]
-"""Takes lines of progress, as `print` does."""
+Say = Callable[[str], None]  # takes lines of progress, as `print` does
 shown_at_once: Say = functools.partial(print, flush=True)
 PathLike = str | Path
-NO_KEYS = ("values", "folder", "say")
-"""Keywords of calls that are no keys of the configuration."""
-EFFECTS = ("effects", "own_effects", "hidden")
-"""Keys of the configuration that name effects."""
+NO_KEYS = ("values", "folder", "say")  # keywords of calls that are no keys of the configuration
+EFFECTS = ("effects", "own_effects", "hidden")  # keys of the configuration that name effects
 
 
 @dataclass(frozen=True)
@@ -135,7 +130,8 @@ def _in_words(value: Any) -> str:
         return "null" if value is None else str(value).lower()
     if isinstance(value, numbers.Real):
         return str(value)
-    text = _name(value)
+    model = hasattr(value, "rig") and not hasattr(value, "folder")
+    text = f"model of {value.rig}" if model else str(getattr(value, "folder", value))
     if re.fullmatch(r"[A-Za-z_/][\w./@-]*", text) and text.lower() not in ("null", "true", "false", "nan", "inf"):
         return text
     from hydra.core.override_parser.types import Quote, QuotedString
@@ -151,12 +147,6 @@ def _refuse_setting(command: str, key: str, value: Any, known: Container[str]) -
             f"{command}: {key}={value!r} is a setting where the value of {key} is due; give settings as "
             f"keywords, e.g. seed=1; a file of that name is pathlib.Path({value!r})"
         )
-
-
-def _name(thing: Any) -> str:
-    if hasattr(thing, "rig") and not hasattr(thing, "folder"):
-        return f"model of {thing.rig}"
-    return str(getattr(thing, "folder", thing))
 
 
 def _job(config: DictConfig, hydra: Any, command: str, words: Sequence[str], folder: PathLike) -> Job:

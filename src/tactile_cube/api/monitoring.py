@@ -1,7 +1,5 @@
 """Watch a machine from a program: what has changed since its model was identified?"""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,14 +69,9 @@ class MonitorResult:
     def data(self) -> dict[str, Any]:
         """The content of monitor.json: plain numbers."""
         rows = {
-            one.name: {
-                "before": one.before.model_dump(),
-                "now": one.now.model_dump(),
-                "difference": one.difference,
-                "half_width": one.half_width,
-                "p_value": one.p_value,
-                "changed": one in self.changed,
-            }
+            one.name: {"before": one.before.model_dump(), "now": one.now.model_dump()}
+            | {key: getattr(one, key) for key in ("difference", "half_width", "p_value")}
+            | {"changed": one in self.changed}
             for one in self.drifts
         }
         return {

@@ -1,7 +1,5 @@
 """Train a policy from a program: in one run, or in stages of which each begins with the networks of the one before."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
@@ -10,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
@@ -38,15 +36,11 @@ PUBLISHED: dict[str, dict[str, Any]] = {
     "object": {"shape": "box", "size": 0.08, "mass": 0.05},
 }
 """Hand and object of the paper, by the groups of conf/."""
-KEY = re.compile(r"[+~]*([\w./@]+)")
-"""What a word of a command line sets."""
-NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")
-"""Keys of the training as a whole."""
+KEY = re.compile(r"[+~]*([\w./@]+)")  # what a word of a command line sets
+NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the training as a whole
 ENGINES = ("bullet", "mujoco")
-AVERAGED = 5
-"""Policies whose mean is what comes out, as in conf/average.yaml."""
-GRASPS = 1000
-"""As many as those that come with the package."""
+AVERAGED = 5  # policies whose mean is what comes out, as in conf/average.yaml
+GRASPS = 1000  # as many as those that come with the package
 COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
 """Columns of metrics.csv that go on from stage to stage."""
 
@@ -140,8 +134,7 @@ def train(
     return run_training(called_job("train", locals()))
 
 
-@dataclass(frozen=True)
-class AveragedPolicy:
+class AveragedPolicy(NamedTuple):
     """A policy whose weights are the mean of several, and after how many steps each of these was kept."""
 
     policy: Path
@@ -175,10 +168,8 @@ def run_averaging(job: Job) -> AveragedPolicy:
 def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
     """Train what a job says, in one run or in stages, and say how it went.
 
-    Args:
-        job: what to train.
-        stage: what lines of progress begin with where the run is a stage of several.
-        later: environment steps that the stages after it usually take.
+    Of a stage of several, `stage` is what lines of progress begin with, and the stages after it usually take `later`
+    environment steps.
     """
     plain = plain_settings(job)
     before = Finished.of(job.folder, plain)
@@ -189,14 +180,12 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
 
 
 def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
-    """Train through faults of the workers."""
     start = partial(_training_run, job, plain, stage, later)
     run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
 
 
 def _training_run(job: Job, plain: dict[str, Any], stage: str, later: int, **changes: str) -> Run:
-    """The run that a job describes, with changes to how it is trained: new, or where its checkpoint says."""
     config: Any = job.config
     run = build_run(
         folder=job.folder,
@@ -255,7 +244,6 @@ def stages_of(job: Job) -> list[Job]:
 
 
 def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
-    """What is mastered, what is not, and what is to come, in one line."""
     lines = [
         f"{one.folder.name}: {one.reason if one.reason.startswith(MASTERED) else f'not mastered: {one.reason}'}"
         for one in results
@@ -281,8 +269,7 @@ def judged(job: Job, last: Path) -> str:
 
 
 def _key(word: str) -> str:
-    found = KEY.match(word)
-    return found[1] if found else word
+    return found[1] if (found := KEY.match(word)) else word
 
 
 def _own_grasps(job: Job, file: Path) -> str | None:
@@ -300,7 +287,6 @@ def _own_grasps(job: Job, file: Path) -> str | None:
 
 
 def _sum_up(folder: Path, results: Sequence[TrainingResult]) -> None:
-    """Write costs and curve of all stages so far into the folder of the whole training."""
     costs = [asdict(read_costs(result.folder / LEDGER)) for result in results]
     spent = Costs(**{name: sum(one[name] for one in costs) for name in costs[0]})
     write_costs(folder / LEDGER, sum(result.steps for result in results), spent)

@@ -1,20 +1,17 @@
-"""The last check of every command: finite, and within the limits around the last accepted angles."""
-
-from __future__ import annotations
+"""The last check of every command, and how the commands to a robot end: where the fingers press on nothing."""
 
 import time
 from collections.abc import Callable
+from enum import StrEnum
 from math import nan
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.limits import JointLimits, StopRules
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, JointLimits, Reading, Robot, StopRules
 
-Array = NDArray[np.float64]
-AGREEING = 5
-"""Readings in a row that must agree before the first command."""
+AGREEING = 5  # readings in a row that must agree before the first command
 ROUNDING = 1e-9  # [rad] of angles that add up ticks
 
 
@@ -37,11 +34,7 @@ class CommandGuard:
     """
 
     def __init__(
-        self,
-        limits: JointLimits,
-        rules: StopRules,
-        names: tuple[str, ...],
-        clock: Callable[[], float] = time.monotonic,
+        self, limits: JointLimits, rules: StopRules, names: tuple[str, ...], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self.limits, self.rules, self.names, self.clock = limits, rules, names, clock
         self._reach = limits.reach
@@ -80,14 +73,10 @@ class CommandGuard:
         return now - self._sent
 
     def checked(self, dt: float, wanted: Array) -> Array:
-        """Return the command to send `(joints,)` [rad]: the nearest to the wanted one that keeps every limit.
+        """Return the command to send `(joints,)` [rad], `dt` [s] after the last: near the wanted one, in every limit.
 
         Where what is wanted is no number, the command stays. Where commands failed for so long that none keeps rate
         and torque, it keeps the torque.
-
-        Args:
-            dt: time since the last command [s].
-            wanted: `(joints,)` [rad].
         """
         if self.state is None:
             raise RuntimeError("no command before an accepted reading")
@@ -123,7 +112,6 @@ class CommandGuard:
         return self._jump(reading) or self._without_room(self.since_sent(now), q_m)
 
     def _jump(self, reading: Reading) -> str:
-        """Say which joint has moved further than it can since the last accepted reading."""
         if self.state is None:
             return ""
         since, moved = reading.time - self.state.time, np.abs(reading.q_m - self.state.q_m)
@@ -134,7 +122,6 @@ class CommandGuard:
         return f"{self.names[at]} moved by {moved[at]:.4f} rad in {1e3 * since:.1f} ms, {allowed}"
 
     def _without_room(self, dt: float, q_m: Array) -> str:
-        """Say around which joint no command keeps all limits."""
         limits, before, step = self.limits, self._before(q_m), self._step(dt)
         low = np.maximum(np.maximum(limits.lower, q_m - self._reach), before - step)
         high = np.minimum(np.minimum(limits.upper, q_m + self._reach), before + step)
@@ -142,3 +129,126 @@ class CommandGuard:
         if low[at] <= high[at]:
             return ""
         return f"{self.names[at]} at {q_m[at]:.4g} rad, where no command keeps all limits"
+
+
+REPEATS = 100  # commands at the goal that the robot takes before it is let alone, so that a lost message does no harm
+LOOKING = 0.2  # how long new measurements are awaited after a gap [s]
+PERIOD = 0.001  # shortest time between two commands [s]
+
+
+class StopError(RuntimeError):
+    """The fingers may still press: the robot did not take the commands that end it."""
+
+
+class Phase(StrEnum):
+    """What the stop is doing."""
+
+    LOOKING = "looking"  # commands ceased for so long that the fingers may be elsewhere; nothing is sent
+    RETURNING = "returning"  # the commands go to the goal
+    RESTING = "resting"  # the last command asks for no torque; it is repeated
+    OVER = "over"
+
+
+class Stop:
+    """The last commands, by the clock of this computer, in steps that are bounded whatever the robot's clock says.
+
+    The goal is the last accepted angles, within the joints' range. Who drives it gives what `command` returns to the
+    robot and calls `sent` if the robot took it, or gives it measurements by `look` while it returns None.
+
+    Attributes:
+        phase: see `Phase`.
+        failure: once it is over, why the fingers may still press; "" if they do not.
+    """
+
+    def __init__(self, guard: CommandGuard) -> None:
+        self._guard, self.clock, self.failure = guard, guard.clock, ""
+        self._fresh, self._offered = guard, guard.command
+        self._repeats, self._since = 0, -np.inf
+        self.phase = Phase.OVER if guard.command is None else Phase.RETURNING
+        if self.phase is Phase.RETURNING:
+            away = float(np.max(np.abs(self._away())))
+            self._ends = self.clock() + guard.rules.patience + 2.0 * away / guard.limits.rate
+
+    @property
+    def torque(self) -> float:
+        """Largest spring torque K_P |q_d - q_m| of the last command that the robot took, q_m at the goal [N m]."""
+        return float(np.max(self._guard.limits.kp * np.abs(self._away())))
+
+    def command(self) -> Array | None:
+        """Return the next command `(joints,)` [rad]; None while measurements are awaited, and when it is over."""
+        now, guard = self.clock(), self._guard
+        if self.phase is not Phase.OVER and now > self._ends:
+            self._end()
+        elif self.phase is Phase.LOOKING and now - self._since > LOOKING:
+            self.phase, self._since = Phase.RETURNING, now
+        elif self.phase is not Phase.LOOKING and now - max(guard.sent_at, self._since) > guard.rules.timeout:
+            self.phase, self._since = Phase.LOOKING, now
+            self._fresh = CommandGuard(guard.limits, guard.rules, guard.names, guard.clock)
+        if self.phase in (Phase.LOOKING, Phase.OVER):
+            return None
+        self._offered = guard.checked(now - guard.sent_at, self._goal())
+        return self._offered.copy()
+
+    def sent(self) -> None:
+        """Take note that the robot took the last command."""
+        assert self._offered is not None
+        self._guard.sent(np.nan, self._offered)
+        self.phase = Phase.RESTING if self.torque <= self._guard.rules.tolerance else Phase.RETURNING
+        self._repeats = self._repeats + 1 if self.phase is Phase.RESTING else 0
+        if self._repeats >= REPEATS:
+            self._end()
+
+    def look(self, now: float, reading: Reading | None) -> None:
+        """Take a measurement while looking; as many as agree at the beginning of a run give the goal anew."""
+        if reading is not None:
+            self._fresh.accept(now, reading)
+        if self._fresh.ready:
+            self._guard.state, self.phase, self._since = self._fresh.state, Phase.RETURNING, self.clock()
+
+    def _goal(self) -> Array:
+        assert self._guard.state is not None  # as a command has been sent
+        return np.clip(self._guard.state.q_m, self._guard.limits.lower, self._guard.limits.upper)
+
+    def _away(self) -> Array:
+        assert self._guard.command is not None
+        return np.asarray(self._guard.command - self._goal())
+
+    def _end(self) -> None:
+        self.phase, torque = Phase.OVER, self._guard.limits.kp * np.abs(self._away())
+        if not self._repeats:
+            at = int(np.argmax(torque))
+            self.failure = (
+                f"{self._guard.names[at]} may still press with {torque[at]:.2f} N m: the robot did not take the "
+                f"commands that end it within {self._guard.rules.patience:g} s; switch its drives off"
+            )
+
+
+def let_go(stop: Stop, robot: Robot, alive: Callable[[], None]) -> None:
+    """Drive a stop to its end, whatever the robot's methods raise; `alive` is called at each step.
+
+    Raises:
+        StopError: the fingers may still press.
+        BaseException: what `robot.wait` raised; the stop came to its end by sleeping in its place.
+    """
+    now, lost, broken = np.nan, cast(BaseException | None, None), cast(BaseException | None, None)
+    while stop.phase is not Phase.OVER:
+        alive()
+        began = stop.clock()
+        try:
+            command = stop.command()
+            if command is not None:
+                robot.send(command)
+                stop.sent()
+            elif stop.phase is Phase.LOOKING:
+                stop.look(now, robot.read())
+        except BaseException as error:  # the next message may get through
+            lost = error
+        try:
+            now = now if broken else robot.wait()
+        except BaseException as error:
+            broken = error
+        time.sleep(max(0.0, PERIOD - (stop.clock() - began)))
+    if stop.failure:
+        raise StopError(stop.failure) from lost or broken
+    if broken:
+        raise broken

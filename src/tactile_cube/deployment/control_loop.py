@@ -1,7 +1,5 @@
 """The robot's side in one place: a fast loop that opens, waits for the object, asks the policy and stops by itself."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -9,20 +7,16 @@ from enum import StrEnum
 from math import inf, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.deployment.command_guard import CommandGuard
+from tactile_cube.deployment.command_guard import CommandGuard, Stop
 from tactile_cube.deployment.controller import POLICY_RATE, PlayedTargets, PolicyController
-from tactile_cube.deployment.limits import JointLimits, StopRules, Watchdog, require_positive
-from tactile_cube.deployment.robot import Reading
-from tactile_cube.deployment.stop import Stop
+from tactile_cube.deployment.robot import Array, JointLimits, Reading, StopRules, Watchdog, require_positive
 from tactile_cube.deployment.training_setting import TrainingSetting
-from tactile_cube.drivetrain.control_law import low_pass
+from tactile_cube.drivetrain.laws import low_pass
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.kinematics import grasp_angles
 
-Array = NDArray[np.float64]
 ROUNDING = 1e-9  # [s] of clocks that add up ticks
 
 
@@ -48,7 +42,6 @@ class Homing:
     clearance: float = 0.015
 
     def __post_init__(self) -> None:
-        """Refuse what never arrives."""
         require_positive({f"homing.{name}": value for name, value in asdict(self).items()})
 
 
@@ -170,11 +163,13 @@ class ControlLoop:
     def tick(self, now: float, reading: Reading | None = None) -> Array | None:
         """Return the desired angles q_d `(joints,)` [rad] to send, or None while nothing may be sent.
 
-        Args:
-            now: time of this tick on a monotonic clock [s].
-            reading: what has been measured since the tick before; None: nothing.
+        `now` [s] is on a monotonic clock; `reading` is what has been measured since the tick before.
         """
-        dt = self._clock(now)
+        dt = now - self.time if now > self.time and isfinite(now) else 0.0
+        if dt == 0.0:
+            self.stop(f"the clock went from {self.time:g} s to {now:g} s")
+        else:
+            self.time = now
         doubt = "" if reading is None else self._guard.accept(now, reading)
         if doubt:
             self.doubted, self.doubt = self.doubted + 1, doubt
@@ -210,14 +205,6 @@ class ControlLoop:
             self.mode, self.reason = Mode.STOPPED, reason + doubts
             self._stopping = Stop(self._guard)
         return self._stopping
-
-    def _clock(self, now: float) -> float:
-        """Time since the tick before [s]; a clock that does not go forward stops the loop."""
-        if not (now > self.time and isfinite(now)):
-            self.stop(f"the clock went from {self.time:g} s to {now:g} s")
-            return 0.0
-        dt, self.time = now - self.time, now
-        return dt
 
     def _go_on(self, now: float, dt: float, q_m: Array) -> None:
         if self.mode in (Mode.HOMING, Mode.CLOSING):

@@ -1,7 +1,5 @@
 """The policy as it runs on the hand: at 10 Hz from measured joint angles to desired ones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,13 +11,12 @@ from tactile_cube.agent.policy_file import read_policy
 from tactile_cube.deployment.training_setting import training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
-from tactile_cube.measurement.excitation import excitation
+from tactile_cube.measurement.bench import excitation
 
 Weights = NDArray[np.float32]
 Array = NDArray[np.float64]
 
-POLICY_RATE = 10.0
-"""Rate at which the policy is asked [Hz]."""
+POLICY_RATE = 10.0  # rate at which the policy is asked [Hz]
 
 
 @dataclass(frozen=True)

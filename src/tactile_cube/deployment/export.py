@@ -1,7 +1,5 @@
 """A policy as files that need none of this package: arrays or an ONNX graph, with the contract beside them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import asdict
@@ -12,7 +10,7 @@ import numpy as np
 
 from tactile_cube.deployment.control_loop import Homing
 from tactile_cube.deployment.controller import POLICY_RATE, Network
-from tactile_cube.deployment.limits import RATE, StopRules
+from tactile_cube.deployment.robot import RATE, StopRules
 from tactile_cube.deployment.training_setting import TrainingSetting, training_setting
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
@@ -169,9 +167,6 @@ def _alike(values: Any) -> float | list[float]:
     return numbers[0] if len(set(numbers)) == 1 else numbers
 
 
-Contract = dict[str, Any]
-
-
 def export_policy(network: Network, path: Path, setting: TrainingSetting | None = None) -> Path:
     """Write the network, `.npz` or `.onnx`, and `<path>.contract.json` beside it; return the contract's path.
 
@@ -191,7 +186,7 @@ def export_policy(network: Network, path: Path, setting: TrainingSetting | None 
     return beside
 
 
-def _write_npz(network: Network, contract: Contract, path: Path) -> None:
+def _write_npz(network: Network, contract: dict[str, Any], path: Path) -> None:
     """Write `weight<k>` (out, in) and `bias<k>` (out,), ReLU between layers, tanh after the last, and `contract`."""
     arrays: dict[str, Any] = {"contract": np.array(json.dumps(contract))}
     for index, (weight, bias) in enumerate(network.deterministic_layers()):
@@ -199,7 +194,7 @@ def _write_npz(network: Network, contract: Contract, path: Path) -> None:
     write_npz(path, arrays, compressed=False)
 
 
-def _write_onnx(network: Network, contract: Contract, path: Path) -> None:
+def _write_onnx(network: Network, contract: dict[str, Any], path: Path) -> None:
     """Write a graph "observation" (batch, 120) -> "action" (batch, 12), the contract in its metadata."""
     try:
         import onnx

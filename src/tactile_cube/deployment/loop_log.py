@@ -12,20 +12,16 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from tactile_cube.deployment.limits import JointLimits
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, JointLimits, Reading
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.hand.dlr_hand2 import REFLECTED_INERTIA, STATIC_FRICTION, STIFFNESS
 from tactile_cube.measurement.recordings.description import Controller, Coupling, Description, Sensors, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, write_recording
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.void]
 """Rows of a log: `time` [s] and `position`, `command` [rad], `torque` [N m] `(joints,)`, nan where not measured."""
-CHUNK = 500
-"""Rows that are written at a time: what a crash may cost."""
-BEHIND = 20
-"""Chunks that may wait for the disk."""
+CHUNK = 500  # rows that are written at a time: what a crash may cost
+BEHIND = 20  # chunks that may wait for the disk
 
 
 class LoopLog:
@@ -54,7 +50,6 @@ class LoopLog:
         self._thread.start()
 
     def __enter__(self) -> LoopLog:
-        """The log itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -140,13 +135,11 @@ def write_runs(
         trials=[TrialEntry(file="none")],
         source="log of the control loop",
     )
-    tables = [_table(number, run) for number, run in enumerate(runs)]
+    tables = []
+    for number, run in enumerate(runs):  # their signals stay on the disk
+        entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
+        measured = not np.isnan(run["torque"].min())  # a copy of them all would not fit into the memory
+        signals = (run["time"], run["command"], run["position"], run["torque"] if measured else None)
+        tables.append(TrialTable(entry, *signals))
     write_recording(folder, RecordingTables(description, hand.urdf(), tables))
     return folder
-
-
-def _table(number: int, run: Rows) -> TrialTable:
-    """A run as a trial of kind `policy`; its signals stay on the disk."""
-    entry = TrialEntry(file=f"trials/run_{number}.parquet", initialisation=number, kind="policy")
-    measured = not np.isnan(run["torque"].min())  # a copy of them all would not fit into the memory
-    return TrialTable(entry, run["time"], run["command"], run["position"], run["torque"] if measured else None)

@@ -1,15 +1,12 @@
 """A hand behind ROS 2: joint states come in as sensor_msgs/JointState, desired angles go out as the same."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from tactile_cube.deployment.limits import Array, require_positive
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, Reading, require_positive
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 

@@ -1,24 +1,73 @@
-"""Run the control loop on a hand until it stops, keep its tick times."""
+"""Run the control loop on a hand until it stops or a signal ends it; keep its tick times."""
 
 from __future__ import annotations
 
 import os
 import select
+import signal
 import sys
 import termios
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
+from types import FrameType, TracebackType
+from typing import Any
 
 import numpy as np
 
+from tactile_cube.deployment.command_guard import let_go
 from tactile_cube.deployment.control_loop import ControlLoop, Mode
 from tactile_cube.deployment.loop_log import LoopLog
 from tactile_cube.deployment.robot import Robot
-from tactile_cube.deployment.signals import NotedSignals
-from tactile_cube.deployment.stop import let_go
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+DEADLY = (signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGVTALRM, signal.SIGPROF, signal.SIGXCPU)
+"""Signals that end a program which has no handler of its own for them."""
+TERMINAL = (signal.SIGTTIN, signal.SIGTTOU)
+"""Signals by which a terminal suspends a program in the background that reads or writes."""
+PATIENCE = 1.0  # after how long without a step a signal breaks what hangs [s]
+
+
+class NotedSignals:
+    """Context in which signals are noted by name instead of ending or suspending the program.
+
+    A signal raises KeyboardInterrupt only where no step, said by `alive`, has come for `PATIENCE`. One that was ignored
+    at the start, as by nohup, stays ignored. A suspension (Ctrl-Z) is made up for at the end.
+    """
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self._before: dict[signal.Signals, Any] = {}
+        self._stepped = time.monotonic()
+
+    def alive(self) -> None:
+        """Say that nothing hangs."""
+        self._stepped = time.monotonic()
+
+    def __enter__(self) -> NotedSignals:
+        self.alive()
+        if threading.current_thread() is threading.main_thread():
+            taken = [kind for kind in (*ENDING, *TERMINAL) if signal.getsignal(kind) is not signal.SIG_IGN]
+            taken += [kind for kind in DEADLY if signal.getsignal(kind) is signal.SIG_DFL]
+            for kind in taken:
+                self._before[kind] = signal.signal(kind, signal.SIG_IGN if kind in TERMINAL else self._note)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        if signal.SIGTSTP.name in self.names:
+            os.kill(os.getpid(), signal.SIGTSTP)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.names.append(signal.Signals(number).name)
+        if time.monotonic() - self._stepped > PATIENCE:
+            self.alive()
+            raise KeyboardInterrupt
+
 
 NO_HAND = 5.0  # [s] without believable measurements at the beginning
 TICK_TIMES = {"median": 0.5, "p99.9": 0.999, "largest": 1.0}
@@ -46,15 +95,9 @@ class LoopRun:
 
 
 def run_loop(loop: ControlLoop, robot: Robot, say: Say = print, log: LoopLog | None = None) -> LoopRun:
-    """Run a new loop until it stops by itself or a signal ends it.
+    """Run a new loop until it stops by itself or a signal ends it; `log` is of the time in which the policy decides.
 
     However it ends, by an exception too, the stop has the last commands and the robot is closed.
-
-    Args:
-        loop: a new one.
-        robot: the hand.
-        say: takes a line at each change of mode.
-        log: of the time in which the policy decides.
 
     Raises:
         StopError: the fingers may still press.
@@ -88,7 +131,10 @@ def _until_stopped(
             said, key = loop.mode, EnterKey()
         given = loop.mode is Mode.WAIT_FOR_OBJECT and (robot.wait_for_object() or key.pressed())
         if changed and not loop.reason:
-            _announce(loop, robot, say, ", then press Enter" if key.usable and not given else "")
+            if loop.mode is Mode.RUNNING:
+                robot.release()
+            asked = loop.mode is Mode.WAIT_FOR_OBJECT and key.usable and not given
+            say(f"{loop.mode}: {loop.doing}{', then press Enter' * asked}")
         if given:
             loop.confirm_object()
         if loop.mode is Mode.WAITING and now - began > NO_HAND:
@@ -110,17 +156,14 @@ def _tick(loop: ControlLoop, robot: Robot, now: float, run: LoopRun, log: LoopLo
         log.append(loop.accepted, q_d)
 
 
-def _announce(loop: ControlLoop, robot: Robot, say: Say, key: str) -> None:
-    if loop.mode is Mode.RUNNING:
-        robot.release()
-    say(f"{loop.mode}: {loop.doing}" + (key if loop.mode is Mode.WAIT_FOR_OBJECT else ""))
-
-
 class EnterKey:
     """Enter on the terminal, where there is one to read from, from now on: what was typed before does not count."""
 
     def __init__(self) -> None:
-        self.usable = sys.stdin is not None and sys.stdin.isatty() and _in_front(sys.stdin.fileno())
+        self.usable = sys.stdin is not None and sys.stdin.isatty()
+        with suppress(OSError):  # else: not the terminal that this process is controlled from
+            # a process in the background is stopped when it tries to read
+            self.usable = self.usable and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
         if self.usable:
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
@@ -129,11 +172,3 @@ class EnterKey:
         if not self.usable or not select.select([sys.stdin], [], [], 0.0)[0]:
             return False
         return b"\n" in os.read(sys.stdin.fileno(), 4096)
-
-
-def _in_front(terminal: int) -> bool:
-    """Whether this process may read the terminal: one in the background is stopped when it tries."""
-    try:
-        return os.tcgetpgrp(terminal) == os.getpgrp()
-    except OSError:  # not the one that this process is controlled from
-        return True

@@ -1,22 +1,17 @@
 """The simulated hand as the control loop sees a real one: for dry runs."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.deployment.limits import require_positive
-from tactile_cube.deployment.robot import Reading
+from tactile_cube.deployment.robot import Array, Reading, require_positive
 from tactile_cube.deployment.training_setting import TrainingSetting
 from tactile_cube.env import cube_pose
 from tactile_cube.env.cube_pose import frame_along, seen_along
 from tactile_cube.hand import DLR_HAND2
 from tactile_cube.simulation import SimulationOptions, Start, World
 
-Array = NDArray[np.float64]
 AWAY = (0.0, 0.0, -0.3)  # [m] where the cube waits
 LONGEST_STOP = 100_000
 """Periods for which the angle of the object is kept: a stop takes some 100, in 5 s of computing 30 000."""
@@ -79,7 +74,8 @@ class SimulatedHand:
                 self._q_d = np.array(self._world.q_m)
             self._world.step(self._q_d)
             self._ticks += 1
-            self._follow_object()
+            seen = seen_along(self._frame, self._world.cube_quaternion.tolist())
+            self._theta.append(cube_pose(self._world.cube_position.tolist(), seen, self._theta[-1]).theta)
         return self._ticks / self._rate
 
     def read(self) -> Reading | None:
@@ -110,7 +106,3 @@ class SimulatedHand:
     def close(self) -> None:
         """End the physics server."""
         self._world.close()
-
-    def _follow_object(self) -> None:
-        seen = seen_along(self._frame, self._world.cube_quaternion.tolist())
-        self._theta.append(cube_pose(self._world.cube_position.tolist(), seen, self._theta[-1]).theta)

@@ -51,13 +51,10 @@ def training_setting(
     object: Mapping[str, Any] | None = None,
     label: str = "the policy",
 ) -> TrainingSetting:
-    """Return what a policy was trained with.
+    """Return what a policy was trained with, from what its file says beside its weights.
 
-    Args:
-        info: what the policy file says beside its weights.
-        hand: the one that the file names, where its URDF is none of the package's: no file has another file read.
-        object: likewise, as `constants_of` takes it.
-        label: how the policy is called in a message.
+    `hand` and `object` are those that the file names, where their files are none of the package's: no file has another
+    file read. Messages call the policy `label`.
 
     Raises:
         InputError: another hand or another URDF than the file names, or a file of which no setting can be made; see
@@ -119,7 +116,6 @@ def _require_reach(setting: TrainingSetting, label: str) -> None:
 
 
 def _values(env: Mapping[str, Any], part: str, known: set[str], label: str) -> dict[str, Any]:
-    """The plain values of a part of the environment; classes and the hand stand elsewhere."""
     values = {key: value for key, value in (env.get(part) or {}).items() if key not in ("_target_", "hand", "joints")}
     for key in values.keys() - known:
         raise InputError(f"{label}: has env.{part}.{key}, which this version does not know")

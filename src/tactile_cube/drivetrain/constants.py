@@ -1,7 +1,5 @@
 """The constants of a drivetrain, one number for all joints or one per joint."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from itertools import product
@@ -47,7 +45,6 @@ class DrivetrainConstants:
     sign: Literal["physical", "printed"] = "physical"
 
     def __post_init__(self) -> None:
-        """Refuses values that no drive has."""
         for name in [entry.name for entry in fields(self) if entry.name != "sign"]:
             value, positive = getattr(self, name), name in _POSITIVE
             try:

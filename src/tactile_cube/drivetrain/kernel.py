@@ -1,14 +1,14 @@
 """Turns the steps into machine code for one plant, kept on disk so that the next process starts at once."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import os
 import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
+from math import prod
 from pathlib import Path
 from types import ModuleType
 
@@ -16,22 +16,103 @@ import numba
 import numpy as np
 
 from tactile_cube import compiled as decorator
-from tactile_cube.drivetrain import control_law, coupled_joints, dry_friction, signals
-from tactile_cube.drivetrain.effects.effect import Effect, Stage
-from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology
+from tactile_cube.drivetrain import laws, signals
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Stage
+from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body_equations
+from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS
 
-_PHYSICS = (control_law, coupled_joints, decorator, dry_friction, rigid_body_equations, signals)
+Shape = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What is compiled into a kernel: `chains` equal trees and how their dofs hang together.
+
+    Attributes:
+        chains: C, number of fingers.
+        parent: (N) index of the parent link, -1 for the base.
+        prismatic: (N) 1 where a joint slides.
+        follow: (N) actuated joint that each dof follows.
+        leader: (n) dof of each actuated joint.
+    """
+
+    chains: int
+    parent: tuple[int, ...]
+    prismatic: tuple[int, ...]
+    follow: tuple[int, ...]
+    leader: tuple[int, ...]
+
+    @property
+    def joints(self) -> int:
+        """Actuated joints of all chains."""
+        return self.chains * len(self.leader)
+
+
+@dataclass(frozen=True)
+class MemoryLayout:
+    """Offset and shape of each key; effect states and the trace come last, so that nothing else moves with dt."""
+
+    entries: dict[str, tuple[int, Shape]]
+    size: int
+
+    def view(self, memory: Array, key: str) -> Array:
+        """A writable view (..., shape) of a key in memory (..., size).
+
+        Raises:
+            KeyError: no such key.
+        """
+        offset, shape = self.entries[key]
+        part = memory[..., offset : offset + prod(shape)]
+        part.shape = memory.shape[:-1] + shape  # never a copy
+        return part
+
+
+def plan_memory(topology: Topology, effects: Sequence[type[Effect]], dt: float, trace_rows: int) -> MemoryLayout:
+    """The layout for a topology and the effects that may act on its joints."""
+    C, N, n, joints = topology.chains, len(topology.parent), len(topology.leader), topology.joints
+    keys: list[tuple[Shape, str]] = [
+        ((1,), "dt step seen trace_rows trace_offset reading unsure follows"),
+        ((1,), "time_constant tendon_stiffness tendon_damping contact_torque_limit weighed"),
+        # of each joint: constants, then its state
+        ((joints,), "kp kd compliance static_friction reflected_inertia torque_limit command_torque_limit rate_limit"),
+        ((joints,), "brake friction_creep external_torque angle_offset goal"),
+        ((joints,), "q v filtered limited extra extra_compliance held_back contact"),
+        ((C, ROWS, n), "signals"),
+        # of each chain: its mechanism, then what the last step left
+        ((C, 3), "gravity engine_gravity"),
+        ((C, N), "ratio offset mass spin_inertia armature last_speed last_torque last_bias"),
+        ((C, N, 3), "placement_translation axis com"),
+        ((C, N, 3, 3), "placement_rotation inertia"),
+        ((C, N, N), "last_mass_matrix"),
+        # scratch of one chain at a time
+        ((N + 1, WORK_COLUMNS), "work"),
+        ((N, N), "mass_matrix"),
+        ((N,), "bias weight q_all v_all"),
+        ((n, n), "joint_mass_matrix factor"),
+        ((n,), "joint_bias momentum friction_impulse grip speed side trial joint_acceleration"),
+        ((len(effects),), "state_offset state_size"),
+        *(((joints,), f"active:{effect.name}") for effect in effects),
+        *(((joints, len(effect.parameters)), f"parameters:{effect.name}") for effect in effects),
+        *(((joints, effect.kept(dt)), f"state:{effect.name}") for effect in effects),
+        ((trace_rows, C, ROWS, n), "trace"),
+    ]
+    entries, offset = {}, 0
+    for shape, names in keys:
+        for key in names.split():
+            entries[key] = offset, shape
+            offset += prod(shape)
+    return MemoryLayout(entries, offset)
+
+
+_PHYSICS = (decorator, laws, rigid_body_equations, signals)
 _STEPS = Path(__file__).parent / "steps"
 _ENTRY_POINTS = "entry_points"
 
 
 def load_kernel(topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> ModuleType:
-    """The compiled steps of a plant, see `steps.entry_points`; they can be called inside other compiled code.
-
-    They are in a package of their own: a folder in the cache, and the steps' own.
-    """
+    """The compiled steps of a plant, see `steps.entry_points`, in a package of a folder in the cache and the steps'."""
     plant = kernel_source(topology, effects, layout)
     name = "kernel_" + _fingerprint(plant, effects)
     if name not in sys.modules:
@@ -67,16 +148,13 @@ def _fingerprint(source: str, effects: Sequence[type[Effect]]) -> str:
     for module in _PHYSICS:
         digest.update(inspect.getsource(module).encode())
     for effect in effects:
-        digest.update(_source_of(effect).encode())
+        if effect.__module__ == "__main__" or "<locals>" in effect.__qualname__:
+            raise InputError(
+                f"effect '{effect.__qualname__}' must stand at the top of a file of its own, to be imported"
+            )
+        digest.update(inspect.getsource(sys.modules[effect.__module__]).encode())
     digest.update(f"{numba.__version__} {np.__version__} {sys.version}".encode())
     return digest.hexdigest()[:20]
-
-
-def _source_of(effect: type[Effect]) -> str:
-    module = sys.modules[effect.__module__]
-    if effect.__module__ == "__main__" or "<locals>" in effect.__qualname__:
-        raise InputError(f"effect '{effect.__qualname__}' must stand at the top of a file of its own, to be imported")
-    return inspect.getsource(module)
 
 
 def _write_once(path: Path, source: str) -> None:
@@ -104,27 +182,23 @@ from tactile_cube.compiled import compiled
 
 def kernel_source(topology: Topology, effects: Sequence[type[Effect]], layout: MemoryLayout) -> str:
     """Text of a module with C, N, n, the topology, the offsets into the memory and a function for each stage."""
-    stages = [_stage(stage, effects, layout) for stage in Stage if stage is not Stage.MECHANISM]
-    return _HEADER + "\n".join([*_constants(topology, layout), *_laws(effects), *stages, _ahead(effects, layout)])
-
-
-def _constants(topology: Topology, layout: MemoryLayout) -> list[str]:
-    sizes = f"C, N, n = {topology.chains}, {len(topology.parent)}, {len(topology.leader)}"
-    indices = ("parent", "prismatic", "follow", "leader")
-    offsets = {key: offset for key, (offset, _) in layout.entries.items() if ":" not in key and key != "trace"}
-    return [
-        sizes,
-        *(f"{name.upper()} = np.array({list(getattr(topology, name))}, dtype=np.int64)" for name in indices),
-        *(f"{key.upper()} = {offset}" for key, offset in offsets.items()),
-    ]
-
-
-def _laws(effects: Sequence[type[Effect]]) -> list[str]:
-    return [
+    laws = [
         f'{law}_{index} = compiled(import_module("{effect.__module__}").{effect.__qualname__}.{law})'
         for index, effect in enumerate(effects)
         for law in ("law", "torque_law", "ahead_law")
         if effect.defines(law)
+    ]
+    stages = [_stage(stage, effects, layout) for stage in Stage if stage is not Stage.MECHANISM]
+    return _HEADER + "\n".join([*_constants(topology, layout), *laws, *stages, _ahead(effects, layout)])
+
+
+def _constants(topology: Topology, layout: MemoryLayout) -> list[str]:
+    indices = ("parent", "prismatic", "follow", "leader")
+    offsets = {key: offset for key, (offset, _) in layout.entries.items() if ":" not in key and key != "trace"}
+    return [
+        f"C, N, n = {topology.chains}, {len(topology.parent)}, {len(topology.leader)}",
+        *(f"{name.upper()} = np.array({list(getattr(topology, name))}, dtype=np.int64)" for name in indices),
+        *(f"{key.upper()} = {offset}" for key, offset in offsets.items()),
     ]
 
 

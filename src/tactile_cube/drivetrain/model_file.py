@@ -15,13 +15,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.whole_file import write_whole
 
 OBJECT_EFFECTS = (
-    "lateral_friction",
-    "spinning_friction",
-    "tip_compliance",
-    "object_mass",
-    "object_com",
-    "object_size",
-)
+    "lateral_friction", "spinning_friction", "tip_compliance", "object_mass", "object_com", "object_size"
+)  # fmt: skip
 """Effects of fingertips and object, which `simulation.contact_effects` describes; no joint has them."""
 NOT_NEGATIVE = ("kp", "kd", "torque_limit", "stiffness", "static_friction", "reflected_inertia")
 MAY_BE_INFINITE = ("stiffness", "torque_limit", "rate_limit")
@@ -211,7 +206,6 @@ def write_model(model: ModelFile, path: str | Path) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Dicts and lists in place of a configuration's own containers."""
     if isinstance(value, Mapping):
         return {str(key): _plain(part) for key, part in value.items()}
     return [_plain(part) for part in value] if isinstance(value, Sequence) and not isinstance(value, str) else value

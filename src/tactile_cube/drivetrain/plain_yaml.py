@@ -13,8 +13,7 @@ from tactile_cube import limits
 from tactile_cube.errors import InputError
 from tactile_cube.untrusted_file import read_text
 
-DIGITS = 40
-"""Of a number in a file."""
+DIGITS = 40  # of a number in a file
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
@@ -112,13 +111,9 @@ def describe(error: ValidationError) -> str:
     """The first problem of a validation error in one line, and how many more there are."""
     first, more = error.errors()[0], error.error_count() - 1
     key = ".".join(str(part) for part in first["loc"]) or "the file"
-    received = "" if first["type"] == "missing" else f", received {_short(first['input'])}"
+    value = repr(first["input"])
+    received = "" if first["type"] == "missing" else f", received {value if len(value) <= 60 else f'{value[:57]}...'}"
     return f"key '{key}': {first['msg']}{received}" + (f" (and {more} more)" if more else "")
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _place(error: yaml.YAMLError) -> str:

@@ -1,7 +1,5 @@
 """A drivetrain and the mechanism that it moves, ready to be stepped: one or more equal fingers, any effects."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -11,21 +9,18 @@ import numpy.typing as npt
 
 from tactile_cube.drivetrain.constants import DrivetrainConstants
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
-from tactile_cube.drivetrain.effects.effect import Effect, Place, Stage
-from tactile_cube.drivetrain.kernel import load_kernel
-from tactile_cube.drivetrain.memory_layout import MemoryLayout, Topology, plan_memory
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Place, Stage
+from tactile_cube.drivetrain.kernel import MemoryLayout, Topology, load_kernel, plan_memory
 from tactile_cube.drivetrain.signals import COMMAND, FRICTION, MOTOR_POSITION, POSITION, VELOCITY
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
 
-Array = npt.NDArray[np.float64]
 EffectClass = type[Effect]
 
-_TREE_KEYS = ("ratio", "offset", "placement_rotation", "placement_translation", "axis", "mass", "com", "inertia")
-_CONSTANT_KEYS = ("kp", "kd", "compliance", "static_friction", "reflected_inertia", "torque_limit", "rate_limit")
+TREE_KEYS = ("ratio", "offset", "placement_rotation", "placement_translation", "axis", "mass", "com", "inertia")
+CONSTANT_KEYS = ("kp", "kd", "compliance", "static_friction", "reflected_inertia", "torque_limit", "rate_limit")
 _STARTING_ROWS = {POSITION: "q", VELOCITY: "v", MOTOR_POSITION: "q", COMMAND: "q", FRICTION: "static_friction"}
-CONTACT_TORQUE_LIMIT = 5.0
-"""Largest contact torque that is believed [N m]: 30 N at the outstretched tip of a finger."""
+CONTACT_TORQUE_LIMIT = 5.0  # largest contact torque that is believed [N m]: 30 N at the outstretched tip of a finger
 
 
 LAST_SUBSTEP = 1e9
@@ -52,15 +47,10 @@ class Plant:
         joint_names: Sequence[str] | None = None,
         trace_rows: int = 0,
     ) -> None:
-        """Describe a plant.
+        """Describe a plant: equal chains whose trees may differ in their numbers alone, in steps of `dt` [s].
 
-        Args:
-            trees: one per chain; they may differ in their numbers, not in their structure.
-            dt: step of the physics [s].
-            effects: the effects that can be switched on; each once, in the order in which they act within a stage.
-            joint_names: of all actuated joints, chain by chain; by default the tree's own, with `0/`, `1/` .. before
-                them if there are several chains.
-            trace_rows: steps of the control loop whose signals are kept under the key `trace`.
+        Effects that can be switched on act in this order within a stage. Joints are named chain by chain, by default by
+        the tree with `0/`, `1/` .. before them if there are several. So many steps of the control loop are traced.
 
         Raises:
             InputError: trees of different structure, a step that is not positive.
@@ -95,17 +85,12 @@ class Plant:
         return rows.reshape(*memory.shape[:-1], self.topology.joints)
 
     def memory(
-        self,
-        constants: DrivetrainConstants,
-        gravity: npt.ArrayLike = (0.0, 0.0, -9.81),
-        effects: Sequence[Effect] = (),
+        self, constants: DrivetrainConstants, gravity: npt.ArrayLike = (0.0, 0.0, -9.81), effects: Sequence[Effect] = ()
     ) -> Array:
-        """A memory (size,) at rest at zero, with these constants and effects.
+        """A memory (size,) at rest at zero, with these constants, and effects whose classes are among the plant's.
 
-        Args:
-            constants: of the drivetrain; per-joint values hold n (repeated in every chain) or C n numbers.
-            gravity: (3,) or (C, 3) in the frame of each chain's base [m/s^2].
-            effects: effects to switch on; their classes must be among the plant's.
+        Per-joint constants hold n (repeated in every chain) or C n numbers; gravity (3,) or (C, 3) [m/s^2] is in the
+        frame of each chain's base.
         """
         memory = np.zeros(self.size)
         header = {"dt": self.dt, "trace_rows": self.trace_rows, "reading": LAST_SUBSTEP}
@@ -114,7 +99,7 @@ class Plant:
         states = [self.layout.entries[f"state:{effect.name}"] for effect in self.effects]
         self.view(memory, "state_offset")[...] = [offset for offset, _ in states]
         self.view(memory, "state_size")[...] = [shape[1] for _, shape in states]
-        for key in _TREE_KEYS:
+        for key in TREE_KEYS:
             self.view(memory, key)[...] = np.stack([getattr(tree, key) for tree in self.trees])
         for key in ("gravity", "engine_gravity"):
             self.view(memory, key)[...] = gravity
@@ -129,9 +114,12 @@ class Plant:
 
     def set_constants(self, memory: Array, constants: DrivetrainConstants) -> None:
         """Write the drivetrain's constants into memory (..., size)."""
-        for key in _CONSTANT_KEYS:
+        for key in CONSTANT_KEYS:
             value = np.asarray(getattr(constants, key), dtype=float)
-            self.view(memory, key)[...] = self._per_joint(value, key)
+            size, count = value.shape[-1] if value.ndim else 0, len(self.topology.leader)
+            if size not in (0, count, self.topology.joints):
+                raise InputError(f"drivetrain {key} has {size} values for {count} joints; give one or one each")
+            self.view(memory, key)[...] = np.tile(value, self.topology.chains) if size == count else value
 
     def set_effect(self, memory: Array, effect: EffectClass, joint: str, values: Mapping[str, float | Array]) -> None:
         """Switch an effect on at a joint of memory (..., size); values may be (batch,) arrays.
@@ -162,13 +150,9 @@ class Plant:
         return Place(joint=a, chain=chain, link=link, followers=followers)
 
     def reset(self, memory: Array, q: npt.ArrayLike, v: npt.ArrayLike = 0.0, time: float = 0.0) -> None:
-        """Start anew at positions q and speeds v (..., all joints): filters at q, effects without a past.
+        """Start memory (..., size) anew at positions q [rad] and speeds v [rad/s] (..., all joints) of the links.
 
-        Args:
-            memory: (..., size).
-            q: link-side positions [rad].
-            v: [rad/s].
-            time: of the first step [s].
+        Filters are at q, effects without a past; `time` is that of the first step [s].
         """
         for key in ("q", "filtered", "limited", "goal"):
             self.view(memory, key)[...] = q
@@ -182,12 +166,6 @@ class Plant:
         rows = self.view(memory, "signals")
         for row, key in _STARTING_ROWS.items():
             rows[..., row, :] = self.view(memory, key).reshape(by_chain)
-
-    def _per_joint(self, value: Array, key: str) -> Array:
-        count, every = len(self.topology.leader), self.topology.joints
-        if value.ndim and value.shape[-1] not in (count, every):
-            raise InputError(f"drivetrain {key} has {value.shape[-1]} values for {count} joints; give one or one each")
-        return np.tile(value, self.topology.chains) if value.ndim and value.shape[-1] == count else value
 
     def _index(self, joint: str) -> int:
         if joint not in self.joint_names:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.errors import InputError
 from tactile_cube.run_folder import CONFIGURATION
 

@@ -1,7 +1,5 @@
 """Fingertips from joint angles and back: for any chain of revolute joints, and in closed form for the DLR-Hand II."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +7,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 40
-"""Steps of the search; from the middle of the range, points within reach take five to fifteen."""
-_CLOSE = 1e-7
-"""A tip this near to its target is there [m]."""
-_LONGEST = 0.3
-"""Longest step of a joint in one round [rad]."""
-_FADING = 0.7
-"""How much of the pull towards the middle of the range is left after each round."""
+_ROUNDS = 40  # steps of the search; from the middle of the range, points within reach take five to fifteen
+_CLOSE = 1e-7  # A tip this near to its target is there [m]
+_LONGEST = 0.3  # longest step of a joint in one round [rad]
+_FADING = 0.7  # how much of the pull towards the middle of the range is left after each round
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,6 @@ ICRA 2022; W = the authors' website for it; scene = static transforms of the han
 page, which agree with the public robot description `rokin` (JustinHand12).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -14,19 +12,14 @@ from tactile_cube.hand.chain import PlanarChain
 from tactile_cube.hand.hand import Finger, Hand
 from tactile_cube.hand.urdf import Array, CollisionShape, origin_element
 
-KP = 3.69
-"""Stiffness of the impedance law [N m/rad]. Source: W, table."""
-KD = 0.25
-"""Damping of the impedance law [N m s/rad]. Source: W, table (its picture says 0.28)."""
-STIFFNESS = 25.0
-"""Elasticity K_e between motor and joint [N m/rad]. Source: W, table."""
-STATIC_FRICTION = 0.02
-"""Dry friction of a joint [N m]. Source: W, table (its picture says 0.08 for q3)."""
+KP = 3.69  # stiffness of the impedance law [N m/rad]. Source: W, table.
+KD = 0.25  # damping of the impedance law [N m s/rad]. Source: W, table (its picture says 0.28).
+STIFFNESS = 25.0  # elasticity K_e between motor and joint [N m/rad]. Source: W, table.
+STATIC_FRICTION = 0.02  # dry friction of a joint [N m]. Source: W, table (its picture says 0.08 for q3).
 REFLECTED_INERTIA = 1.5e-3
 """Rotor inertia seen at the joint [kg m^2]. Estimate within 1e-3..2e-3, where the 500 Hz loop is stable with margin;
 gear ratios 120 and 200 with rotors of this size give 1.4e-3..6e-3, critical damping K_D^2 / 4 K_P = 4.2e-3."""
-TORQUE_LIMIT = 1.0
-"""Largest joint torque [N m]. Source: the authors' follow-up, ICRA 2023 page."""
+TORQUE_LIMIT = 1.0  # largest joint torque [N m]. Source: the authors' follow-up, ICRA 2023 page.
 
 _LIMITS = np.radians([(-30.0, 30.0), (-20.0, 86.0), (-10.0, 105.0), (-10.0, 105.0)])
 """Of q1 .. q4 [rad]. Source: W, "theta_min .. theta_max" of the hardware."""
@@ -72,7 +65,10 @@ def _finger(
         mass=np.array([mass for _, mass, _ in LINKS.values()]),
         com=np.array([[0.0, 0.0, along] for _, _, along in LINKS.values()]),
         inertia=np.array([_moments(link) for link in LINKS]),
-        shapes=tuple((_capsule(*_CAPSULES[link]),) if link in _CAPSULES else () for link in LINKS),
+        shapes=tuple(
+            tuple(CollisionShape("capsule", (r, b - a), np.array([0.0, 0.0, 0.5 * (a + b)])) for r, a, b in capsule)
+            for capsule in ([_CAPSULES[link]] if link in _CAPSULES else [] for link in LINKS)
+        ),
         chain=PlanarChain((proximal, middle, _CAPSULES["distal"][2])),
         prefix=f"{name}_",
     )
@@ -86,10 +82,6 @@ def _moments(link: str) -> tuple[float, float, float]:
     return across, across, 0.5 * mass * radius**2
 
 
-def _capsule(radius: float, start: float, end: float) -> CollisionShape:
-    return CollisionShape("capsule", (radius, end - start), np.array([0.0, 0.0, 0.5 * (start + end)]))
-
-
 _LIKE_RING = (-1.63850239, -0.74407776, -1.79289304)
 _LIKE_MIDDLE = (-1.90822554, 0.04794712, -2.36863463)
 _FINGERS = (
@@ -100,12 +92,11 @@ _FINGERS = (
 )
 
 
-def _palm() -> CollisionShape:
-    """A slab under the finger bases, for pictures only: nothing ever reaches it."""
-    bases = np.array([finger.position for finger in _FINGERS])
-    low, high = bases.min(axis=0), bases.max(axis=0)
-    size = (high[0] - low[0], high[1] - low[1] + 0.03, 0.10)
-    return CollisionShape("box", size, np.array([*(0.5 * (low + high))[:2], low[2] - 0.05]))
+_BASES = np.array([finger.position for finger in _FINGERS])
+_LOW, _HIGH = _BASES.min(axis=0), _BASES.max(axis=0)
+_SLAB = (_HIGH[0] - _LOW[0], _HIGH[1] - _LOW[1] + 0.03, 0.10)
+_PALM = CollisionShape("box", _SLAB, np.array([*(0.5 * (_LOW + _HIGH))[:2], _LOW[2] - 0.05]))
+"""A slab under the finger bases, for pictures only: nothing ever reaches it."""
 
 
 def _every_finger(*degrees: float) -> Array:
@@ -127,7 +118,7 @@ DLR_HAND2 = Hand(
     position=np.array([-0.0576, 0.0136, 0.2559]),
     rotation=Rotation.from_euler("ZYX", [191.98, 17.82, 184.69], degrees=True).as_matrix(),
     start_angles=np.radians([14.4, -1.6, 28.0, -3.9, 16.7, 7.1, -16.0, 21.1, 25.9, 9.9, 7.8, 14.2]),
-    palm=(_palm(),),
+    palm=(_PALM,),
 )
 """The hand of the paper, palm down over a cube at the origin."""
 

@@ -59,7 +59,6 @@ class Gait:
     phases: tuple[float, ...] = (0.0, 0.5, 0.0, 0.5)
 
     def __post_init__(self) -> None:
-        """Refuse what no clock can follow: the numbers may be a file's."""
         for key, value in vars(self).items():
             for number in value if key == "phases" else (value,):
                 if not (isinstance(number, int | float) and math.isfinite(number)):
@@ -79,10 +78,7 @@ class Gait:
     def tips(self, step: int, direction: int = -1, around: Array = PLACES) -> Array:
         """Return the targets of the fingertips `(fingers, 3)` [m] at a policy step; direction +1 turns about +z.
 
-        Args:
-            step: policy steps since the start.
-            direction: of the turn.
-            around: where the fingers stand, see `places` (fingers,) [rad].
+        `around` (fingers,) [rad] is where the fingers stand, see `places`.
         """
         holding = 1.0 - self.air_share
         cycle = ((step - self.closing) / self.period + np.array(self.phases)) % 1.0
@@ -90,9 +86,7 @@ class Gait:
         on_cube = phase < holding
         forth = 1.0 - 2.0 * phase / holding
         back = -1.0 + 2.0 * (phase - holding) / self.air_share
-        walk = (
-            -direction * self.swing * np.where(on_cube, forth, back) if step >= self.closing else np.zeros(len(around))
-        )
+        walk = -direction * self.swing * np.where(on_cube, forth, back) * (step >= self.closing)
         angle, radius = around - direction * self.shift + walk, np.where(on_cube, self.pressed, self.lifted)
         return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(len(around), self.height)], axis=1)
 
@@ -127,7 +121,6 @@ class GaitRanges:
     search: Mapping[str, float | str] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse names that no gait has, and bounds that do not fit."""
         known = {field.name for field in fields(Gait)} - {"phases"}
         for name in {*self.low, *self.high}:
             if name not in known or name not in self.low or name not in self.high:

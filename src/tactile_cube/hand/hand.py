@@ -1,7 +1,5 @@
 """What every hand has: fingers around an object, joints with limits, a pose in the world, and drives."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -96,12 +94,12 @@ class Hand:
     columns: tuple[int, ...]
     axes: tuple[int, ...]
     tip_radius: float
-    action_lower: Array
-    action_upper: Array
     position: Array
     rotation: Array
-    start_angles: Array
     palm: tuple[CollisionShape, ...]
+    action_lower: Array = field(default_factory=lambda: np.zeros(0))
+    action_upper: Array = field(default_factory=lambda: np.zeros(0))
+    start_angles: Array = field(default_factory=lambda: np.zeros(0))
     drive: Mapping[str, float | Array] = field(default_factory=dict)
     file: str = ""
     sha256: str = ""
@@ -138,7 +136,6 @@ class Hand:
 
     @cached_property
     def _own(self) -> list[int]:
-        """The links whose joints are actuated."""
         return [self.columns.index(column) for column in range(max(self.columns) + 1)]
 
     def coupled(self) -> tuple[tuple[int, int], ...]:
@@ -232,7 +229,6 @@ class Hand:
         return self.sha256 or hashlib.sha256(self.urdf().encode()).hexdigest()
 
     def _finger_parts(self, finger: Finger, prefix: str, parent: str, base: str) -> list[str]:
-        """Links and joints of a finger whose first joint sits at `base` (an origin element) in the link `parent`."""
         links, joints = [], []
         for k, (link, joint) in enumerate(zip(finger.links, finger.joints, strict=True)):
             name = prefix + link

@@ -1,7 +1,5 @@
 """Where fingertips are, and joint angles with which they stand around an object."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,8 +12,7 @@ from tactile_cube.hand.urdf import Array
 
 _ROOM = 2e-3
 """A point of a face counts as reachable only with this gap [m], so that a grasp and its approach take the same one."""
-_REACHED = 1e-5
-"""A fingertip this near to its target has reached it [m]."""
+_REACHED = 1e-5  # A fingertip this near to its target has reached it [m]
 
 
 def tip_positions(hand: Hand, angles: Array) -> Array:
@@ -40,16 +37,8 @@ def grasp_angles(
     Each finger aims at the middle of its face. Where the action limits forbid that it takes the nearest point of the
     face that they and the finger's length allow, and where there is none the angles that come nearest.
 
-    Args:
-        hand: The hand.
-        cube_size: Edge lengths of the object's bounding box (3,) [m].
-        position: Its centre in the world (3,) [m].
-        quaternion: Its orientation (4,), xyzw.
-        clearance: Gap between tip and object [m].
-        shape: What the object is.
-
-    Returns:
-        Joint angles (joints,) [rad], within the action limits.
+    The object has a bounding box of edges `cube_size` (3,) [m], its centre at `position` (3,) [m] in the world, turned
+    by `quaternion` (4,), xyzw. Angles (joints,) [rad] are within the action limits.
     """
     half = 0.5 * np.asarray(cube_size, dtype=np.float64)
     rotation = Rotation.from_quat(np.asarray(quaternion)).as_matrix()
@@ -58,17 +47,13 @@ def grasp_angles(
     for k, finger in enumerate(hand.fingers):
         gaps = (max(clearance, _ROOM), clearance)
         off, on = (tip_centres(shape, finger.face, half, hand.tip_radius, gap) for gap in gaps)
-        chosen = _first_reachable(hand, k, centre + off @ rotation.T)
+        aims = centre + off @ rotation.T
+        miss = _misses(hand, k, aims[:1])
+        if not miss[0] < _REACHED:  # seldom: else the others need not be looked at
+            miss = _misses(hand, k, aims)
+        chosen = int(np.argmax(miss < _REACHED) if np.any(miss < _REACHED) else np.argmin(miss))
         angles.append(_within_limits(hand, k, centre + on[chosen][None] @ rotation.T)[0])
     return np.concatenate(angles)
-
-
-def _first_reachable(hand: Hand, finger: int, targets: Array) -> int:
-    """Index of the first target that limits and finger length allow, else of the nearest miss."""
-    if _misses(hand, finger, targets[:1])[0] < _REACHED:
-        return 0  # most often: the others need not be looked at
-    miss = _misses(hand, finger, targets)
-    return int(np.argmax(miss < _REACHED) if np.any(miss < _REACHED) else np.argmin(miss))
 
 
 def _misses(hand: Hand, finger: int, targets: Array) -> Array:

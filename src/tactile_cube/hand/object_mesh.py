@@ -55,15 +55,12 @@ class ObjectMesh:
     file: str = ""
 
     def __str__(self) -> str:
-        """What it is called: equal for equal meshes."""
         return f"mesh {hashlib.sha256(self.vertices.tobytes()).hexdigest()[:12]}"
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is a mesh with the same corners."""
         return isinstance(other, ObjectMesh) and (self is other or np.array_equal(self.vertices, other.vertices))
 
     def __hash__(self) -> int:
-        """Of the corners."""
         return hash(self.vertices.tobytes())
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -82,15 +79,9 @@ class ObjectMesh:
         return np.asarray(np.trace(moments) * np.eye(3) - moments)
 
     def surface(self, size: Array, origins: Array, directions: Array) -> tuple[Array, Array]:
-        """Where rays from inside leave the solid.
+        """Where rays from `origins` (n, 3) along unit vectors `directions` (n, 3) leave the solid of `size` (3,) [m].
 
-        Args:
-            size: edges of the bounding box (3,) [m].
-            origins: (n, 3) [m].
-            directions: unit vectors (n, 3).
-
-        Returns:
-            Points (k, 3) [m] and outward normals (k, 3), k <= n: of the rays that begin inside.
+        Gives points (k, 3) [m] and outward normals (k, 3) of the k <= n rays that begin inside.
         """
         planes = ConvexHull(self.vertices * size).equations  # normal @ x + offset <= 0 inside
         depth = -(origins @ planes[:, :3].T + planes[:, 3])
@@ -104,15 +95,9 @@ class ObjectMesh:
 
 
 def read_mesh(file: str | Path, scale: float = 1.0, hull: bool = False) -> tuple[ObjectMesh, Array]:
-    """Read an OBJ or STL file, whose axes are the object's.
+    """Read an OBJ or STL file, whose axes are the object's, and the edges of its bounding box (3,) [m].
 
-    Args:
-        file: of the mesh.
-        scale: metres per unit of the file.
-        hull: whether a hollow or open mesh may be taken as its convex hull.
-
-    Returns:
-        The mesh and the edges of its bounding box (3,) [m].
+    `scale` is metres per unit of the file; with `hull` a hollow or open mesh is taken as its convex hull.
 
     Raises:
         InputError: there is no such file, no mesh in it, its size is none for fingers, or it is not convex.
@@ -202,10 +187,8 @@ ObjectShape = NamedShape | ObjectMesh
 its ends, which is a sphere where z equals x; or a convex mesh."""
 SHAPES: tuple[NamedShape, ...] = get_args(NamedShape)
 
-_SHARE = 0.7
-"""How far from the middle of a side towards its edges a fingertip is put."""
-_ARC = np.radians(30.0)
-"""The same around a round side [rad]."""
+_SHARE = 0.7  # how far from the middle of a side towards its edges a fingertip is put
+_ARC = np.radians(30.0)  # the same around a round side [rad]
 
 
 def straight_half(half: Array) -> float:
@@ -215,37 +198,31 @@ def straight_half(half: Array) -> float:
 
 def unit_inertia(shape: ObjectShape, size: Array) -> Array:
     """Inertia (3, 3) [m^2] about the centre of mass of a solid of 1 kg with a bounding box `size` (3,) [m]."""
-    return shape.inertia(size) if isinstance(shape, ObjectMesh) else np.diag(_moments(shape, size))
-
-
-def _moments(shape: NamedShape, size: Array) -> Array:
+    if isinstance(shape, ObjectMesh):
+        return shape.inertia(size)
     if shape == "box":
-        return np.asarray((np.sum(size**2) - size**2) / 12.0)
+        return np.diag((np.sum(size**2) - size**2) / 12.0)
     radius = 0.5 * float(size[0])
     if shape == "cylinder":
         across = (3.0 * radius**2 + float(size[2]) ** 2) / 12.0
-        return np.array([across, across, 0.5 * radius**2])
+        return np.diag([across, across, 0.5 * radius**2])
     length = 2.0 * straight_half(0.5 * size)
     bar = length / (length + 4.0 / 3.0 * radius)  # share of the mass in the straight part
     ends = 1.0 - bar
     across = bar * (3.0 * radius**2 + length**2) / 12.0
     across += ends * (0.4 * radius**2 + 0.25 * length**2 + 0.375 * length * radius)
-    return np.array([across, across, (0.5 * bar + 0.4 * ends) * radius**2])
+    return np.diag([across, across, (0.5 * bar + 0.4 * ends) * radius**2])
 
 
 def tip_centres(shape: ObjectShape, side: Array, half: Array, radius: float, gap: float) -> Array:
     """Centres (n, 3) [m] of a sphere that stands at a side of the object, the most wanted place first.
 
-    Args:
-        shape: what the object is.
-        side: horizontal unit vector towards the finger (3,), in the object's frame.
-        half: half the edges of its bounding box (3,) [m].
-        radius: of the sphere [m].
-        gap: between sphere and object [m]; negative: it presses.
+    `side` (3,) is the horizontal unit vector towards the finger, in the object's frame, `half` (3,) half the edges of
+    its bounding box, `gap` between sphere and object [m]; negative: it presses.
     """
     if shape == "box":
-        face, aim = _face_of(side, half)
-        return np.asarray(face * (half + radius + gap) + _on_face(face, half, aim))
+        face, places = _on_face(side, half)
+        return np.asarray(face * (half + radius + gap) + places)
     height = straight_half(half) if shape == "capsule" else half[2]
     turns, ups = np.linspace(-_ARC, _ARC, 15), np.linspace(-_SHARE, _SHARE, 9) * height
     turn, up = (grid.ravel() for grid in np.meshgrid(turns, ups, indexing="ij"))
@@ -261,20 +238,20 @@ def tip_centres(shape: ObjectShape, side: Array, half: Array, radius: float, gap
     return np.stack([reach * np.cos(angle), reach * np.sin(angle), up[order]], axis=1)
 
 
-def _face_of(side: Array, half: Array) -> tuple[Array, Array]:
-    """Outward normal (3,) of the face that a ray from the middle meets, and where, from the face's middle (3,)."""
+def _on_face(side: Array, half: Array) -> tuple[Array, Array]:
+    """Outward normal (3,) of the face that a ray from the middle meets, and a grid on it, nearest to the ray first.
+
+    The grid (n, 3) [m] is relative to the face's middle.
+    """
     axis = int(np.argmax(np.abs(side) / half))
-    normal = np.zeros(3)
-    normal[axis] = np.sign(side[axis])
-    if np.array_equal(normal, side):
-        return np.asarray(side, dtype=np.float64), np.zeros(3)
-    return normal, np.asarray(side * (half[axis] / abs(side[axis])) * (1.0 - np.abs(normal)))
-
-
-def _on_face(face: Array, half: Array, aim: Array) -> Array:
-    """Grid of points on a face relative to its middle (n, 3) [m], nearest to `aim` first."""
+    face, aim = np.zeros(3), np.zeros(3)
+    face[axis] = np.sign(side[axis])
+    if np.array_equal(face, side):
+        face = np.asarray(side, dtype=np.float64)
+    else:
+        aim = side * (half[axis] / abs(side[axis])) * (1.0 - np.abs(face))
     sideways = np.cross([0.0, 0.0, 1.0], face)
     across = np.linspace(-_SHARE, _SHARE, 15) * float(np.abs(sideways) @ half)
     up = np.linspace(-_SHARE, _SHARE, 9) * half[2]
     grid = np.array([s * sideways + np.array([0.0, 0.0, z]) for s in across for z in up])
-    return grid[np.argsort(np.linalg.norm(grid - aim, axis=1), kind="stable")]
+    return face, grid[np.argsort(np.linalg.norm(grid - aim, axis=1), kind="stable")]

@@ -127,14 +127,7 @@ class RigidBodyTree:
         return M, h
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, gravity: Array) -> Array:
-        """Torques (samples, n) [N m] of the drives that make actuated joints move so, rotors apart.
-
-        Args:
-            q: actuated positions (samples, n).
-            v: their velocities.
-            a: their accelerations.
-            gravity: (3,) in the base.
-        """
+        """Torques (samples, n) [N m] of the drives that move actuated joints by q, v, a (samples, n), rotors apart."""
         J = self.coupling
         taken = np.empty_like(q)
         for k, (position, speed) in enumerate(zip(q, v, strict=True)):

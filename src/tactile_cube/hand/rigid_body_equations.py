@@ -67,15 +67,6 @@ def _carried(spin: Vector, spin_rate: Vector, arm: Vector) -> Vector:
 
 
 @compiled_once
-def _start_base(gravity: Array, work: Array) -> None:
-    for column in range(WORK_COLUMNS):
-        work[0, column] = 0.0
-    for i in range(3):
-        work[0, ROTATION + 4 * i] = 1.0
-        work[0, ACCELERATION + i] = -gravity[i]
-
-
-@compiled_once
 def _turn(work: Array, before: int, row: int, placement: Array, axis: Vector, angle: float) -> None:
     """Orientation of a link, parent * placement * rotation about `axis` (Rodrigues), and its axis, in the base."""
     co, si = (cos(angle), sin(angle)) if angle != 0.0 else (1.0, 0.0)
@@ -112,15 +103,8 @@ def _inertia_times(work: Array, row: int, inertia: Array, vector: Vector) -> Vec
     """R I R^T applied to a vector in base coordinates."""
     x, y, z = _at(work, row, 0), _at(work, row, 3), _at(work, row, 6)
     local = _add(_add(_scaled(x, vector[0]), _scaled(y, vector[1])), _scaled(z, vector[2]))
-    return _rotated(
-        work,
-        row,
-        (
-            inertia[0, 0] * local[0] + inertia[0, 1] * local[1] + inertia[0, 2] * local[2],
-            inertia[1, 0] * local[0] + inertia[1, 1] * local[1] + inertia[1, 2] * local[2],
-            inertia[2, 0] * local[0] + inertia[2, 1] * local[1] + inertia[2, 2] * local[2],
-        ),
-    )
+    a, b, c = _at(inertia, 0, 0), _at(inertia, 1, 0), _at(inertia, 2, 0)
+    return _rotated(work, row, (_dot(a, local), _dot(b, local), _dot(c, local)))
 
 
 @compiled_once
@@ -169,25 +153,16 @@ def mass_matrix_and_bias(
     M: Array,
     h: Array,
 ) -> None:
-    """Mass matrix and bias torques (Coriolis, centrifugal, gravity) of all degrees of freedom: M a + h = tau.
+    """Mass matrix M (N, N) and bias h (N,) (Coriolis, centrifugal, gravity) of all dofs, written: M a + h = tau.
 
-    Args:
-        parent: (N,) index of each link's parent, -1 for the base; parents come first.
-        prismatic: (N,) 1 where the joint slides, 0 where it turns.
-        rotation: (N, 3, 3) orientation of each joint frame in its parent's frame.
-        translation: (N, 3) its origin there [m].
-        axis: (N, 3) unit axis in the joint frame.
-        mass: (N,) [kg].
-        com: (N, 3) centre of mass in the link's frame [m].
-        inertia: (N, 3, 3) about the centre of mass, in the link's axes [kg m^2].
-        q: (N,) positions [rad or m].
-        v: (N,) velocities.
-        gravity: (3,) in the base frame [m/s^2].
-        work: (N + 1, WORK_COLUMNS) scratch; afterwards it holds the links' poses and spins.
-        M: (N, N) written [kg m^2].
-        h: (N,) written [N m].
+    At positions q and velocities v (N,), gravity (3,) in the base frame; parent to inertia as in `RigidBodyTree`.
+    `work` (N + 1, WORK_COLUMNS) is scratch; afterwards it holds the links' poses and spins.
     """
-    _start_base(gravity, work)
+    for column in range(WORK_COLUMNS):
+        work[0, column] = 0.0
+    for i in range(3):
+        work[0, ROTATION + 4 * i] = 1.0
+        work[0, ACCELERATION + i] = -gravity[i]
     for k in range(len(parent)):
         before, row = parent[k] + 1, k + 1
         _turn(work, before, row, rotation[k], _at(axis, k, 0), 0.0 if prismatic[k] else q[k])

@@ -1,7 +1,5 @@
 """Writing URDF text: elements that every mechanism has, shapes, and other masses for the links of one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -38,14 +36,9 @@ class CollisionShape:
 
 
 def with_inertias(urdf: str, links: Sequence[str], mass: Array, com: Array, inertia: Array) -> str:
-    """The same robot with other masses of its links.
+    """The same robot with other masses (n,) [kg] of some links.
 
-    Args:
-        urdf: Its description.
-        links: Names of the links to change.
-        mass: (n,) [kg].
-        com: Centres of mass in the link's frame (n, 3) [m].
-        inertia: About the centre of mass in the link's axes (n, 3, 3) [kg m^2].
+    Centres of mass (n, 3) [m] and inertias about them (n, 3, 3) [kg m^2] are in the links' frames.
     """
     robot = ElementTree.fromstring(urdf)
     for k, name in enumerate(links):

@@ -14,12 +14,9 @@ from tactile_cube.errors import InputError
 
 Array = npt.NDArray[np.float64]
 MOVABLE = ("revolute", "continuous", "prismatic")
-FREE = ("floating", "planar")
-"""Types of joints without a drive; their links are held where the URDF puts them."""
-ROUNDING = 0.02
-"""Share of the largest principal moment that rounded numbers may lack to those of a body."""
-NO_INERTIA = 1e-15
-"""[kg m^2] A moment that is rounding of zero: a milligram of 1 mm has 1e-13."""
+FREE = ("floating", "planar")  # types of joints without a drive; their links are held where the URDF puts them
+ROUNDING = 0.02  # share of the largest principal moment that rounded numbers may lack to those of a body
+NO_INERTIA = 1e-15  # [kg m^2] A moment that is rounding of zero: a milligram of 1 mm has 1e-13
 
 
 @dataclass(frozen=True)
@@ -62,8 +59,9 @@ class Body:
         if mass == 0.0:
             return Body(0.0, self.com, self.inertia + other.inertia)
         com = (self.mass * self.com + other.mass * other.com) / mass
-        inertia = sum((b.inertia + b.mass * _square(b.com - com) for b in (self, other)), np.zeros((3, 3)))
-        return Body(mass, com, inertia)
+        arms = ((b, b.com - com) for b in (self, other))
+        moved = (b.inertia + b.mass * (r @ r * np.eye(3) - np.outer(r, r)) for b, r in arms)
+        return Body(mass, com, sum(moved, np.zeros((3, 3))))
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,11 @@ def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
     if kind not in (*MOVABLE, *FREE, "fixed"):
         raise InputError(f"URDF: joint '{name}' has type '{kind}'; use one of {', '.join(MOVABLE)} or fixed")
     parent, child = (_linked(element, end, name, bodies) for end in ("parent", "child"))
-    limit = element.find("limit")
+    limit, mimic, coupling = element.find("limit"), element.find("mimic"), None
+    if mimic is not None and kind in MOVABLE:
+        where = f"the <mimic> of joint '{name}'"
+        ratio, offset = number(mimic, "multiplier", where, 1.0), number(mimic, "offset", where, 0.0)
+        coupling = Mimic(attribute(mimic, "joint", where), ratio, offset)
     bounded = kind != "continuous" and limit is not None and not {"lower", "upper"}.isdisjoint(limit.keys())
     return Joint(
         name=name,
@@ -122,7 +124,7 @@ def joint_of(element: ElementTree.Element, bodies: Mapping[str, Body]) -> Joint:
         upper=_end(limit, "upper", name) if bounded else np.inf,
         velocity=_strength(limit, "velocity", name),
         effort=_strength(limit, "effort", name),
-        coupling=_mimic(element, name) if kind in MOVABLE else None,
+        coupling=coupling,
         body=bodies[child],
     )
 
@@ -137,15 +139,6 @@ def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
     """A limit of speed or torque; exporters also write 0 or -1 where they know none."""
     value = _end(limit, key, joint)
     return value if value > 0.0 else float("inf")
-
-
-def _mimic(element: ElementTree.Element, name: str) -> Mimic | None:
-    mimic = element.find("mimic")
-    if mimic is None:
-        return None
-    where = f"the <mimic> of joint '{name}'"
-    ratio, offset = number(mimic, "multiplier", where, 1.0), number(mimic, "offset", where, 0.0)
-    return Mimic(attribute(mimic, "joint", where), ratio, offset)
 
 
 def body_of(link: ElementTree.Element) -> Body:
@@ -262,8 +255,3 @@ def _linked(element: ElementTree.Element, end: str, name: str, bodies: Mapping[s
     if link not in bodies:
         raise InputError(f"URDF: the {end} link '{link}' of joint '{name}' is not defined; add <link name=.../>")
     return link
-
-
-def _square(r: Array) -> Array:
-    """|r|^2 1 - r r^T, the inertia of a unit point mass."""
-    return np.asarray(r @ r * np.eye(3) - np.outer(r, r))

@@ -1,7 +1,5 @@
 """A hand of one's own: any number of fingers with equally many joints, from its URDF and a short description."""
 
-from __future__ import annotations
-
 import hashlib
 import warnings
 from collections.abc import Mapping, Sequence
@@ -14,20 +12,133 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
+from tactile_cube.hand.chain import Chain
 from tactile_cube.hand.hand import Finger, Hand
 from tactile_cube.hand.kinematics import grasp_angles
 from tactile_cube.hand.rigid_body import RigidBodyTree
-from tactile_cube.hand.urdf import Array
-from tactile_cube.hand.urdf_finger import read_finger, read_shapes
-from tactile_cube.hand.urdf_tree import package_of, with_own_files
+from tactile_cube.hand.urdf import Array, CollisionShape, origin_element
+from tactile_cube.hand.urdf_elements import Placement, number, placement_of, triple
+from tactile_cube.hand.urdf_tree import package_of, require_mesh, with_own_files
 from tactile_cube.untrusted_file import read_text
 
-DESCRIPTIONS = Path(__file__).parent / "descriptions"
-"""URDFs that the package ships."""
-LARGEST_TIP = 0.1
-"""Radius of a fingertip [m]: a ball for a hand."""
-NOMINAL_OBJECT = (0.08, 0.08, 0.08)
-"""That the start angles are for where a description names none [m]."""
+
+def read_shapes(robot: ElementTree.Element, tree: RigidBodyTree, carrier: int, turn: Array) -> list[CollisionShape]:
+    """Collision shapes of all links that move with dof `carrier` (-1: with none), seen from axes (3, 3) in its frame.
+
+    The files that the robot, of which `tree` was read, names have absolute names.
+
+    Raises:
+        InputError: a shape that no engine has, a mesh that none reads.
+    """
+    shapes = []
+    for link in robot.findall("link"):
+        name = str(link.get("name"))
+        dof, place = tree.homes[name]
+        for collision in link.findall("collision") if dof == carrier else ():
+            geometry, where = collision.find("geometry"), f"link '{name}'"
+            kinds = list(geometry) if geometry is not None else []
+            if len(kinds) != 1:
+                raise InputError(f"URDF: a <collision> of {where} has {len(kinds)} geometries; give one")
+            at = place.then(placement_of(collision, where))
+            seen = Placement(turn.T @ at.rotation, turn.T @ at.translation)
+            shapes.append(_shape(kinds[0], seen, where))
+    return shapes
+
+
+def _shape(element: ElementTree.Element, at: Placement, where: str) -> CollisionShape:
+    kind = element.tag
+    if kind == "box":
+        return CollisionShape("box", tuple(triple(element, "size", where).tolist()), at.translation, at.rotation)
+    if kind == "sphere":
+        return CollisionShape("sphere", (number(element, "radius", where, 0.0),), at.translation, at.rotation)
+    if kind == "cylinder" or kind == "capsule":
+        size = (number(element, "radius", where, 0.0), number(element, "length", where, 0.0))
+        return CollisionShape("cylinder" if kind == "cylinder" else "capsule", size, at.translation, at.rotation)
+    if kind == "mesh":
+        scale = tuple(triple(element, "scale", where).tolist()) if element.get("scale") else (1.0, 1.0, 1.0)
+        file = Path(element.get("filename", ""))
+        require_mesh(file, where)
+        return CollisionShape("mesh", scale, at.translation, at.rotation, str(file))
+    raise InputError(f"URDF: {where} has the shape <{kind}>; use box, sphere, cylinder, capsule or mesh")
+
+
+def read_finger(
+    text: str, name: str, joints: tuple[str, ...], tip: str, face: Array, where: str
+) -> tuple[Finger, tuple[int, ...]]:
+    """Cut a finger out of a URDF whose files have absolute names; also the actuated joint that each joint moves with.
+
+    Products of inertia about a joint's axis are left out: beside the rotor's inertia, which acts there, they vanish.
+    `joints` are actuated, from the palm to the tip; the origin of link `tip` is the middle of the fingertip; errors
+    begin with `where`.
+
+    Raises:
+        InputError: joints that form no chain of revolute joints, a tip elsewhere, links without mass.
+    """
+    tree = RigidBodyTree.from_urdf(text, joints)
+    _require_chain(tree, joints, where)
+    last, tip_place = tree.homes.get(tip, (-1, Placement()))
+    if last != tree.dofs - 1:
+        raise InputError(f"{where}.tip is '{tip}', no link that joint '{tree.dof_names[-1]}' carries; name one")
+    robot = ElementTree.fromstring(text)
+    turns = [_principal_axes(tree.axis[k], tree.inertia[k]) for k in range(tree.dofs)]
+    before = [np.eye(3), *turns]
+    rotations = [before[k].T @ tree.placement_rotation[k] @ turns[k] for k in range(tree.dofs)]
+    translations = [before[k].T @ tree.placement_translation[k] for k in range(tree.dofs)]
+    columns = tuple(int(column) for column in tree.follow)
+    finger = Finger(
+        name=name,
+        position=translations[0],
+        rotation=rotations[0],
+        face=face,
+        joints=tree.dof_names,
+        links=tree.link_names,
+        limits=np.stack([tree.lower, tree.upper], axis=1),
+        origins=tuple(map(origin_element, translations[1:], rotations[1:])),
+        mass=tree.mass,
+        com=np.stack([turn.T @ com for turn, com in zip(turns, tree.com, strict=True)]),
+        inertia=np.stack([np.diag(turn.T @ own @ turn) for turn, own in zip(turns, tree.inertia, strict=True)]),
+        shapes=tuple(tuple(read_shapes(robot, tree, k, turn)) for k, turn in enumerate(turns)),
+        chain=Chain(np.array(rotations[1:]), np.array(translations[1:]), columns, turns[-1].T @ tip_place.translation),
+    )
+    return finger, columns
+
+
+def _require_chain(tree: RigidBodyTree, joints: tuple[str, ...], where: str) -> None:
+    actuated = tuple(name for k, name in enumerate(tree.dof_names) if name in joints)
+    if list(tree.parent) != list(range(-1, tree.dofs - 1)) or actuated != joints:
+        raise InputError(f"{where}.joints are {', '.join(joints)}; list a chain, from the palm to the tip")
+    for k, name in enumerate(tree.dof_names):
+        if tree.prismatic[k]:
+            raise InputError(f"{where}: joint '{name}' slides; fingers have revolute joints")
+        if not np.all(np.isfinite([tree.lower[k], tree.upper[k]])):
+            raise InputError(f"{where}: joint '{name}' has no limits; give it <limit lower= upper=> [rad]")
+        if not tree.lower[k] < tree.upper[k]:
+            raise InputError(
+                f"{where}: joint '{name}' has the limits {tree.lower[k]:g} to {tree.upper[k]:g} rad; lower < upper"
+            )
+        if not (tree.ratio[k] == 1.0 and tree.offset[k] == 0.0):
+            raise InputError(
+                f"{where}: joint '{name}' follows another with a ratio other than 1; that is not simulated"
+            )
+        if not tree.mass[k] > 0.0:
+            raise InputError(f"{where}: what joint '{name}' carries has no mass; give its link <inertial>")
+
+
+def _principal_axes(axis: Array, inertia: Array) -> Array:
+    """Axes (3, 3) of which z is `axis` (3,) and x, y are principal for `inertia` (3, 3) seen along it."""
+    least = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(least, axis)
+    x /= np.linalg.norm(x)
+    frame = np.stack([x, np.cross(axis, x), axis], axis=1)
+    seen = frame.T @ inertia @ frame
+    angle = 0.5 * np.arctan2(2.0 * seen[0, 1], seen[0, 0] - seen[1, 1])
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+DESCRIPTIONS = Path(__file__).parent / "descriptions"  # URDFs that the package ships
+LARGEST_TIP = 0.1  # radius of a fingertip [m]: a ball for a hand
+NOMINAL_OBJECT = (0.08, 0.08, 0.08)  # that the start angles are for where a description names none [m]
 
 
 def hand_from_urdf(
@@ -88,11 +199,8 @@ def hand_from_urdf(
         columns=columns[0],
         axes=(2,) * len(columns[0]),
         tip_radius=float(tip_radius),
-        action_lower=np.zeros(0),
-        action_upper=np.zeros(0),
         position=_vector("position", position),
         rotation=Rotation.from_euler("xyz", _vector("rotation", rotation)).as_matrix(),
-        start_angles=np.zeros(0),
         palm=tuple(read_shapes(ElementTree.fromstring(text), moving, -1, np.eye(3))),
         drive={key: np.asarray(value) if np.ndim(value) else float(value) for key, value in (drive or {}).items()},  # type: ignore[arg-type]
         file=file.name,
@@ -114,11 +222,7 @@ def hand_from_urdf(
 
 
 def urdf_file(urdf: str) -> Path:
-    """Return the file that a hand's `urdf` means.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Return the file that a hand's `urdf` means; an InputError if there is none."""
     file = next((at for at in (Path(urdf), DESCRIPTIONS / urdf) if at.exists()), None)
     if file is None:
         raise InputError(f"hand.urdf={urdf}: no such file, nor one of the package's in {DESCRIPTIONS.name}/")

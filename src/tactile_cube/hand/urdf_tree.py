@@ -3,8 +3,6 @@
 Fixed and locked joints disappear: what hangs on them is merged into the link before them.
 """
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
@@ -28,8 +26,7 @@ from tactile_cube.hand.urdf_elements import (
 from tactile_cube.untrusted_file import below, regular
 
 XACRO = "URDF: it is a xacro file, which other programs turn into a URDF; run xacro first: xacro FILE > robot.urdf"
-UNEXPANDED = re.compile(r"\$[{(]")
-"""What xacro would replace in an attribute."""
+UNEXPANDED = re.compile(r"\$[{(]")  # what xacro would replace in an attribute
 Homes = dict[str, tuple[str, Placement]]
 """The link that each link moves with, itself or the root's included, and where its frame is in that link's."""
 
@@ -173,16 +170,9 @@ PARTS = re.compile(r"^\s*(?:mtllib|map_\w+|bump|disp|decal|refl|norm)\s(.+)$", r
 
 
 def with_own_files(urdf: str, file: Path, root: Path, shapes: tuple[str, ...] = SHAPES) -> tuple[str, list[str]]:
-    """Return a URDF whose files all lie below a folder and have absolute names.
+    """Return a URDF, read from `file`, whose files lie below `root` and have absolute names, with `shapes` alone.
 
-    Args:
-        urdf: the text.
-        file: that it was read from, which names are relative to.
-        root: folder of the robot's files, which `package://NAME/` stands for.
-        shapes: kinds to keep.
-
-    Returns:
-        The text without shapes whose files lie elsewhere or are not there, and why each was left out.
+    `package://NAME/` stands for the root. Shapes whose files lie elsewhere or are not there are left out; why is said.
 
     Raises:
         InputError: no URDF, or elements nested too deeply.
@@ -230,7 +220,6 @@ def require_mesh(file: Path, where: str) -> None:
 
 
 def _require_parts(file: Path) -> list[Path]:
-    """Files that an OBJ file or a material names, all below its folder."""
     lines = PARTS.findall(file.read_text(encoding="utf-8", errors="replace"))
     return [below(file.parent, word, str(file)) for line in lines for word in line.split()]
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.effect import Effect
 from tactile_cube.drivetrain.model_file import ModelErrors, ModelFile

@@ -334,9 +334,11 @@ def trials_from_rest(recording: Recording, kind: str, commands: Array) -> list[T
         (trial.initialisation, tuple(trial.position[0] if recording.torque_controlled else commands[0]))
         for trial in reversed(recording.trials)
     ]
+    starts = [*reversed(dict.fromkeys(starts))]
+    signals = [(number, (time, commands, np.tile(start, (len(time), 1)))) for number, start in starts]
     return [
-        Trial(kind, "", kind, number, time, commands, np.tile(start, (len(time), 1)), None, valid, recording.gains)
-        for number, start in reversed(dict.fromkeys(starts))
+        Trial(*own, name=kind, file="", kind=kind, initialisation=number, valid=valid, gains=recording.gains)
+        for number, own in signals
     ]
 
 

@@ -1,7 +1,5 @@
 """The sizes of a recording's joints: what every bound, usual size and start of a number follows from."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,26 +38,18 @@ def joint_scales(recording: Recording) -> tuple[Scales, ...]:
     own = [tree.dof_names.index(name) for name in tree.joint_names]
     slides = tree.prismatic[own]
     limits = np.full(len(own), np.inf) if recording.torque_controlled else recording.gains.torque_limit
+    levers = np.where(slides, spans, np.sqrt(links / masses))
+    columns = {"torque": usual, "often": often, "seldom": seldom, "low": low, "high": low + spans, "speed": speeds}
+    columns |= {"command_speed": command_speed, "inertia": inertia, "mass": masses, "lever": levers}
+    columns |= {"torque_limit": limits, "lower": tree.lower[own], "upper": tree.upper[own]}
     return tuple(
         Scales(
-            torque=float(usual[j]),
-            often=float(often[j]),
-            seldom=float(seldom[j]),
-            low=float(low[j]),
-            high=float(low[j] + spans[j]),
-            speed=float(speeds[j]),
-            command_speed=float(command_speed[j]),
-            inertia=float(inertia[j]),
-            mass=float(masses[j]),
-            lever=float(spans[j] if slides[j] else np.sqrt(links[j] / masses[j])),
+            **{key: float(values[j]) for key, values in columns.items()},
             time=time,
             slides=bool(slides[j]),
             neighbours=len(spans) - 1,
             leads=joint in leaders,
             first=j == 0,
-            torque_limit=float(limits[j]),
-            lower=float(tree.lower[own[j]]),
-            upper=float(tree.upper[own[j]]),
         )
         for j, joint in enumerate(recording.joints)
     )

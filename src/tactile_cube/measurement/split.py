@@ -38,10 +38,8 @@ def held_out_split(recording: Recording, share: float = 0.33, seed: int = 0) -> 
             for index in rng.permutation(members)[:count]:
                 chosen[int(index)] = True
     trials = list(zip(recording.trials, chosen, strict=True))
-    return (
-        recording.with_trials([trial for trial, held_out in trials if not held_out]),
-        recording.with_trials([trial for trial, held_out in trials if held_out]),
-    )
+    fitted, judged = ([trial for trial, out in trials if out is wanted] for wanted in (False, True))
+    return recording.with_trials(fitted), recording.with_trials(judged)
 
 
 TESTED = 0.15  # of all trials
@@ -66,7 +64,5 @@ def with_test_part(fitted: Recording, trials: int, seed: int = 0) -> tuple[Recor
     if not chosen:
         return fitted, None
     rows = list(enumerate(fitted.trials))
-    return (
-        fitted.with_trials([trial for index, trial in rows if index not in chosen]),
-        fitted.with_trials([trial for index, trial in rows if index in chosen]),
-    )
+    kept, tested = ([trial for k, trial in rows if (k in chosen) is test] for test in (False, True))
+    return fitted.with_trials(kept), fitted.with_trials(tested)

@@ -1,18 +1,20 @@
 """Distributions as values; the constants and the start of one episode drawn from them."""
 
-from tactile_cube.randomization.distributions import (
+from tactile_cube.randomization.grasp_starts import Grasps, GraspStarts, GraspTable, StartPoses, StartStates
+from tactile_cube.randomization.identified import identified
+from tactile_cube.randomization.randomization import (
     Choice,
     Constant,
     Distribution,
     EffectRange,
+    Learnability,
     LogUniform,
+    Randomization,
     Uniform,
     UniformPerJoint,
+    drawn_places,
     sample,
 )
-from tactile_cube.randomization.grasp_starts import Grasps, GraspStarts, GraspTable, StartPoses, StartStates
-from tactile_cube.randomization.identified import identified
-from tactile_cube.randomization.randomization import Learnability, Randomization, drawn_places
 
 __all__ = [
     "Choice",

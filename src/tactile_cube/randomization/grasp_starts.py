@@ -12,20 +12,16 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand, grasp_angles
-from tactile_cube.randomization.distributions import sample
-from tactile_cube.randomization.randomization import Randomization
+from tactile_cube.randomization.randomization import Array, Randomization, sample
 from tactile_cube.simulation import EpisodeConstants, Start
 from tactile_cube.untrusted_file import read_npz
 from tactile_cube.whole_file import write_npz
 
-Array = NDArray[np.float64]
-MOST = 10_000
-"""Start poses; inverse kinematics is solved for each."""
+MOST = 10_000  # start poses; inverse kinematics is solved for each
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,6 @@ class StartStates:
     clearance: float = 0.001
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
         if not 1 <= self.poses <= MOST:
             raise InputError(f"start.poses is {self.poses}; give 1 to {MOST}")
         if not 0.0 <= self.yaw_range < 0.25 * np.pi:
@@ -174,7 +169,6 @@ class GraspStarts:
     share: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuses values without a meaning."""
         if not 0.0 < self.share <= 1.0:
             raise InputError(f"start.share is {self.share}; give a part above 0, at most 1")
 

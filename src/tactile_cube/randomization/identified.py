@@ -1,24 +1,27 @@
 """What a model file says about the drive, as nominal constants, ranges and effects of the training world."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect, Stage, resolve
 from tactile_cube.drivetrain.effects.catalogue import matching_joints
 from tactile_cube.drivetrain.model_file import Estimate, ModelFile
 from tactile_cube.errors import InputError
-from tactile_cube.randomization.distributions import Constant, Distribution, EffectRange, Uniform, UniformPerJoint
-from tactile_cube.randomization.randomization import Randomization
+from tactile_cube.randomization.randomization import (
+    Array,
+    Constant,
+    Distribution,
+    EffectRange,
+    Randomization,
+    Uniform,
+    UniformPerJoint,
+)
 from tactile_cube.simulation import EpisodeConstants
 from tactile_cube.simulation.contact_effects import contact_catalogue
 
-Array = NDArray[np.float64]
 UNSEEN = 1e-4  # [rad] span of the offsets below which they were not observed: an axis along gravity shows none
 PER_JOINT = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "friction_creep")
 
@@ -29,13 +32,8 @@ def identified(
     """The hand that was identified: values in place of nominal ones, intervals in place of ranges, effects added.
 
     A model of one finger (q1, q2, q3) stands for all four. Constants that were fitted are drawn from their intervals;
-    those that were not keep the relative range of `randomization` around the model's value.
-
-    Args:
-        model: what `identify` or `diagnose` wrote.
-        constants: nominal, of what the model does not mention.
-        randomization: ranges of the same.
-        joints: the hand's joints, in the order of the constants' vectors.
+    those that were not keep the relative range of `randomization` around the model's value. `joints` are the hand's, in
+    the order of the constants' vectors.
 
     Raises:
         InputError: joints, effects or limits that the hand does not have.
@@ -55,6 +53,10 @@ def identified(
     if len(limits) > 1:
         raise InputError(f"model of {model.rig}: torque limits {sorted(limits)} N m differ; the hand has one for all")
     limit = min(limits, default=constants.torque_limit)
+
+    def drawn(estimate: Estimate) -> Distribution:
+        return Uniform(estimate.low, estimate.high) if estimate.high > estimate.low else Constant(estimate.value)
+
     placed = [(one, *place) for one in model.drive_effects for place in resolve([one.effect], joints)]
     changed = dataclasses.replace(
         randomization,
@@ -62,7 +64,7 @@ def identified(
         factors=factors,
         shifts=shifts,
         effects=[
-            EffectRange(effect, joint, {key: _interval(estimate) for key, estimate in one.parameters.items()})
+            EffectRange(effect, joint, {key: drawn(estimate) for key, estimate in one.parameters.items()})
             for one, effect, joint in placed
             if effect.stage is not Stage.MECHANISM
         ],
@@ -105,10 +107,6 @@ def _on_joints(estimates: Mapping[str, Estimate], nominal: Array, joints: Sequen
             index = list(joints).index(joint)
             low[index], value[index], high[index] = estimate.low, estimate.value, estimate.high
     return low, value, high
-
-
-def _interval(estimate: Estimate) -> Distribution:
-    return Uniform(estimate.low, estimate.high) if estimate.high > estimate.low else Constant(estimate.value)
 
 
 def _offsets(model: ModelFile, default: Distribution, joints: Sequence[str]) -> Distribution:

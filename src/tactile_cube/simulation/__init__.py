@@ -20,8 +20,7 @@ def _import_quietly() -> None:
 _import_quietly()
 
 from tactile_cube.simulation.constants import EpisodeConstants, Start, constants_of  # noqa: E402
-from tactile_cube.simulation.contact import Contact  # noqa: E402
-from tactile_cube.simulation.engine import SimulationOptions  # noqa: E402
+from tactile_cube.simulation.engine import Contact, SimulationOptions  # noqa: E402
 from tactile_cube.simulation.world import World  # noqa: E402
 
 __all__ = ["Contact", "EpisodeConstants", "SimulationOptions", "Start", "World", "constants_of"]

@@ -4,26 +4,20 @@ One multibody per finger: the solver couples the rows of everything that hangs o
 several times faster than one hand.
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pybullet
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.errors import InputError
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, ObjectShape, straight_half, unit_inertia
-from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import SKIN_RELAXATION, Contact, named_contact
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, SimulationOptions
-
-Array = NDArray[np.float64]
+from tactile_cube.simulation.engine import OBJECT_STATE, SKIN_RELAXATION, Contact, SimulationOptions, named_contact
 
 _TABLE_SIZE = np.array([0.5, 0.5, 0.04])
 TILTED = 0.05
@@ -87,7 +81,6 @@ class BulletEngine:
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Builds the fingers; cube and table come with each episode."""
         self._hand, self._drive = hand, drive
         self.client = connect(options)
         half = (0.5 * _TABLE_SIZE).tolist()
@@ -131,9 +124,8 @@ class BulletEngine:
         for body, position, velocity in zip(self.fingers, q, v, strict=True):
             for k in self._links:
                 pybullet.resetJointState(body, k, position[k], velocity[k], physicsClientId=self.client)
-        self._set_friction(constants)
+        self._set_links(constants)
         self._forget_contacts()
-        self._set_spin_inertia()
 
     def set_gravity(self, acceleration: Array) -> None:
         """See `Engine.set_gravity`."""
@@ -146,13 +138,18 @@ class BulletEngine:
         torque = np.zeros_like(self.q)
         for i in range(steps):
             control(i, self.q.reshape(-1), self.v.reshape(-1), torque.reshape(-1), memory)
-            self._apply(torque)
+            for body, forces in zip(self.fingers, torque.tolist(), strict=True):
+                pybullet.setJointMotorControlArray(
+                    body, self._links, pybullet.TORQUE_CONTROL, forces=forces, physicsClientId=self.client
+                )
             if states is not None:
                 states[i] = self.cube_state()
             if wrench is not None:
                 self._push(wrench)
             pybullet.stepSimulation(physicsClientId=self.client)
-            self._read_joints()
+            read = [one for body in self.fingers for one in pybullet.getJointStates(body, self._links, self.client)]
+            self.q.reshape(-1)[:] = [state[0] for state in read]
+            self.v.reshape(-1)[:] = [state[1] for state in read]
         if states is not None:
             states[steps] = self.cube_state()
         return states
@@ -161,7 +158,12 @@ class BulletEngine:
         """See `Engine.cube_state`."""
         position, quaternion = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
         linear, angular = pybullet.getBaseVelocity(self.cube, physicsClientId=self.client)
-        return self._of_centre(np.array([*position, *quaternion, *linear, *angular]))
+        state = np.array([*position, *quaternion, *linear, *angular])
+        if np.asarray(self._constants.cube_com).any():  # Bullet speaks of the centre of mass
+            arm = com_arm(self._constants, state[3:7])
+            state[:3] -= arm
+            state[7:10] -= np.cross(state[10:13], arm)
+        return state
 
     def gaps(self) -> list[float]:
         """See `Engine.gaps`."""
@@ -194,30 +196,11 @@ class BulletEngine:
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
 
-    def _apply(self, torque: Array) -> None:
-        for body, forces in zip(self.fingers, torque.tolist(), strict=True):
-            pybullet.setJointMotorControlArray(
-                body, self._links, pybullet.TORQUE_CONTROL, forces=forces, physicsClientId=self.client
-            )
-
-    def _read_joints(self) -> None:
-        states = [one for body in self.fingers for one in pybullet.getJointStates(body, self._links, self.client)]
-        self.q.reshape(-1)[:] = [state[0] for state in states]
-        self.v.reshape(-1)[:] = [state[1] for state in states]
-
     def _push(self, wrench: Array) -> None:
         centre, _ = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
         frame = pybullet.WORLD_FRAME
         pybullet.applyExternalForce(self.cube, -1, wrench[:3].tolist(), centre, frame, physicsClientId=self.client)
         pybullet.applyExternalTorque(self.cube, -1, wrench[3:].tolist(), frame, physicsClientId=self.client)
-
-    def _of_centre(self, state: Array) -> Array:
-        """Bullet speaks of the centre of mass; the same state (13,) of the cube's centre."""
-        if np.asarray(self._constants.cube_com).any():
-            arm = com_arm(self._constants, state[3:7])
-            state[:3] -= arm
-            state[7:10] -= np.cross(state[10:13], arm)
-        return state
 
     def _new_table(self, height: float) -> int:
         centre = [0.0, 0.0, height - 0.5 * float(_TABLE_SIZE[2])]
@@ -289,26 +272,18 @@ class BulletEngine:
             self._cube_size, self._cube_com = size.copy(), com.copy()
         return self._cube_shape
 
-    def _set_spin_inertia(self) -> None:
-        """Adds inertia about the joint axis to each link, for numerical stability."""
+    def _set_links(self, constants: EpisodeConstants) -> None:
+        """Friction of the links, whose factors Bullet multiplies with the object's, and inertia about their joints."""
         for body, inertias, spins in zip(self.fingers, self._inertias, self._drive.view("spin_inertia"), strict=True):
             for link, (diagonal, spin) in enumerate(zip(inertias, spins, strict=True)):
-                spinning = list(diagonal)
+                tip, spinning = link == self._links[-1], list(diagonal)
                 spinning[self._hand.axes[link]] += spin
-                pybullet.changeDynamics(body, link, localInertiaDiagonal=spinning, physicsClientId=self.client)
-
-    def _set_friction(self, constants: EpisodeConstants) -> None:
-        """Friction of the links; Bullet multiplies the factors of the two bodies that touch."""
-        for body in self.fingers:
-            for link in self._links:
-                tip = link == self._links[-1]
-                pybullet.changeDynamics(
-                    body,
-                    link,
-                    lateralFriction=constants.tip_friction if tip else constants.link_friction,
-                    spinningFriction=constants.tip_spinning_friction if tip else 0.0,
-                    physicsClientId=self.client,
-                )
+                numbers = {
+                    "lateralFriction": constants.tip_friction if tip else constants.link_friction,
+                    "spinningFriction": constants.tip_spinning_friction if tip else 0.0,
+                    "localInertiaDiagonal": spinning,
+                }
+                pybullet.changeDynamics(body, link, **numbers, physicsClientId=self.client)
 
     def _forget_contacts(self) -> None:
         """Registers every finger anew with the broadphase; cube and table are new themselves.
@@ -318,11 +293,9 @@ class BulletEngine:
         """
         for k, body in enumerate(self.fingers):
             group = _FIRST_FINGER_GROUP << k
-            for link in self._links:
-                if link not in self._bare[k]:
-                    pybullet.setCollisionFilterGroupMask(
-                        body, link, group, _ALL_GROUPS & ~group, physicsClientId=self.client
-                    )
+            mask = _ALL_GROUPS & ~group
+            for link in (one for one in self._links if one not in self._bare[k]):
+                pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=self.client)
 
 
 def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
@@ -337,7 +310,6 @@ def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:
 
 
 def _geometry(kind: NamedShape, size: Array) -> dict[str, Any]:
-    """Bullet's words for an object of a kind with a bounding box (3,) [m]."""
     half = 0.5 * size
     if kind == "box":
         return {"shapeType": pybullet.GEOM_BOX, "halfExtents": half.tolist()}

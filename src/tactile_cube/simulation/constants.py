@@ -1,7 +1,5 @@
 """Every physical constant of one episode, and how the episode starts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
@@ -106,7 +104,6 @@ class EpisodeConstants:
     object_shape: ObjectShape = "box"
 
     def __post_init__(self) -> None:
-        """Give every vector its length and refuse values without a physical meaning."""
         for name in (*_OF_SPACE, *_OF_JOINTS):
             count = 3 if name in _OF_SPACE else self.joints
             object.__setattr__(self, name, _vector(name, getattr(self, name), count))
@@ -166,7 +163,6 @@ class Start:
     cube_angular_velocity: Array | tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Give every vector its length; normalise the quaternion."""
         lengths = dict.fromkeys(("angles", "velocities"), np.size(self.angles))
         lengths |= dict.fromkeys(("cube_position", "cube_linear_velocity", "cube_angular_velocity"), 3)
         lengths |= {"cube_quaternion": 4} | ({} if self.target is None else {"target": np.size(self.angles)})
@@ -191,9 +187,9 @@ def constants_of(hand: Hand | None = None, object: Mapping[str, Any] | None = No
         InputError: a value without a physical meaning, a drive or an object that has what no constant names.
     """
     given, hand = _without_mesh(dict(object or {})), hand or DLR_HAND2
+    known = {field.name for field in fields(EpisodeConstants)}
     for key in given.keys() - _OBJECT_KEYS.keys():
         raise InputError(f"object.{key}: no such setting; give {', '.join(_OBJECT_KEYS)}")
-    known = {field.name for field in fields(EpisodeConstants)}
     for key in hand.drive.keys() - known:
         raise InputError(f"hand.drive.{key}: no such constant; choose from {', '.join(sorted(known))}")
     named = {_OBJECT_KEYS[key]: value for key, value in given.items() if value is not None}

@@ -1,22 +1,18 @@
 """The drivetrain of all fingers in the world: constants of an episode into the memory of the compiled control step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain import DrivetrainConstants, Plant, check_damping_stability
 from tactile_cube.drivetrain.effects import Effect
+from tactile_cube.drivetrain.plant import CONSTANT_KEYS
 from tactile_cube.hand import Hand
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.hand.urdf import with_inertias
-from tactile_cube.simulation.constants import EpisodeConstants, Start
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.engine import SimulationOptions
-
-Array = NDArray[np.float64]
 
 
 class HandDrive:
@@ -28,7 +24,6 @@ class HandDrive:
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, effects: Sequence[Effect]) -> None:
-        """Compiles the control step, or finds it in the cache."""
         self._hand, self._engine = hand, options.single_engine
         self._effects = list(effects)
         self._urdfs = [hand.finger_urdf(k) for k in range(len(hand.fingers))]
@@ -60,16 +55,8 @@ class HandDrive:
         Raises:
             InputError: The torque loop would be unstable with these constants and this time step.
         """
-        constants = DrivetrainConstants(
-            kp=c.kp,
-            kd=c.kd,
-            stiffness=c.stiffness,
-            static_friction=c.static_friction,
-            reflected_inertia=c.reflected_inertia,
-            torque_limit=c.torque_limit,
-            rate_limit=c.rate_limit,
-            sign="physical" if c.elasticity_sign > 0 else "printed",
-        )
+        named = {key: getattr(c, key) for key in CONSTANT_KEYS if key != "compliance"} | {"stiffness": c.stiffness}
+        constants = DrivetrainConstants(**named, sign="physical" if c.elasticity_sign > 0 else "printed")
         self._refuse_unstable(constants)
         gravity = self._in_bases(c.gravity * c.down)
         self.memory[:] = self.plant.memory(constants, gravity=gravity, effects=[*self._effects, *c.effects])
@@ -99,12 +86,7 @@ class HandDrive:
         self.view("engine_gravity")[:] = self._in_bases(acceleration)
 
     def sense(self, q: Array, v: Array) -> None:
-        """Computes what the sensors read at rest, without moving anything or changing any state.
-
-        Args:
-            q: All joints (all joints,) [rad].
-            v: All joints (all joints,) [rad/s].
-        """
+        """Computes what the sensors read at rest at q, v (all joints,), without changing any state."""
         trial = self.memory.copy()
         self.plant.kernel.control_step(0, q.copy(), v.copy(), np.zeros_like(q), trial)
         self.view("signals")[:] = self.plant.view(trial, "signals")
@@ -126,16 +108,12 @@ class HandDrive:
         return np.stack([rotation.T @ vector for rotation in rotations])
 
 
-LEAST_INERTIA = 1e-3
-"""Reflected inertia below which spin inertia is not lowered further [kg m^2]."""
-TENDON_STIFFNESS = 15.0
-"""Spring that holds q4 at q3 [N m/rad]."""
-TENDON_DAMPING = 0.02
-"""Its damping [N m s/rad]; stable while k dt^2 w + 2 d dt w < 4 with w = (J3 + 4 J4) / (J3 J4)."""
+LEAST_INERTIA = 1e-3  # reflected inertia below which spin inertia is not lowered further [kg m^2]
+TENDON_STIFFNESS = 15.0  # spring that holds q4 at q3 [N m/rad]
+TENDON_DAMPING = 0.02  # its damping [N m s/rad]; stable while k dt^2 w + 2 d dt w < 4 with w = (J3 + 4 J4) / (J3 J4)
 
 
-PARALLEL = 0.99
-"""Cosine of the angle between axes from which on they count as parallel."""
+PARALLEL = 0.99  # cosine of the angle between axes from which on they count as parallel
 
 
 def spin_inertia(hand: Hand, shares: Array, reflected_inertia: Array) -> Array:

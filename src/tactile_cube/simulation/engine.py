@@ -1,20 +1,96 @@
-"""What a physics engine does for the world, under the drive's torques, and its numerical options."""
+"""What a physics engine does for the world, under the drive's torques: options, contacts, surfaces."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tactile_cube.errors import InputError
-from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import Contact
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One contact point on the cube or between fingers.
+
+    Attributes:
+        finger: Name of the finger, or `table` where the cube lies on it.
+        link: Name of its link, "" for the table.
+        other: What it touches: `cube`, `table` or the name of another finger.
+        position: Point on the other body, in the world (3,) [m].
+        normal: Unit vector into the other body (3,).
+        distance: Gap [m], negative where the bodies overlap.
+        force: Normal force [N].
+        friction: Friction force on the other body (3,) [N].
+    """
+
+    finger: str
+    link: str
+    other: str
+    position: Array
+    normal: Array
+    distance: float
+    force: float
+    friction: Array
+
+
+def named_contact(
+    first: tuple[str, str],
+    second: tuple[str, str],
+    middle: Array,
+    normal: Array,
+    distance: float,
+    force: float,
+    friction: Array,
+) -> Contact:
+    """A contact told from the side of the finger; of the table where no finger takes part.
+
+    `first` and `second` name a body (finger, `cube` or `table`) and its link, "" where there is none; `middle` (3,) [m]
+    lies between the two surfaces, `normal` and `friction` point into and act on the second.
+    """
+    if first[0] == "cube" or (first[0] == "table" and second[0] != "cube"):
+        first, second, normal, friction = second, first, -normal, -friction
+    return Contact(*first, second[0], middle + 0.5 * distance * normal, normal, distance, force, friction)
+
+
+SKIN_RELAXATION = 5e-3  # damping over stiffness of a fingertip's skin [s]: rubber settles within a few ms
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A body's side of a contact.
+
+    Attributes:
+        lateral: Factor of Coulomb friction.
+        spinning: Torque against spinning per normal force [m], on a body whose factor is 1.
+        compliance: How far it gives way per normal force [m/N]; 0: hard.
+    """
+
+    lateral: float
+    spinning: float = 0.0
+    compliance: float = 0.0
+
+    def on(self, other: Surface) -> Surface:
+        """Both together."""
+        return Surface(
+            self.lateral * other.lateral,
+            self.spinning * other.lateral + other.spinning * self.lateral,
+            self.compliance + other.compliance,
+        )
+
+
+def surfaces(constants: EpisodeConstants) -> dict[str, Surface]:
+    """The surfaces of an episode: `tip`, `link` (all other links), `cube` and `table`."""
+    return {
+        "tip": Surface(constants.tip_friction, constants.tip_spinning_friction, constants.tip_compliance),
+        "link": Surface(constants.link_friction),
+        "cube": Surface(constants.cube_friction),
+        "table": Surface(constants.table_friction),
+    }
+
 
 EngineName = Literal["bullet", "mujoco", "mixed"]
-MOST = 100_000
-"""Physics steps of a policy step, and iterations of a physics step."""
+MOST = 100_000  # physics steps of a policy step, and iterations of a physics step
 ENGINES = ("bullet", "mujoco", "mixed")
 _SINGLE: tuple[Literal["bullet", "mujoco"], ...] = ("bullet", "mujoco")
 
@@ -40,7 +116,6 @@ class SimulationOptions:
     trace: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse values that no world can run with."""
         if self.engine not in ENGINES:
             raise InputError(f"simulation.engine is {self.engine!r}; choose one of {', '.join(ENGINES)}")
         if not 0.0 < self.dt <= 0.01:
@@ -77,10 +152,7 @@ class SimulationOptions:
         return cls(engine, dt=5e-4, substeps=200, solver_iterations=150)
 
 
-Array = NDArray[np.float64]
-
-OBJECT_STATE = 13
-"""Position (3), quaternion xyzw (4), linear and angular velocity (3 + 3) of the object."""
+OBJECT_STATE = 13  # position (3), quaternion xyzw (4), linear and angular velocity (3 + 3) of the object
 
 
 class Engine(Protocol):
@@ -95,49 +167,29 @@ class Engine(Protocol):
     v: Array
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
-        """Puts everything at the start of an episode; nothing of the past remains, to the bit.
-
-        Args:
-            constants: Sizes, masses and friction.
-            start: Pose and velocity of the cube.
-            q: Positions of all joints (fingers, links) [rad].
-            v: Their velocities (fingers, links) [rad/s].
-        """
-        ...
+        """Puts everything at the start of an episode, the joints at q, v; nothing of the past remains, to the bit."""
 
     def set_gravity(self, acceleration: Array) -> None:
         """Sets the world's gravity (3,) [m/s^2]."""
-        ...
 
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
         """Runs physics steps: control, apply torques, step.
 
-        Args:
-            steps: How many.
-            wrench: Force and torque on the cube's centre of mass in the world (6,) [N, N m], or None.
-            record: Whether to give the cube's states.
-
-        Returns:
-            State of the cube before each step and after the last (steps + 1, 13), or None.
+        A wrench (6,) [N, N m] acts on the cube's centre of mass in the world. With `record` it gives the cube's states
+        before each step and after the last (steps + 1, 13).
         """
-        ...
 
     def cube_state(self) -> Array:
         """Pose and velocity of the cube's centre in the world (13,), see `OBJECT_STATE`."""
-        ...
 
     def gaps(self) -> list[float]:
         """Gaps of the contact points of the last physics step [m], negative where bodies overlap."""
-        ...
 
     def contacts(self) -> list[Contact]:
         """Contacts on the cube and between fingers in the last physics step."""
-        ...
 
     def normal_forces(self) -> Array:
         """Sums of the normal forces on the object of each finger's other links and of its tip (2, fingers) [N]."""
-        ...
 
     def close(self) -> None:
         """Ends the simulation."""
-        ...

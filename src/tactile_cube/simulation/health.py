@@ -3,8 +3,6 @@
 In ordinary episodes joints stay below 3 rad/s, contact forces below 12 N and overlaps below 1 mm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import inf, isfinite
 
@@ -28,16 +26,11 @@ BOUNDS = (
 def find_fault(q: Array, v: Array, cube: Array, distances: Sequence[float], coupled: NDArray[np.int64]) -> str:
     """What is wrong with a state, in a few words; "" if nothing.
 
-    Args:
-        q: Angles of all joints (fingers, links) [rad].
-        v: Their velocities (fingers, links) [rad/s].
-        cube: Position, quaternion, linear and angular velocity (13,).
-        distances: Gaps of the contact points [m], negative where bodies overlap.
-        coupled: Links that follow another one of their finger, and which (pairs, 2).
+    Angles and velocities of all joints are (fingers, links), the cube's state (13,), `distances` the gaps of contact
+    points [m], `coupled` (pairs, 2) links that follow another one of their finger, and which.
     """
-    for (name, bound, unit), value in zip(
-        BOUNDS, (*_extremes(q, v, cube, coupled), -min(distances, default=0.0)), strict=True
-    ):
+    values = (*_extremes(q, v, cube, coupled), -min(distances, default=0.0))
+    for (name, bound, unit), value in zip(BOUNDS, values, strict=True):
         if not isfinite(value):
             return f"{name} is not a number"
         if value > bound:
@@ -71,11 +64,9 @@ REFERENCE_STEP, REFERENCE_ITERATIONS = 2e-4, 300
 
 
 def unresolved(spinning_friction: float, options: SimulationOptions) -> str:
-    """What to know about worlds whose answers are those of an unconverged solver; "" where there is nothing.
+    """What to know about worlds whose answers are those of an unconverged solver, by the tips' spinning friction [m].
 
-    Args:
-        spinning_friction: the largest of the tips [m].
-        options: of the worlds; MuJoCo's solver runs until it has converged.
+    "" where there is nothing: MuJoCo's solver runs until it has converged.
     """
     reference = options.dt <= REFERENCE_STEP and options.solver_iterations >= REFERENCE_ITERATIONS
     if options.engine == "mujoco" or spinning_friction <= RESOLVED or reference:
@@ -87,11 +78,6 @@ def unresolved(spinning_friction: float, options: SimulationOptions) -> str:
 
 
 def unresolved_among(spinning_frictions: Sequence[float], options: SimulationOptions) -> str:
-    """What to know about worlds that were drawn, with the number of those it concerns; "" where it concerns none.
-
-    Args:
-        spinning_frictions: of the tips, one a world [m].
-        options: of the worlds.
-    """
+    """The same about worlds that were drawn, with the number of those it concerns; "" where it concerns none."""
     beyond = [friction for friction in spinning_frictions if unresolved(friction, options)]
     return f"{len(beyond)} of {len(spinning_frictions)} worlds: {unresolved(max(beyond), options)}" if beyond else ""

@@ -1,27 +1,20 @@
 """Hand and cube in MuJoCo."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand import Hand
-from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import Contact, named_contact
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, SimulationOptions
+from tactile_cube.simulation.engine import OBJECT_STATE, Contact, SimulationOptions, named_contact
 from tactile_cube.simulation.mujoco_model import HandSpec
-
-Array = NDArray[np.float64]
 
 
 class MujocoEngine:
     """See `Engine`. Newton's method on soft contacts; rotors are native, tendons are equality constraints."""
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Describes the bodies; the model comes with each episode."""
         self._spec = HandSpec(hand, options, drive)
         self._hand = hand
         self._dofs = hand.links_per_finger * len(hand.fingers)
@@ -75,7 +68,15 @@ class MujocoEngine:
 
     def contacts(self) -> list[Contact]:
         """See `Engine.contacts`."""
-        return [self._contact(index) for index in range(self._data.ncon)]
+        found = []
+        for index in range(self._data.ncon):
+            contact, wrench = self._data.contact[index], np.zeros(6)
+            mujoco.mj_contactForce(self._model, self._data, index, wrench)  # on the second shape
+            frame = np.reshape(contact.frame, (3, 3))
+            first, second = map(self._names, contact.geom.tolist())
+            place, friction = (np.array(contact.pos), np.array(frame[0])), wrench[1:3] @ frame[1:]
+            found.append(named_contact(first, second, *place, float(contact.dist), float(wrench[0]), friction))
+        return found
 
     def normal_forces(self) -> Array:
         """See `Engine.normal_forces`."""
@@ -100,13 +101,3 @@ class MujocoEngine:
         body, link = self._names(shape)
         found = [k for k, finger in enumerate(self._hand.fingers) if finger.name == body]
         return (int(link == self._hand.fingers[found[0]].links[-1]), found[0]) if found else None
-
-    def _contact(self, index: int) -> Contact:
-        """One contact with names; MuJoCo's force is that on the second shape."""
-        contact, wrench = self._data.contact[index], np.zeros(6)
-        mujoco.mj_contactForce(self._model, self._data, index, wrench)
-        frame = np.reshape(contact.frame, (3, 3))
-        first, second = map(self._names, contact.geom.tolist())
-        friction = wrench[1:3] @ frame[1:]
-        middle, normal = np.array(contact.pos), np.array(frame[0])
-        return named_contact(first, second, middle, normal, float(contact.dist), float(wrench[0]), friction)

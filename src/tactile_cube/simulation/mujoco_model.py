@@ -1,32 +1,24 @@
 """The bodies in MuJoCo: four fingers on their bases, a cube and perhaps a table, compiled anew for each episode."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.hand import Hand
 from tactile_cube.hand.object_mesh import NamedShape, ObjectMesh, straight_half, unit_inertia
 from tactile_cube.hand.urdf import CollisionShape
-from tactile_cube.simulation.constants import EpisodeConstants
-from tactile_cube.simulation.contact import SKIN_RELAXATION, Surface, surfaces
+from tactile_cube.simulation.constants import Array, EpisodeConstants
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import SimulationOptions
+from tactile_cube.simulation.engine import SKIN_RELAXATION, SimulationOptions, Surface, surfaces
 
-Array = NDArray[np.float64]
-
-TABLE_HALF_SIZE = (0.25, 0.25, 0.02)
-"""[m]."""
+TABLE_HALF_SIZE = (0.25, 0.25, 0.02)  # [m]
 SOLVER_TOLERANCE = 1e-10
 UNSAID = [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
 """An inertia with products that MuJoCo is to take for none: the moments then hold."""
-RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]
-"""Impedance of tendons and joint stops, as hard as MuJoCo has it."""
+RIGID = [0.9999, 0.9999, 1e-3, 0.5, 2.0]  # impedance of tendons and joint stops, as hard as MuJoCo has it
 
 
 class HandSpec:
@@ -36,7 +28,6 @@ class HandSpec:
     """
 
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
-        """Describes the fingers; their masses are the drive's."""
         self._hand, self._drive = hand, drive
         self.spec = mujoco.MjSpec()
         self.spec.compiler.degree = False
@@ -75,17 +66,13 @@ class HandSpec:
         return model
 
     def _add_finger(self, k: int) -> list[tuple[Any, Any]]:
-        """Links and joints of a finger, as bodies below its base."""
         view, finger = self._drive.view, self._hand.fingers[k]
         position, rotation = self._hand.base_in_world(k)
         parent = self.spec.worldbody.add_body(name=f"{finger.name} base", pos=position, quat=_wxyz(rotation))
         rigid = [2.0 * self.spec.option.timestep, 1.0]
         parts = []
         for i, link in enumerate(finger.links):
-            place = {
-                "pos": view("placement_translation")[k, i],
-                "quat": _wxyz(view("placement_rotation")[k, i]),
-            }
+            place = {"pos": view("placement_translation")[k, i], "quat": _wxyz(view("placement_rotation")[k, i])}
             body = parent.add_body(name=f"{finger.name} {link}", explicitinertial=True, **place)
             joint = body.add_joint(
                 name=f"{finger.name}_q{i + 1}",
@@ -160,7 +147,6 @@ class HandSpec:
         self._table.pos = [0.0, 0.0, height - TABLE_HALF_SIZE[2]]
 
     def _set_mesh(self, mesh: ObjectMesh, size: Array) -> None:
-        """Gives the object the shape of a mesh."""
         if self._mesh is None:
             self._mesh = self.spec.add_mesh(name="object")
         self._mesh.uservert = (mesh.vertices * size).ravel().tolist()
@@ -170,7 +156,6 @@ class HandSpec:
 
 
 def _geometry(kind: NamedShape, half: Array) -> tuple[Any, Array]:
-    """MuJoCo's type and size of an object with half edges (3,) [m]."""
     kinds = mujoco.mjtGeom
     if kind == "box":
         return kinds.mjGEOM_BOX, half
@@ -191,15 +176,12 @@ def _six(inertia: Array) -> list[float]:
     return [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
 
 
-IMPRATIO = 100.0
-"""Regularisation of the normal force over that of friction."""
-HARD = 2e-5
-"""Compliance of surfaces that are called hard [m/N]: 3 N sink in by 60 um."""
+IMPRATIO = 100.0  # regularisation of the normal force over that of friction
+HARD = 2e-5  # compliance of surfaces that are called hard [m/N]: 3 N sink in by 60 um
 HARD_RELAXATION = 2e-2
 """Damping over stiffness of hard surfaces [s]. A body overlaps by up to its way in one step before it is met, which the
 spring gives back as speed unless that takes much longer than a step."""
-CONDIM = 4
-"""Normal force, two of lateral friction and a torque against spinning, under one elliptic cone."""
+CONDIM = 4  # normal force, two of lateral friction and a torque against spinning, under one elliptic cone
 LEAST_IMPEDANCE, MOST_IMPEDANCE = 1e-4, 0.9999
 
 

@@ -1,23 +1,18 @@
 """The world in which the hand turns the cube: 500 Hz physics under a 10 Hz policy."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.effects import Effect
 from tactile_cube.drivetrain.signals import COMMAND, MOTOR_POSITION, POSITION, TORQUE, VELOCITY
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand, tip_positions
-from tactile_cube.simulation.constants import EpisodeConstants, Start
-from tactile_cube.simulation.contact import Contact
+from tactile_cube.simulation.constants import Array, EpisodeConstants, Start
 from tactile_cube.simulation.drive import HandDrive
-from tactile_cube.simulation.engine import OBJECT_STATE, Engine, SimulationOptions
+from tactile_cube.simulation.engine import OBJECT_STATE, Contact, Engine, SimulationOptions
 from tactile_cube.simulation.health import find_fault
 
-Array = NDArray[np.float64]
 _JOINT_SIGNALS = {"q": POSITION, "dq": VELOCITY, "q_m": MOTOR_POSITION, "q_d": COMMAND, "torque": TORQUE}
 
 
@@ -40,17 +35,9 @@ class World:
     constants: EpisodeConstants
 
     def __init__(
-        self,
-        hand: Hand = DLR_HAND2,
-        options: SimulationOptions | None = None,
-        effects: Sequence[Effect] = (),
+        self, hand: Hand = DLR_HAND2, options: SimulationOptions | None = None, effects: Sequence[Effect] = ()
     ) -> None:
-        """Builds the bodies and the compiled control step.
-
-        Args:
-            hand: The hand.
-            options: Numerical choices; the fast ones by default.
-            effects: Further physical effects of the drivetrain, each at a joint.
+        """Builds the bodies and the compiled control step, with further effects of the drivetrain, each at a joint.
 
         Raises:
             InputError: The options name no single engine.
@@ -71,12 +58,8 @@ class World:
     def reset(self, constants: EpisodeConstants, start: Start) -> None:
         """Starts an episode.
 
-        Args:
-            constants: Every physical constant of the episode.
-            start: Where fingers and cube are.
-
         Raises:
-            InputError: The torque loop would be unstable with these constants and this time step.
+            InputError: Constants or start of another hand, or a torque loop that would be unstable with this time step.
         """
         if not constants.joints == start.angles.size == self.hand.joints:
             raise InputError(
@@ -97,7 +80,11 @@ class World:
         if self.steps == self.constants.gravity_onset:
             self.set_weight(self.constants.gravity_scale)
         self._drive.view("goal")[:] = q_n - self.constants.joint_offset
-        self._run()
+        filtered, random = self._drive.view("filtered").copy(), random_wrench(self.constants, self.time)
+        wrench = random + self._push if random is not None else self._push if self._push.any() else None
+        states = self._engine.run(self.options.substeps, wrench, self.options.trace)
+        if states is not None:
+            self.trace = self._read_trace(filtered, states)
         self.steps += 1
         self._cube = self._engine.cube_state()
         self.fault = self.fault or find_fault(
@@ -119,7 +106,12 @@ class World:
 
     def pull_finger(self, finger: int, force: Array) -> None:
         """Pulls a fingertip with a force (3,) [N] in the world until changed or reset."""
-        self._drive.view("external_torque")[self.hand.of_finger(finger)] = self._tip_jacobian(finger).T @ force
+        columns, q, width = [], self.q, 1e-6  # of the tip's velocity per joint velocity, by central differences
+        for joint in range(q.size)[self.hand.of_finger(finger)]:
+            delta = np.where(np.arange(q.size) == joint, width, 0.0)
+            ahead, behind = tip_positions(self.hand, q + delta), tip_positions(self.hand, q - delta)
+            columns.append((ahead - behind)[finger] / (2.0 * width))
+        self._drive.view("external_torque")[self.hand.of_finger(finger)] = np.stack(columns, axis=1).T @ force
 
     def close(self) -> None:
         """Ends the simulation."""
@@ -207,20 +199,8 @@ class World:
 
     # --- parts of reset and step ---------------------------------------------------------------------------------
 
-    def _run(self) -> None:
-        """The physics steps of one policy step, with a trace where wanted."""
-        filtered = self._drive.view("filtered").copy()
-        states = self._engine.run(self.options.substeps, self._wrench(), self.options.trace)
-        if states is not None:
-            self.trace = self._read_trace(filtered, states)
-
     def _read_trace(self, filtered: Array, states: Array) -> dict[str, Array]:
-        """The trace of the policy step that has just been run.
-
-        Args:
-            filtered: q_f before the step (joints,) [rad].
-            states: State of the cube before each physics step, and after the last (substeps + 1, 13).
-        """
+        """The trace of the step just run: q_f before it (joints,) [rad], the cube's states (substeps + 1, 13)."""
         rows, dt, offset = self._drive.view("trace"), self.options.dt, np.asarray(self.constants.joint_offset)
         trace: dict[str, Array] = {
             name: rows[:, :, row, :].reshape(len(rows), -1).copy() for name, row in _JOINT_SIGNALS.items()
@@ -234,22 +214,6 @@ class World:
         trace["time"] = np.asarray(self.time + dt * np.arange(len(rows), dtype=np.float64))
         trace["cube_position"], trace["cube_quaternion"] = states[:-1, :3], states[:-1, 3:7]
         return trace
-
-    def _wrench(self) -> Array | None:
-        """Everything that pushes the cube in this policy step, or None."""
-        random = random_wrench(self.constants, self.time)
-        if random is None:
-            return self._push if self._push.any() else None
-        return random + self._push
-
-    def _tip_jacobian(self, finger: int) -> Array:
-        """Velocity of a fingertip's centre per velocity of its finger's joints (3, n), by central differences."""
-        columns, q, width = [], self.q, 1e-6
-        for joint in range(q.size)[self.hand.of_finger(finger)]:
-            delta = np.where(np.arange(q.size) == joint, width, 0.0)
-            ahead, behind = tip_positions(self.hand, q + delta), tip_positions(self.hand, q - delta)
-            columns.append((ahead - behind)[finger] / (2.0 * width))
-        return np.stack(columns, axis=1)
 
 
 def _make_engine(hand: Hand, options: SimulationOptions, drive: HandDrive) -> Engine:
@@ -277,6 +241,5 @@ def random_wrench(constants: EpisodeConstants, time: float) -> Array | None:
 
 
 def _direction(rng: np.random.Generator) -> Array:
-    """A unit vector, uniform on the sphere (3,)."""
     vector = rng.normal(size=3)
     return np.asarray(vector / np.linalg.norm(vector))

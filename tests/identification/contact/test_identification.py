@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tactile_cube.command_help import CONFIG
+from tactile_cube.composition import CONFIG
 from tactile_cube.drivetrain.model_file import Estimate
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.identification import (

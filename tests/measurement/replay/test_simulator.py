@@ -1,3 +1,5 @@
+"""Positions that are older or younger than the row that logs them."""
+
 from dataclasses import replace
 from pathlib import Path
 
@@ -159,3 +161,45 @@ def test_commanded_torques_drive_the_joint(tmp_path: Path) -> None:
     expected = 0.5 * 0.002 / inertia * trial.time[49] ** 2
     assert result.position[49, 0] == pytest.approx(expected, rel=0.02)
     assert result.torque[49, 0] == pytest.approx(0.002, rel=1e-4)
+
+
+def recording_controller_rate(folder: Path, rate: float | None) -> Recording:
+    def change(data: dict) -> None:
+        if rate is not None:
+            data["controller"]["rate_hz"] = rate
+
+    return read_recording(write(folder, change))
+
+
+def simulated(folder: Path, rate: float | None, step: float) -> np.ndarray:
+    one = recording_controller_rate(folder, rate)
+    return np.concatenate([trial.position for trial in free_run(one, nominal_model(one), step=step)])
+
+
+def test_the_law_runs_at_the_controllers_rate_whatever_the_simulations_step(tmp_path: Path) -> None:
+    often = simulated(tmp_path / "often", 1000, step=0.01)
+    assert np.array_equal(often, simulated(tmp_path / "small", None, step=0.001))
+    assert np.abs(often - simulated(tmp_path / "log", None, step=0.01)).max() > 1e-4
+
+
+def test_by_default_the_controller_is_as_fast_as_the_log(tmp_path: Path) -> None:
+    assert recording_controller_rate(tmp_path / "a", None).substeps(0.01) == 1
+    assert recording_controller_rate(tmp_path / "b", 100).substeps(0.01) == 1
+    assert recording_controller_rate(tmp_path / "c", 1000).substeps(0.01) == 10
+    assert recording_controller_rate(tmp_path / "d", 1000).substeps(0.0005) == 20
+
+
+def test_a_controller_slower_than_the_log_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"key 'controller\.rate_hz': received 50, below"):
+        recording_controller_rate(tmp_path, 50)
+
+
+@pytest.mark.parametrize("rows", [-0.5, 0.3, 1.0])
+def test_a_reading_shows_the_position_of_a_part_of_a_row_before(rows: float, tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path))
+    model, delay = nominal_model(recording), rows * recording.step
+    late = replace(model, constants={**model.constants, "reading_delay": np.full(2, delay)})
+    exact, shown = (free_run(recording, one)[0].position for one in (model, late))
+    time = recording.trials[0].time
+    expected = np.stack([np.interp(time - delay, time, column) for column in exact.T], axis=1)
+    assert np.abs(shown - expected)[2:-2].max() < 0.1 * np.abs(exact - expected)[2:-2].max()

@@ -1,62 +1,13 @@
 """The catalogue of physical effects: one class each, used in training, fitting and search."""
 
-from tactile_cube.drivetrain.effects.catalogue import (
-    catalogue,
-    find_effect,
-    import_own_effects,
-    matching_joints,
-    parse_effect,
-    resolve,
-)
-from tactile_cube.drivetrain.effects.effect import Effect, Parameter, Place, Stage
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    ANGLE,
-    COMMAND,
-    CONTACT,
-    CONTROLLER_TORQUE,
-    DEFLECTION,
-    DIRECTION,
-    FRICTION,
-    JOINT_TORQUE,
-    LEAD,
-    LOAD,
-    MEASURED_VELOCITY,
-    MOTOR_POSITION,
-    POSITION,
-    TIME,
-    TORQUE,
-    VELOCITY,
-    WEIGHT,
-)
-
-__all__ = [
-    "ACCELERATION",
-    "ANGLE",
-    "COMMAND",
-    "CONTACT",
-    "CONTROLLER_TORQUE",
-    "DEFLECTION",
-    "DIRECTION",
-    "FRICTION",
-    "JOINT_TORQUE",
-    "LEAD",
-    "LOAD",
-    "MEASURED_VELOCITY",
-    "MOTOR_POSITION",
-    "POSITION",
-    "TIME",
-    "TORQUE",
-    "VELOCITY",
-    "WEIGHT",
-    "Effect",
-    "Parameter",
-    "Place",
-    "Stage",
-    "catalogue",
-    "find_effect",
-    "import_own_effects",
-    "matching_joints",
-    "parse_effect",
-    "resolve",
-]
+from tactile_cube.drivetrain.effects.catalogue import catalogue as catalogue
+from tactile_cube.drivetrain.effects.catalogue import find_effect as find_effect
+from tactile_cube.drivetrain.effects.catalogue import import_own_effects as import_own_effects
+from tactile_cube.drivetrain.effects.catalogue import matching_joints as matching_joints
+from tactile_cube.drivetrain.effects.catalogue import parse_effect as parse_effect
+from tactile_cube.drivetrain.effects.catalogue import resolve as resolve
+from tactile_cube.drivetrain.effects.effect import Effect as Effect
+from tactile_cube.drivetrain.effects.effect import Parameter as Parameter
+from tactile_cube.drivetrain.effects.effect import Place as Place
+from tactile_cube.drivetrain.effects.effect import Stage as Stage
+from tactile_cube.drivetrain.signals import *  # noqa: F403 - what a law can see

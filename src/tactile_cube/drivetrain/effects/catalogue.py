@@ -1,7 +1,5 @@
 """Which effects exist, and how a user names them: `stribeck_friction@q3`, `my_rig.CableDrag@q2`, `cogging`."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -12,22 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.signals import ROWS
 from tactile_cube.errors import InputError
 
 EffectClass = type[Effect]
 CATALOGUE_MODULES = (
-    "command",
-    "controller",
-    "motor",
-    "elastic_joint",
-    "transmission",
-    "joint_torque",
-    "friction",
-    "mechanism",
-)
+    "command", "motor", "elastic_joint", "transmission", "joint_torque", "friction", "mechanism"
+)  # fmt: skip
 """Files of this folder; effects of one stage act in the order in which these define them."""
 
 
@@ -68,10 +59,6 @@ def find_effect(name: str) -> EffectClass:
 def parse_effect(text: str, find: Callable[[str], Any] = find_effect) -> tuple[str, dict[str, float]]:
     """Return `NAME@JOINT` and parameter -> value; parameters that are not given take their typical values.
 
-    Args:
-        text: as a user writes it.
-        find: returns the effect of a name.
-
     Raises:
         InputError: an unknown effect or parameter, or a value that is no number.
     """
@@ -92,8 +79,7 @@ def parse_effect(text: str, find: Callable[[str], Any] = find_effect) -> tuple[s
 def import_own_effects(names: Iterable[str]) -> None:
     """Import the modules of a user's own classes, so that files may name them; other names are ignored.
 
-    Args:
-        names: as the user wrote them, never from a file: `my_rig.CableDrag`, `my_rig.CableDrag@q2: tension=0.1`.
+    Names are as the user wrote them, never from a file: `my_rig.CableDrag`, `my_rig.CableDrag@q2: tension=0.1`.
 
     Raises:
         InputError: a module that cannot be imported, or has no such effect.
@@ -114,11 +100,6 @@ def import_own_effects(names: Iterable[str]) -> None:
 
 
 def _try_laws(effect: EffectClass, path: str) -> None:
-    """Ask each law of a user's class once, as Python and compiled; with neutral values it changes nothing.
-
-    Raises:
-        InputError: it fails, or changes its signal.
-    """
     from tactile_cube.compiled import compiled  # Numba takes half a second; most commands have no such class
 
     x = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS, 3))
@@ -142,9 +123,7 @@ def _try_laws(effect: EffectClass, path: str) -> None:
 def resolve(names: Sequence[str], joints: Sequence[str]) -> list[tuple[EffectClass, str]]:
     """Return effects and joints for names such as `backlash@q3`; without `@JOINT` an effect acts on every joint.
 
-    Args:
-        names: as a user writes them.
-        joints: the plant's joints; `@q3` also stands for every joint that ends in `_q3`, `/q3` or `.q3`.
+    `@q3` also stands for every joint that ends in `_q3`, `/q3` or `.q3`.
 
     Raises:
         InputError: an unknown effect or joint.

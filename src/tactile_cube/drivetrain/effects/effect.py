@@ -126,16 +126,13 @@ class Effect:
 
     Empty: one form, all parameters at their typical values.
     """
-    details: ClassVar[tuple[str, ...]] = ()
-    """Parameters that a search frees last, where a form fits the data already."""
-    contains: ClassVar[tuple[str, ...]] = ()
-    """Names of simpler effects that are special cases of this one."""
+    details: ClassVar[tuple[str, ...]] = ()  # parameters that a search frees last, where a form fits the data already
+    contains: ClassVar[tuple[str, ...]] = ()  # names of simpler effects that are special cases of this one
     state_size: ClassVar[Any] = 0
     """How many numbers the law keeps between steps, zero after a reset; a class method of the step [s] if it counts."""
     bounded_memory: ClassVar[bool] = False
     """Whether the law of a COMMAND remembers no more steps than its state has numbers; older ones are not played."""
-    weighs: ClassVar[bool] = False
-    """Whether the law reads WEIGHT, which makes a step several per cent slower."""
+    weighs: ClassVar[bool] = False  # whether the law reads WEIGHT, which makes a step several per cent slower
     chosen_starts: ClassVar[int] = 0
     """Numbers of a state that no log shows, so that a fit chooses them where a trial begins."""
     constant_reading: ClassVar[str] = ""
@@ -271,6 +268,6 @@ class Effect:
             p: (..., parameters) with the same leading dimensions.
         """
 
-    def __repr__(self) -> str:  # noqa: D105
+    def __repr__(self) -> str:
         values = ", ".join(f"{key}={value:g}" for key, value in self.values.items())
         return f"{type(self).__name__}('{self.joint}', {values})"

@@ -20,8 +20,7 @@ from tactile_cube.drivetrain.signals import (
     VELOCITY,
 )
 
-RESONANCES = (8.0, 16.0, 32.0)
-"""Where a search starts at a finger [Hz], with half of the joint's inertia in the rotor."""
+RESONANCES = (8.0, 16.0, 32.0)  # where a search starts at a finger [Hz], with half of the joint's inertia in the rotor
 DAMPING_RATIO = 0.03
 
 

@@ -7,14 +7,7 @@ import numpy as np
 
 from tactile_cube.drivetrain.effects.effect import Array, Effect, Parameter, Stage, harmonic
 from tactile_cube.drivetrain.effects.scales import Scales, unit_at
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    ANGLE,
-    DAMPING,
-    JOINT_TORQUE,
-    TORQUE,
-    VELOCITY,
-)
+from tactile_cube.drivetrain.signals import ACCELERATION, ANGLE, DAMPING, JOINT_TORQUE, TORQUE, VELOCITY
 
 
 class TorqueGain(Effect):
@@ -39,8 +32,7 @@ class TorqueGain(Effect):
         return x[TORQUE, j] * (1.0 + p[0])
 
 
-SMALLEST = 0.01
-"""Part of `reference` below which the curve is a straight line to zero."""
+SMALLEST = 0.01  # part of `reference` below which the curve is a straight line to zero
 
 
 class TorqueCurve(Effect):
@@ -241,14 +233,11 @@ class ActuatorLag(Effect):
         return s[0]
 
 
-LEVELS = 9
-"""Number of limits at which a search starts, from the median torque to the largest ones in equal factors."""
+LEVELS = 9  # number of limits at which a search starts, from the median torque to the largest ones in equal factors
 
-REACHED = 0.9
-"""Share of the stated limit from which it counts as reached: limits of drives vary by a tenth."""
+REACHED = 0.9  # share of the stated limit from which it counts as reached: limits of drives vary by a tenth
 
-HARD = 0.02
-"""A softness up to this counts as none: the torque is within 1.4 % of the limit, and larger powers overflow."""
+HARD = 0.02  # A softness up to this counts as none: the torque is within 1.4 % of the limit, and larger powers overflow
 
 
 class TorqueSaturation(Effect):
@@ -296,10 +285,8 @@ class TorqueSaturation(Effect):
         return min(max(x[TORQUE, j], -p[0]), p[0])
 
 
-UNLIMITED = 1e9
-"""Neutral value of `stall`: a supply that is never too weak."""
-FASTER = (1.2, 2.5)
-"""No-load speeds at which a search starts, as multiples of the largest speed of the recording."""
+UNLIMITED = 1e9  # neutral value of `stall`: a supply that is never too weak
+FASTER = (1.2, 2.5)  # No-load speeds at which a search starts, as multiples of the largest speed of the recording
 
 
 class BackEmf(Effect):

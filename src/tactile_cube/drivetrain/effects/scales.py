@@ -1,7 +1,5 @@
 """Sizes of a joint, from which bounds, typical values and starts of an effect's parameters follow."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from math import inf
@@ -66,13 +64,10 @@ class Scales:
         return self.span / FINGER_RANGE if self.slides else 1.0
 
     def of(self, unit: str) -> float:
-        """Return how many times larger a number of this unit is at this joint than at a finger's.
+        """Return how many times larger a number of a unit (`N m s/rad`) is at this joint than at a finger's.
 
         Torques, positions and speeds scale with those of the recording; inertias, masses and lengths with those of the
         rig. Times scale in powers of ten. Units other than these (K, V) do not scale.
-
-        Args:
-            unit: as a parameter states it, `N m s/rad`.
         """
         plain = {"kg m^2": self.inertia / FINGER.inertia, "kg": self.mass / FINGER.mass, "s": self.time / FINGER.time}
         plain |= {"m": self.lever / FINGER.lever, "1": 1.0}

@@ -79,8 +79,7 @@ class VelocityFilterLag(Effect):
         return asked
 
 
-STIFF = 0.03
-"""Compliance of a stiffly controlled machine at which a search starts, as a part of a finger's."""
+STIFF = 0.03  # compliance of a stiffly controlled machine at which a search starts, as a part of a finger's
 
 
 class Elasticity(Effect):
@@ -205,8 +204,7 @@ class PositionOffset(Effect):
 
 
 NEWTON_STEPS = 12
-SHOWN = 0.5
-"""Part of the link's motion that its sensor must show, or the link is free within its gap."""
+SHOWN = 0.5  # part of the link's motion that its sensor must show, or the link is free within its gap
 
 
 def torque_behind_play(torque: Array, drop: Array, softness: Array) -> Array:

@@ -4,19 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tactile_cube.compiled import compiled
-from tactile_cube.drivetrain.control_law import limit_rate, limit_torque, low_pass
-from tactile_cube.drivetrain.coupled_joints import add_tendons, estimate_contact, link_torques
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    COMMAND,
-    CONTACT,
-    LOAD,
-    MOTOR_POSITION,
-    POSITION,
-    ROWS,
-    TIME,
-    VELOCITY,
-)
+from tactile_cube.drivetrain import signals as sig
+from tactile_cube.drivetrain.laws import add_tendons, estimate_contact, limit_rate, limit_torque, link_torques, low_pass
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, add_spin_inertia, add_weight
 
 from . import plant
@@ -36,7 +25,7 @@ def shape_target(x: Array, c: int, dt: float, memory: Array) -> None:
         memory[plant.FILTERED + a] = filtered
         memory[plant.LIMITED + a] = limited
         kp, kd, limit = memory[plant.KP + a], memory[plant.KD + a], memory[plant.COMMAND_TORQUE_LIMIT + a]
-        x[COMMAND, j] = limit_torque(limited, x[MOTOR_POSITION, j], x[VELOCITY, j], kp, kd, limit)
+        x[sig.COMMAND, j] = limit_torque(limited, x[sig.MOTOR_POSITION, j], x[sig.VELOCITY, j], kp, kd, limit)
 
 
 @compiled
@@ -60,9 +49,9 @@ def sense_contact(x: Array, c: int, v: Array, dt: float, memory: Array) -> None:
             contact,
         )
         for j in range(n):
-            x[ACCELERATION, j] = acceleration[plant.LEADER[j]]
+            x[sig.ACCELERATION, j] = acceleration[plant.LEADER[j]]
     for j in range(n):
-        x[CONTACT, j] = contact[j] + memory[plant.EXTERNAL_TORQUE + c * n + j]
+        x[sig.CONTACT, j] = contact[j] + memory[plant.EXTERNAL_TORQUE + c * n + j]
 
 
 @compiled
@@ -102,12 +91,12 @@ def control(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
         sense_contact(x, c, v_c, dt, memory)
         find_equations(c, q_c, v_c, memory)
         for j in range(n):
-            x[POSITION, j] = q_c[plant.LEADER[j]]
-            x[VELOCITY, j] = v_c[plant.LEADER[j]]
-            memory[plant.Q + c * n + j] = x[POSITION, j]
-            memory[plant.V + c * n + j] = x[VELOCITY, j]
-            x[LOAD, j] = memory[plant.JOINT_BIAS + j] - x[CONTACT, j]
-            x[TIME, j] = memory[plant.STEP] * dt
+            x[sig.POSITION, j] = q_c[plant.LEADER[j]]
+            x[sig.VELOCITY, j] = v_c[plant.LEADER[j]]
+            memory[plant.Q + c * n + j] = x[sig.POSITION, j]
+            memory[plant.V + c * n + j] = x[sig.VELOCITY, j]
+            x[sig.LOAD, j] = memory[plant.JOINT_BIAS + j] - x[sig.CONTACT, j]
+            x[sig.TIME, j] = memory[plant.STEP] * dt
         shape_target(x, c, dt, memory)
         plant.effects_command(x, c, dt, memory)
         drive(x, c, dt, memory)
@@ -116,5 +105,5 @@ def control(i: int, q: Array, v: Array, torque: Array, memory: Array) -> None:
     memory[plant.SEEN] = 1.0
     memory[plant.STEP] += 1.0
     if i < memory[plant.TRACE_ROWS]:
-        start = int(memory[plant.TRACE_OFFSET]) + i * C * ROWS * n
-        memory[start : start + C * ROWS * n] = memory[plant.SIGNALS : plant.SIGNALS + C * ROWS * n]
+        start = int(memory[plant.TRACE_OFFSET]) + i * C * sig.ROWS * n
+        memory[start : start + C * sig.ROWS * n] = memory[plant.SIGNALS : plant.SIGNALS + C * sig.ROWS * n]

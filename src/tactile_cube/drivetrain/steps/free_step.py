@@ -8,21 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tactile_cube.compiled import compiled, shaped_view
-from tactile_cube.drivetrain.coupled_joints import expand
-from tactile_cube.drivetrain.signals import (
-    ACCELERATION,
-    COMMAND,
-    CONTACT,
-    GAP,
-    LOAD,
-    MOTOR_POSITION,
-    POSITION,
-    ROWS,
-    SENSOR_VELOCITY,
-    TIME,
-    VELOCITY,
-    WEIGHT,
-)
+from tactile_cube.drivetrain import signals as sig
+from tactile_cube.drivetrain.laws import expand
 
 from . import plant
 from .joint_step import block, drive, find_equations, next_speeds, signals_of
@@ -51,7 +38,7 @@ def equations_at(c: int, q: Array, v: Array, memory: Array) -> None:
 def note_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> None:
     """Position, bias, weight and mass matrix without rotors, into a path's step."""
     for j in range(n):
-        here[j], here[n + j], here[2 * n + j] = q[j], memory[plant.JOINT_BIAS + j], x[WEIGHT, j]
+        here[j], here[n + j], here[2 * n + j] = q[j], memory[plant.JOINT_BIAS + j], x[sig.WEIGHT, j]
         for k in range(n):
             rotor = memory[plant.REFLECTED_INERTIA + c * n + j] if j == k else 0.0
             here[3 * n + j * n + k] = memory[plant.JOINT_MASS_MATRIX + j * n + k] - rotor
@@ -84,7 +71,7 @@ def take_equations(c: int, x: Array, q: Array, here: Array, memory: Array) -> No
             rotor = memory[plant.REFLECTED_INERTIA + c * n + j] if j == k else 0.0
             memory[plant.JOINT_MASS_MATRIX + j * n + k] = here[3 * n + j * n + k] + rotor
         memory[plant.JOINT_BIAS + j] = load
-        x[WEIGHT, j] = here[2 * n + j]
+        x[sig.WEIGHT, j] = here[2 * n + j]
 
 
 @compiled
@@ -107,12 +94,12 @@ def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
             if width > 0:
                 note_equations(c, x, q, here, memory)
         for j in range(n):
-            x[POSITION, j] = q[j]
-            x[VELOCITY, j] = v[j]
-            x[CONTACT, j] = memory[plant.EXTERNAL_TORQUE + c * n + j]
-            x[LOAD, j] = memory[plant.JOINT_BIAS + j] - x[CONTACT, j]
-            x[TIME, j] = memory[plant.STEP] * dt
-            x[COMMAND, j] = command[c * n + j]
+            x[sig.POSITION, j] = q[j]
+            x[sig.VELOCITY, j] = v[j]
+            x[sig.CONTACT, j] = memory[plant.EXTERNAL_TORQUE + c * n + j]
+            x[sig.LOAD, j] = memory[plant.JOINT_BIAS + j] - x[sig.CONTACT, j]
+            x[sig.TIME, j] = memory[plant.STEP] * dt
+            x[sig.COMMAND, j] = command[c * n + j]
         plant.effects_command(x, c, dt, memory)
         drive(x, c, dt, memory)
         next_speeds(x, c, dt, memory)
@@ -124,7 +111,7 @@ def free_step(command: Array, memory: Array, path: Array, row: int) -> None:
                 for k in range(n * n):
                     here[3 * n + n * n + k] = last[3 * n + n * n + k]
         for j in range(n):
-            x[ACCELERATION, j] = memory[plant.JOINT_ACCELERATION + j]
+            x[sig.ACCELERATION, j] = memory[plant.JOINT_ACCELERATION + j]
             v[j] = memory[plant.SPEED + j]
             q[j] += dt * v[j]
     memory[plant.STEP] += 1.0
@@ -136,7 +123,7 @@ def advance_commands(command: Array, memory: Array) -> None:
     for c in range(C):
         x = signals_of(c, memory)
         for j in range(n):
-            x[COMMAND, j] = command[c * n + j]
+            x[sig.COMMAND, j] = command[c * n + j]
         plant.effects_command(x, c, memory[plant.DT], memory)
 
 
@@ -154,7 +141,7 @@ def row_of_steps(
         if s == reading:
             for r in range(len(rows)):
                 for a in range(C * n):
-                    out[k - history, r, a] = memory[plant.SIGNALS + (a // n * ROWS + rows[r]) * n + a % n]
+                    out[k - history, r, a] = memory[plant.SIGNALS + (a // n * sig.ROWS + rows[r]) * n + a % n]
 
 
 @compiled
@@ -169,7 +156,7 @@ def roll(commands: Array, length: int, history: int, substeps: int, memory: Arra
 def note_free(memory: Array, free: Array) -> None:
     """Marks the joints that their sensors do not show, within a gap of the transmission."""
     for a in range(C * n):
-        if signals_of(a // n, memory)[GAP, a % n] == 2.0:
+        if signals_of(a // n, memory)[sig.GAP, a % n] == 2.0:
             free[a] = 1.0
 
 
@@ -187,7 +174,7 @@ def look_ahead(
     """Notes free joints in the steps first..last of `commands` to come, if any joint has a gap at all."""
     gaps = 0.0
     for a in range(C * n):
-        gaps += signals_of(a // n, memory)[GAP, a % n]
+        gaps += signals_of(a // n, memory)[sig.GAP, a % n]
     if gaps > 0.0:
         copy_into(trial, memory)
         for k in range(first, min(last, len(commands))):
@@ -200,15 +187,14 @@ def start_segment(position: Array, speed: Array, free: Array, trial: Array, memo
     """Puts the sensor to its measured position and speed; effects keep their past.
 
     `trial` has made the coming step already, which says how far the sensor is from the joint and how fast it leaves it.
-    A joint that is `free` of
-    its sensor around the start goes on as it was.
+    A joint that is `free` of its sensor around the start goes on as it was.
     """
     for a in range(C * n):
         column = a % n
         x = signals_of(a // n, trial)
         if free[a] == 0.0:
-            memory[plant.Q + a] = position[a] - (x[MOTOR_POSITION, column] - x[POSITION, column])
-            memory[plant.V + a] = speed[a] - (x[SENSOR_VELOCITY, column] - x[VELOCITY, column])
+            memory[plant.Q + a] = position[a] - (x[sig.MOTOR_POSITION, column] - x[sig.POSITION, column])
+            memory[plant.V + a] = speed[a] - (x[sig.SENSOR_VELOCITY, column] - x[sig.VELOCITY, column])
 
 
 @compiled

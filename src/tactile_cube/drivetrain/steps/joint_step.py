@@ -4,34 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tactile_cube.compiled import compiled, shaped_view
-from tactile_cube.drivetrain.control_law import impedance_torque
-from tactile_cube.drivetrain.coupled_joints import reduce_equations
-from tactile_cube.drivetrain.dry_friction import solve_speeds
-from tactile_cube.drivetrain.signals import (
-    ANGLE,
-    COMMAND,
-    CONTROLLER_TORQUE,
-    DAMPING,
-    DEFLECTION,
-    DIRECTION,
-    FRICTION,
-    GAP,
-    INERTIA,
-    JOINT_TORQUE,
-    LEAD,
-    LOAD,
-    LOOP_GAIN,
-    LOOSE_TORQUE,
-    MEASURED_VELOCITY,
-    MOTOR_POSITION,
-    MOTOR_SHARE,
-    POSITION,
-    ROWS,
-    SENSOR_VELOCITY,
-    TORQUE,
-    VELOCITY,
-    WEIGHT,
-)
+from tactile_cube.drivetrain import signals as sig
+from tactile_cube.drivetrain.laws import impedance_torque, reduce_equations, solve_speeds
 from tactile_cube.hand.rigid_body_equations import WORK_COLUMNS, mass_matrix_and_bias, pull_of_gravity
 
 from . import plant
@@ -52,7 +26,7 @@ def block(memory: Array, offset: int, shape: tuple[int, ...], c: int = 0) -> Arr
 @compiled
 def signals_of(c: int, memory: Array) -> Array:
     """The signals x (ROWS, n) of chain c."""
-    return block(memory, plant.SIGNALS, (ROWS, n), c)
+    return block(memory, plant.SIGNALS, (sig.ROWS, n), c)
 
 
 @compiled
@@ -82,11 +56,11 @@ def find_equations(c: int, q: Array, v: Array, memory: Array) -> None:
     reduce_equations(plant.FOLLOW, ratio, M, h, rotor, M_joint, h_joint)
     if memory[plant.WEIGHED] != 0.0:
         x, weight = signals_of(c, memory), block(memory, plant.WEIGHT, (N,))
-        x[WEIGHT, :] = 0.0
+        x[sig.WEIGHT, :] = 0.0
         weight[:] = 0.0
         pull_of_gravity(plant.PARENT, plant.PRISMATIC, mass, (-gravity[0], -gravity[1], -gravity[2]), work, weight)
         for k in range(N):
-            x[WEIGHT, plant.FOLLOW[k]] += ratio[k] * weight[k]
+            x[sig.WEIGHT, plant.FOLLOW[k]] += ratio[k] * weight[k]
 
 
 @compiled
@@ -95,20 +69,20 @@ def drive(x: Array, c: int, dt: float, memory: Array) -> None:
     read_sensors(x, c, dt, memory)
     control_torque(x, c, dt, memory)
     for j in range(n):
-        memory[plant.TRIAL + j] = x[DAMPING, j]
+        memory[plant.TRIAL + j] = x[sig.DAMPING, j]
     plant.effects_motor_torque(x, c, dt, memory)
     for j in range(n):
         asked = memory[plant.TRIAL + j]
-        memory[plant.HELD_BACK + c * n + j] = 1.0 - x[DAMPING, j] / asked if asked > 0.0 else 0.0
+        memory[plant.HELD_BACK + c * n + j] = 1.0 - x[sig.DAMPING, j] / asked if asked > 0.0 else 0.0
     for j in range(n):
-        x[DEFLECTION, j] = memory[plant.COMPLIANCE + c * n + j] * x[TORQUE, j]
+        x[sig.DEFLECTION, j] = memory[plant.COMPLIANCE + c * n + j] * x[sig.TORQUE, j]
     plant.effects_deflection(x, c, dt, memory)
     for j in range(n):
-        x[MOTOR_POSITION, j] = x[POSITION, j] + x[DEFLECTION, j]
+        x[sig.MOTOR_POSITION, j] = x[sig.POSITION, j] + x[sig.DEFLECTION, j]
     plant.effects_position_sensor(x, c, dt, memory)
     note_extra_deflection(x, c, memory)
     for j in range(n):
-        x[JOINT_TORQUE, j] = 0.0
+        x[sig.JOINT_TORQUE, j] = 0.0
     plant.effects_joint_torque(x, c, dt, memory)
 
 
@@ -116,25 +90,25 @@ def drive(x: Array, c: int, dt: float, memory: Array) -> None:
 def read_sensors(x: Array, c: int, dt: float, memory: Array) -> None:
     """The measured speed, and the part of q_m that needs no torque to be known."""
     for j in range(n):
-        x[MEASURED_VELOCITY, j] = x[VELOCITY, j]
-        x[SENSOR_VELOCITY, j] = x[VELOCITY, j]
-        x[DAMPING, j] = 1.0
-        x[MOTOR_SHARE, j] = 0.0
-        x[INERTIA, j] = memory[plant.JOINT_MASS_MATRIX + j * n + j]
-        x[MOTOR_POSITION, j] = x[POSITION, j]
-        x[ANGLE, j] = x[POSITION, j] + memory[plant.ANGLE_OFFSET + c * n + j]
+        x[sig.MEASURED_VELOCITY, j] = x[sig.VELOCITY, j]
+        x[sig.SENSOR_VELOCITY, j] = x[sig.VELOCITY, j]
+        x[sig.DAMPING, j] = 1.0
+        x[sig.MOTOR_SHARE, j] = 0.0
+        x[sig.INERTIA, j] = memory[plant.JOINT_MASS_MATRIX + j * n + j]
+        x[sig.MOTOR_POSITION, j] = x[sig.POSITION, j]
+        x[sig.ANGLE, j] = x[sig.POSITION, j] + memory[plant.ANGLE_OFFSET + c * n + j]
     plant.effects_velocity_sensor(x, c, dt, memory)
     for j in range(n):
         a = c * n + j
         kp, compliance = memory[plant.KP + a], memory[plant.COMPLIANCE + a] + memory[plant.EXTRA_COMPLIANCE + a]
-        damped = memory[plant.KD + a] * x[MEASURED_VELOCITY, j] / kp
-        x[LEAD, j] = x[COMMAND, j] - x[POSITION, j] - damped
-        asked = kp * (x[COMMAND, j] - x[POSITION, j] - memory[plant.EXTRA + a])
-        asked = (asked - memory[plant.KD + a] * x[MEASURED_VELOCITY, j]) / (1.0 + kp * compliance)
+        damped = memory[plant.KD + a] * x[sig.MEASURED_VELOCITY, j] / kp
+        x[sig.LEAD, j] = x[sig.COMMAND, j] - x[sig.POSITION, j] - damped
+        asked = kp * (x[sig.COMMAND, j] - x[sig.POSITION, j] - memory[plant.EXTRA + a])
+        asked = (asked - memory[plant.KD + a] * x[sig.MEASURED_VELOCITY, j]) / (1.0 + kp * compliance)
         passed = 1.0 - memory[plant.HELD_BACK + a]  # by the laws of the motor's torque
-        x[LOOP_GAIN, j] = passed * kp / (1.0 + kp * compliance)
-        x[LOOSE_TORQUE, j] = x[TORQUE, j] + passed * (asked - x[CONTROLLER_TORQUE, j])
-        x[GAP, j] = 0.0
+        x[sig.LOOP_GAIN, j] = passed * kp / (1.0 + kp * compliance)
+        x[sig.LOOSE_TORQUE, j] = x[sig.TORQUE, j] + passed * (asked - x[sig.CONTROLLER_TORQUE, j])
+        x[sig.GAP, j] = 0.0
     plant.effects_position_sensor_ahead(x, c, dt, memory)
 
 
@@ -145,21 +119,25 @@ def control_torque(x: Array, c: int, dt: float, memory: Array) -> None:
         a = c * n + j
         kp, kd = memory[plant.KP + a], memory[plant.KD + a]
         compliance = memory[plant.COMPLIANCE + a] + memory[plant.EXTRA_COMPLIANCE + a]
-        ahead = x[MOTOR_POSITION, j] - x[POSITION, j]  # of sensor laws that need no torque: known now, not a step late
+        ahead = (
+            x[sig.MOTOR_POSITION, j] - x[sig.POSITION, j]
+        )  # of sensor laws that need no torque: known now, not a step late
         extra = memory[plant.EXTRA + a] + ahead
-        torque = impedance_torque(x[COMMAND, j], x[POSITION, j], x[MEASURED_VELOCITY, j], kp, kd, compliance, extra)
+        torque = impedance_torque(
+            x[sig.COMMAND, j], x[sig.POSITION, j], x[sig.MEASURED_VELOCITY, j], kp, kd, compliance, extra
+        )
         memory[plant.EXTRA + a] = -ahead
         memory[plant.TRIAL + j] = torque
-        x[CONTROLLER_TORQUE, j] = torque
-        x[TORQUE, j] = min(max(torque, -memory[plant.TORQUE_LIMIT + a]), memory[plant.TORQUE_LIMIT + a])
-        x[DAMPING, j] = x[DAMPING, j] * kd / (1.0 + kp * compliance)
+        x[sig.CONTROLLER_TORQUE, j] = torque
+        x[sig.TORQUE, j] = min(max(torque, -memory[plant.TORQUE_LIMIT + a]), memory[plant.TORQUE_LIMIT + a])
+        x[sig.DAMPING, j] = x[sig.DAMPING, j] * kd / (1.0 + kp * compliance)
     plant.effects_controller(x, c, dt, memory)
     for j in range(n):
-        limit, asked, own = memory[plant.TORQUE_LIMIT + c * n + j], x[CONTROLLER_TORQUE, j], memory[plant.TRIAL + j]
-        x[TORQUE, j] = min(max(asked, -limit), limit)
-        x[CONTROLLER_TORQUE, j] = own if x[TORQUE, j] == asked else x[TORQUE, j] - (asked - own)
-        if abs(x[TORQUE, j]) >= limit:
-            x[DAMPING, j] = 0.0
+        limit, asked, own = memory[plant.TORQUE_LIMIT + c * n + j], x[sig.CONTROLLER_TORQUE, j], memory[plant.TRIAL + j]
+        x[sig.TORQUE, j] = min(max(asked, -limit), limit)
+        x[sig.CONTROLLER_TORQUE, j] = own if x[sig.TORQUE, j] == asked else x[sig.TORQUE, j] - (asked - own)
+        if abs(x[sig.TORQUE, j]) >= limit:
+            x[sig.DAMPING, j] = 0.0
 
 
 @compiled
@@ -170,13 +148,13 @@ def note_extra_deflection(x: Array, c: int, memory: Array) -> None:
     """
     for j in range(n):
         compliance = memory[plant.COMPLIANCE + c * n + j]
-        more = x[DEFLECTION, j] - compliance * x[TORQUE, j]
-        slope = max(more / x[TORQUE, j], 0.0) if abs(x[TORQUE, j]) > 1e-9 else 0.0
+        more = x[sig.DEFLECTION, j] - compliance * x[sig.TORQUE, j]
+        slope = max(more / x[sig.TORQUE, j], 0.0) if abs(x[sig.TORQUE, j]) > 1e-9 else 0.0
         memory[plant.EXTRA_COMPLIANCE + c * n + j] = slope
         memory[plant.EXTRA + c * n + j] += (
-            (x[MOTOR_POSITION, j] - (x[POSITION, j] + x[DEFLECTION, j]))
-            + (more - slope * x[TORQUE, j])
-            + (compliance + slope) * (x[TORQUE, j] - x[CONTROLLER_TORQUE, j])
+            (x[sig.MOTOR_POSITION, j] - (x[sig.POSITION, j] + x[sig.DEFLECTION, j]))
+            + (more - slope * x[sig.TORQUE, j])
+            + (compliance + slope) * (x[sig.TORQUE, j] - x[sig.CONTROLLER_TORQUE, j])
         )
 
 
@@ -184,22 +162,22 @@ def note_extra_deflection(x: Array, c: int, memory: Array) -> None:
 def next_speeds(x: Array, c: int, dt: float, memory: Array) -> None:
     """Speeds of chain c after the step, under dry friction, in memory[SPEED]; its accelerations beside them."""
     for j in range(n):
-        net = x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j]
-        x[DIRECTION, j] = np.sign(x[VELOCITY, j]) if x[VELOCITY, j] != 0.0 else np.sign(net)
-        x[FRICTION, j] = memory[plant.STATIC_FRICTION + c * n + j]
-        memory[plant.SPEED + j] = x[VELOCITY, j]
+        net = x[sig.TORQUE, j] + x[sig.JOINT_TORQUE, j] - x[sig.LOAD, j]
+        x[sig.DIRECTION, j] = np.sign(x[sig.VELOCITY, j]) if x[sig.VELOCITY, j] != 0.0 else np.sign(net)
+        x[sig.FRICTION, j] = memory[plant.STATIC_FRICTION + c * n + j]
+        memory[plant.SPEED + j] = x[sig.VELOCITY, j]
     plant.effects_friction(x, c, dt, memory)  # may also add to JOINT_TORQUE: bristles in place of dry friction
     M = block(memory, plant.JOINT_MASS_MATRIX, (n, n))
     # damping acts on the mean of the speeds before and after the step, second order in dt: an explicit K_D dq would act
     # half a step late, which fitting to a measurement takes for a delay
     for j in range(n):
-        M[j, j] += 0.5 * dt * x[DAMPING, j]
+        M[j, j] += 0.5 * dt * x[sig.DAMPING, j]
     for j in range(n):
-        memory[plant.MOMENTUM + j] = dt * (x[TORQUE, j] + x[JOINT_TORQUE, j] - x[LOAD, j])
+        memory[plant.MOMENTUM + j] = dt * (x[sig.TORQUE, j] + x[sig.JOINT_TORQUE, j] - x[sig.LOAD, j])
         for k in range(n):
-            memory[plant.MOMENTUM + j] += M[j, k] * x[VELOCITY, k]
+            memory[plant.MOMENTUM + j] += M[j, k] * x[sig.VELOCITY, k]
         memory[plant.FRICTION_IMPULSE + j] = dt * (
-            max(x[FRICTION, j], 0.0) * (1.0 - x[MOTOR_SHARE, j]) + memory[plant.BRAKE + c * n + j]
+            max(x[sig.FRICTION, j], 0.0) * (1.0 - x[sig.MOTOR_SHARE, j]) + memory[plant.BRAKE + c * n + j]
         )
         creep = memory[plant.FRICTION_CREEP + c * n + j]
         memory[plant.GRIP + j] = dt / creep if creep > 0.0 else 0.0
@@ -214,4 +192,4 @@ def next_speeds(x: Array, c: int, dt: float, memory: Array) -> None:
         block(memory, plant.TRIAL, (n,)),
     )
     for j in range(n):
-        memory[plant.JOINT_ACCELERATION + j] = (memory[plant.SPEED + j] - x[VELOCITY, j]) / dt
+        memory[plant.JOINT_ACCELERATION + j] = (memory[plant.SPEED + j] - x[sig.VELOCITY, j]) / dt

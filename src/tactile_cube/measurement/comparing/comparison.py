@@ -8,19 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.drivetrain.model_file import ModelFile
-from tactile_cube.measurement.comparing.error import (
-    ErrorSummary,
-    FailingInterval,
-    failing_intervals,
-    normalised_fit,
-    raw_residuals,
-    residuals,
-    summarise_errors,
-    with_fitted_offsets,
-)
+from tactile_cube.measurement.comparing import error
+from tactile_cube.measurement.comparing.error import ErrorSummary, FailingInterval, summarise_errors
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor, noise_floor, sensor_noise
-from tactile_cube.measurement.comparing.regimes import Regime, regimes, where_it_fails
-from tactile_cube.measurement.comparing.whiteness import CrossCorrelation, Whiteness, cross_correlations, whiteness
+from tactile_cube.measurement.comparing.regimes import (
+    CrossCorrelation,
+    Regime,
+    Whiteness,
+    cross_correlations,
+    regimes,
+    where_it_fails,
+    whiteness,
+)
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.nominal import draw_model, nominal_model, require_same_joints
@@ -117,16 +116,10 @@ def compare_recording(
 ) -> Comparison:
     """Simulate every trial freely from its start and describe what is left.
 
-    Args:
-        recording: what was measured.
-        model: the model file, simulated with the joint offsets of each initialisation that suit it best; None for the
-            values in recording.yaml and no offsets.
-        step: longest simulation step [s]; None: the usual one, or an eighth of it where the sensors would show its
-            error.
-        simulations: how many randomised simulations make the band; 0 for none.
-        spread: relative half widths of constants without an interval, `offset` in rad.
-        seed: of the randomised simulations.
-        floor: noise floor, if it is known already; by default found here.
+    A model is simulated with the joint offsets of each initialisation that suit it best; None: the values in
+    recording.yaml and no offsets. Steps last `step` [s] at most; None: the usual one, or an eighth of it where the
+    sensors would show its error. So many randomised simulations make the band; `spread` has relative half widths of
+    constants without an interval, `offset` in rad. The floor is found unless it is known.
     """
     if model is not None:
         require_same_joints(recording, model)
@@ -135,7 +128,7 @@ def compare_recording(
     def simulated_at(step: float) -> tuple[list[Simulated], Model]:
         used = nominal_model(recording, model)
         if model is not None:
-            used = with_fitted_offsets(Simulator(recording, [term.effect for term in used.terms], step), used)
+            used = error.with_fitted_offsets(Simulator(recording, [term.effect for term in used.terms], step), used)
         return bounded(free_run(recording, used, step)), used
 
     simulated, fitted = simulated_at(used)
@@ -148,7 +141,7 @@ def compare_recording(
         if step is None and any(left[joint] > HIDDEN * noise[joint] for joint in noise):
             used /= FINER
             finer = 1.0 / (FINER - 1)  # errors of the step are of first order
-            left = {joint: finer * error for joint, error in left.items()}
+            left = {joint: finer * size for joint, size in left.items()}
             simulated, _ = simulated_at(used)
         floor = floor or noise_floor(recording, left)
     return describe_comparison(recording, model, simulated, floor, band, used)
@@ -173,7 +166,7 @@ def describe_comparison(
 ) -> Comparison:
     """What simulations of the trials, one each, leave of the measurement, and where."""
     trials, joints, positions = recording.trials, recording.joints, [one.position for one in simulated]
-    errors, raw = residuals(trials, positions), raw_residuals(trials, positions)
+    errors, raw = error.residuals(trials, positions), error.raw_residuals(trials, positions)
     summary = summarise_errors(errors, joints)
     table = regimes(trials, errors, joints)
     return Comparison(
@@ -182,9 +175,9 @@ def describe_comparison(
         simulated=simulated,
         residuals=errors,
         errors=summary,
-        trials=[summarise_errors([error], joints) for error in errors],
+        trials=[summarise_errors([one], joints) for one in errors],
         raw=[summarise_errors(raw, joints), *(summarise_errors([one], joints) for one in raw)],
-        fit=normalised_fit(trials, raw, joints),
+        fit=error.normalised_fit(trials, raw, joints),
         floor=floor,
         regimes=table,
         sentences=where_it_fails(table, summary.joints, floor, recording.units),
@@ -192,9 +185,9 @@ def describe_comparison(
         cross_correlations=cross_correlations(trials, errors, joints),
         failing_intervals=[
             interval
-            for trial, error in zip(trials, errors, strict=True)
-            for index, joint in enumerate(joints)
-            for interval in failing_intervals(trial.name, joint, trial.time, error[:, index], floor.joints[joint])
+            for trial, one in zip(trials, errors, strict=True)
+            for k, joint in enumerate(joints)
+            for interval in error.failing_intervals(trial.name, joint, trial.time, one[:, k], floor.joints[joint])
         ],
         band=band,
         step=step,

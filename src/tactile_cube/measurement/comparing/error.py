@@ -1,19 +1,14 @@
 """How far a simulation is from a measurement: RMS position error, the constant joint offsets removed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.simulator import Simulated, Simulator
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """The error that no model can undercut: the scatter of repeats, or the sensor's noise where nothing was repeated."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -10,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 
-Array = NDArray[np.float64]
 LONGEST_LAG = 0.3  # [s] two starts of one command are not further apart
 SAME = 0.02  # share of a command's spread by which a repeat may differ
 LEFT_START = 0.1  # [rad] of motion after which a joint no longer knows where friction held it at the start
@@ -31,7 +28,11 @@ def aligned_repeats(trials: Sequence[Trial]) -> list[list[Array]]:
     while waiting:
         same = repeats_of(waiting, 0)
         if same:
-            groups.append(_cut([(waiting[0], 0), *((waiting[place], lag) for place, lag in same)]))
+            members = [(waiting[0], 0), *((waiting[place], lag) for place, lag in same)]
+            start = max(0, *(lag for _, lag in members))
+            measured = [np.where(_telling(trial), trial.position, np.nan)[start - lag :] for trial, lag in members]
+            length = min(map(len, measured))
+            groups.append([positions[:length] for positions in measured])
         taken = {0, *(place for place, _ in same)}
         waiting = [trial for place, trial in enumerate(waiting) if place not in taken]
     return groups
@@ -43,14 +44,11 @@ def repeats_of(trials: Sequence[Trial], index: int) -> list[tuple[int, int]]:
     lags = {
         place: lag_between(first.command, other.command, first.step)
         for place, other in enumerate(trials)
-        if place != index and _comparable(first, other)
+        if place != index
+        and (first.kind, first.clamped, first.force) == (other.kind, other.clamped, other.force)
+        and all(np.array_equal(getattr(first.gains, k), getattr(other.gains, k)) for k in ("kp", "kd"))
     }
     return [(place, lag) for place, lag in lags.items() if lag is not None]
-
-
-def _comparable(first: Trial, other: Trial) -> bool:
-    same_gains = all(np.array_equal(getattr(first.gains, k), getattr(other.gains, k)) for k in ("kp", "kd"))
-    return first.kind == other.kind and same_gains and first.clamped == other.clamped and first.force == other.force
 
 
 def lag_between(first: Array, other: Array, step: float) -> int | None:
@@ -72,13 +70,6 @@ def _differs(first: Array, other: Array) -> float:
     return float(np.sqrt(np.mean((first - other) ** 2))) / spread if spread > 0 else np.inf
 
 
-def _cut(members: list[tuple[Trial, int]]) -> list[Array]:
-    start = max(0, *(lag for _, lag in members))
-    measured = [np.where(_telling(trial), trial.position, np.nan)[start - lag :] for trial, lag in members]
-    length = min(map(len, measured))
-    return [positions[:length] for positions in measured]
-
-
 def _telling(trial: Trial) -> NDArray[np.bool_]:
     """(n, joints): measured, and the joint has left its start (if it ever does)."""
     left = np.abs(trial.position - trial.position[0]) > LEFT_START
@@ -98,9 +89,7 @@ class NoiseFloor:
     source: Literal["repeats", "guess", "contact"]  # contact: how well a world with the true effects follows a grasp
     repeats: int  # trials that had a repeat
     step_size: dict[str, float]  # what the simulator's time step adds, no part of the floor; empty: not asked for
-    sensor: dict[str, float] = field(
-        default_factory=dict
-    )  # noise of the position sensor, the floor where it is a guess
+    sensor: dict[str, float] = field(default_factory=dict)  # noise of the position sensor, the floor if it is a guess
 
     @property
     def reachable(self) -> float:
@@ -152,10 +141,7 @@ def sensor_noise(recording: Recording) -> Array:
     return np.array([_noise(one, float(least)) for one, least in zip(signals, stated, strict=True)])
 
 
-WHOLE, MOSTLY = (
-    0.1,
-    0.98,
-)  # of a step by which a change may miss a multiple of it, and the share of changes that keep it
+WHOLE, MOSTLY = 0.1, 0.98  # of a step by which a change may miss a multiple of it; share of changes that keep it
 FEWEST_VALUES = 20  # that a signal takes: with fewer gaps chance looks like a step
 FEW_STEPS = 20  # a larger change is a multiple of any small step, within what its digits tell
 

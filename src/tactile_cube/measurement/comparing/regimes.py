@@ -1,16 +1,16 @@
-"""Where the error is: by joint and speed, after a reversal, direction, load, posture, time and kind of trial."""
+"""Where the error is, by speed, reversal, direction, load, posture, time and kind of trial; is the residual white?"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal, stats
 
 from tactile_cube.measurement.comparing.noise_floor import NoiseFloor
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.units import milli, short
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 SPEEDS = {"standstill": 0.02, "low speed": 0.3, "medium speed": 1.5, "high speed": np.inf}  # [rad/s] upper ends
 MOVING = 0.02  # [rad/s]
@@ -78,6 +78,8 @@ def _parts(trials: Sequence[Trial], velocities: Sequence[Array], joint: int) -> 
     kinds = np.concatenate([np.full(len(trial.time), trial.kind) for trial in trials])
     position = np.concatenate([trial.position[:, joint] for trial in trials])
     phase = np.concatenate([trial.time / trial.duration for trial in trials])
+    others = [np.abs(np.delete(one, joint, axis=1)).max(axis=1, initial=0.0) for one in velocities]
+    fast = np.concatenate(others) > SPEEDS["low speed"]
     return {
         "speed": {
             name: (speed >= least) & (speed < most) for (name, most), least in zip(SPEEDS.items(), edges, strict=False)
@@ -87,16 +89,15 @@ def _parts(trials: Sequence[Trial], velocities: Sequence[Array], joint: int) -> 
         "load": _load(trials, joint),
         "posture": _thirds(position, "third of the range", ("low", "middle", "high")),
         "time": _thirds(phase, "third of the trial", ("first", "second", "last")),
-        "neighbours": _neighbours(velocities, joint),
+        "neighbours": {"other joints moving": fast, "other joints slow or still": ~fast} if fast.any() else {},
         "kind": {f"{kind} trials": kinds == kind for kind in dict.fromkeys(kinds.tolist())},
     }
 
 
 def _load(trials: Sequence[Trial], joint: int) -> dict[str, Mask]:
     """By the size of the measured torque, as far as there is one."""
-    torque = np.abs(
-        np.concatenate([np.full(len(t.time), np.nan) if t.torque is None else t.torque[:, joint] for t in trials])
-    )
+    parts = [np.full(len(t.time), np.nan) if t.torque is None else t.torque[:, joint] for t in trials]
+    torque = np.abs(np.concatenate(parts))
     if np.isnan(torque).all():
         return {}
     half = 0.5 * float(np.nanpercentile(torque, 98))
@@ -107,12 +108,6 @@ def _thirds(values: Array, of: str, names: tuple[str, str, str]) -> dict[str, Ma
     low, high = values.min() + np.ptp(values) * np.array([1, 2]) / 3
     part = (values >= low).astype(int) + (values >= high)
     return {f"{name} {of}": part == index for index, name in enumerate(names)}
-
-
-def _neighbours(velocities: Sequence[Array], joint: int) -> dict[str, Mask]:
-    others = [np.abs(np.delete(one, joint, axis=1)).max(axis=1, initial=0.0) for one in velocities]
-    fast = np.concatenate(others) > SPEEDS["low speed"]
-    return {"other joints moving": fast, "other joints slow or still": ~fast} if fast.any() else {}
 
 
 WORTH_SAYING = 1.5  # error / noise floor of a joint below which nothing is said
@@ -151,7 +146,6 @@ def _sentence(joint: str, rows: list[Regime], error: float, floor: NoiseFloor, u
 
 
 def _worst_of_each(rows: list[Regime], dimensions: Sequence[str]) -> list[Regime]:
-    """The worst regime of each dimension, the worst first."""
     chosen: dict[str, Regime] = {}
     for row in sorted(rows, key=lambda row: -row.error):
         if row.dimension in dimensions:
@@ -172,3 +166,110 @@ def _verb(rows: list[Regime], rms: float) -> str:
 
 def _place(row: Regime) -> str:
     return f"{PREPOSITIONS.get(row.dimension, '')} {row.regime}".strip()
+
+
+LAGS = 20
+LONGEST_DELAY = 0.1  # [s] between a cause and its trace in the residual
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Ljung-Box test of one joint's residual."""
+
+    joint: str
+    p_value: float  # of such autocorrelation in white noise; the smallest over the trials, times their number
+    correlation_time: float  # how long the residual remembers itself [s]
+
+
+@dataclass(frozen=True)
+class CrossCorrelation:
+    """How much of a residual goes with one signal."""
+
+    joint: str  # whose residual
+    cause: str  # the signal, in words
+    correlation: float  # strongest within 0.1 s, averaged over the trials
+    delay: float  # how much later the residual shows it [s]
+    p_value: float  # of such a correlation between unrelated signals that remember themselves as these do
+
+
+def whiteness(trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]) -> list[Whiteness]:
+    """The test of each joint's residual over `LAGS` lags."""
+    results = []
+    for index, joint in enumerate(joints):
+        columns = [_filled(error[:, index]) for error in errors]
+        p = min(1.0, len(columns) * min(ljung_box(column) for column in columns))
+        memory = [_memory(column) * trial.step for column, trial in zip(columns, trials, strict=True)]
+        results.append(Whiteness(joint, p, float(np.mean(memory))))
+    return results
+
+
+def ljung_box(values: Array) -> float:
+    """p-value of the Ljung-Box test: small means that `values` are no white noise."""
+    n, lags = len(values), min(LAGS, len(values) // 5)
+    correlation = _autocorrelation(values)[1 : lags + 1]
+    statistic = n * (n + 2) * np.sum(correlation**2 / (n - np.arange(1, lags + 1)))
+    return float(stats.chi2.sf(statistic, lags))
+
+
+def cross_correlations(
+    trials: Sequence[Trial], errors: Sequence[Array], joints: Sequence[str]
+) -> list[CrossCorrelation]:
+    """Every joint's residual against velocity, acceleration, torque, ... of all joints, the strongest first."""
+    results = []
+    for index, joint in enumerate(joints):
+        causes: dict[str, list[tuple[float, float, float]]] = {}
+        for trial, error in zip(trials, errors, strict=True):
+            for name, cause in _causes(trial, joints).items():
+                causes.setdefault(name, []).append(_strongest(_filled(error[:, index]), cause, trial.step))
+        for name, values in causes.items():
+            correlation, delay, p = np.array(values).T
+            combined = float(stats.combine_pvalues(np.clip(p, 1e-300, 1), method="fisher").pvalue)
+            results.append(CrossCorrelation(joint, name, float(correlation.mean()), float(np.median(delay)), combined))
+    return sorted(results, key=lambda one: -abs(one.correlation))
+
+
+def _causes(trial: Trial, joints: Sequence[str]) -> dict[str, Array]:
+    velocity = trial.velocity()
+    acceleration = np.gradient(velocity, trial.step, axis=0)
+    direction = np.sign(np.where(np.abs(velocity) > 0.02, velocity, 0.0))
+    signals = {"position": trial.position, "velocity": velocity, "acceleration": acceleration}
+    signals["direction of motion"] = direction
+    if trial.torque is not None:
+        signals["torque"] = trial.torque
+    return {f"{name} of {joint}": values[:, j] for name, values in signals.items() for j, joint in enumerate(joints)}
+
+
+def _strongest(error: Array, cause: Array, step: float) -> tuple[float, float, float]:
+    """Correlation, delay [s] and p-value at the lag where the residual follows the cause best."""
+    a, b = error - error.mean(), cause - cause.mean()
+    scale = float(np.sqrt(np.sum(a * a) * np.sum(b * b)))
+    if scale == 0:
+        return 0.0, 0.0, 1.0
+    longest = min(round(LONGEST_DELAY / step), len(a) // 4)
+    full = signal.correlate(a, b, mode="full", method="fft") / scale
+    window = full[len(b) - 1 : len(b) + longest]
+    lag = int(np.argmax(np.abs(window)))
+    lags = slice(1, len(a) // 4)
+    shared = float(1 + 2 * np.sum(_autocorrelation(a)[lags] * _autocorrelation(b)[lags]))
+    effective = max(4.0, len(a) / max(1.0, shared))  # fewer independent samples, by Bartlett's factor
+    p = 2 * stats.norm.sf(abs(window[lag]) * np.sqrt(effective)) * max(1.0, longest / _memory(error))
+    return float(window[lag]), lag * step, float(min(1.0, p))
+
+
+def _memory(values: Array) -> float:
+    """Samples until the autocorrelation has fallen below 1/e."""
+    below = np.flatnonzero(_autocorrelation(values) < np.exp(-1))
+    return float(below[0]) if len(below) else float(len(values))
+
+
+def _autocorrelation(values: Array) -> Array:
+    centred = values - values.mean()
+    full = signal.correlate(centred, centred, mode="full", method="fft")[len(values) - 1 :]
+    return np.asarray(full / full[0] if full[0] > 0 else np.eye(1, len(values))[0])
+
+
+def _filled(values: Array) -> Array:
+    good = np.isfinite(values)
+    if good.all():
+        return values
+    return np.asarray(np.interp(np.arange(len(values)), np.flatnonzero(good), values[good]))

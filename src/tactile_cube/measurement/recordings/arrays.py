@@ -1,13 +1,12 @@
 """A recording out of arrays, for programs that have measured signals in memory."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,65 +84,46 @@ def recording_from_arrays(
         >>> trial = TrialArrays(command=q_d, position=q, torque=tau, kind="ramps")
         >>> recording = recording_from_arrays([trial, ...], ["elbow"], "arm.urdf", rate=500.0, kp=3.7, kd=0.25)
     """
+    if isinstance(rate, bool) or not (isinstance(rate, Real) and 0 < rate < float("inf")):
+        raise InputError(f"rate is {rate!r}; give the samples per second")
+    if isinstance(trials, TrialArrays) or not all(isinstance(trial, TrialArrays) for trial in trials):
+        raise InputError("trials: expected a list of TrialArrays")
+    described: dict[str, object] = {
+        "format": 1, "rate_hz": rate, "joints": list(joints), "gravity": gravity, "nominal": dict(nominal or {}),
+        "controller": {"kp": kp, "kd": kd, "torque_limit": torque_limit, "mode": mode},
+        "sensors": {"read": read, "position_resolution": resolution},
+    }  # fmt: skip
     try:
-        return _recorded(
-            trials, joints, urdf, rate, folder,
-            gravity=gravity, controller={"kp": kp, "kd": kd, "torque_limit": torque_limit, "mode": mode},
-            nominal=dict(nominal or {}), sensors={"read": read, "position_resolution": resolution},
-        )  # fmt: skip
+        tables = [_table(trial, number, len(joints), rate) for number, trial in enumerate(trials)]
+        description = Description.model_validate(described | {"trials": [table.entry for table in tables]})
+        text = urdf if isinstance(urdf, str) and urdf.lstrip().startswith("<") else read_rig(Path(urdf)).text
+        recording = RecordingTables(description, text, tables)
+        with tempfile.TemporaryDirectory() if folder is None else nullcontext(folder) as place:
+            made = Path(place) if folder is not None else Path(place) / "arrays"
+            write_recording(made, recording)
+            return read_recording(made)
     except ValidationError as error:
         raise InputError(describe(error)) from error
     except OSError as error:
         raise InputError(f"{error.filename}: {error.strerror}") from error
 
 
-def _recorded(
-    trials: Sequence[TrialArrays],
-    joints: Sequence[str],
-    urdf: str | Path,
-    rate: float,
-    folder: str | Path | None,
-    **described: object,
-) -> Recording:
-    if isinstance(rate, bool) or not (isinstance(rate, Real) and 0 < rate < float("inf")):
-        raise InputError(f"rate is {rate!r}; give the samples per second")
-    if isinstance(trials, TrialArrays) or not all(isinstance(trial, TrialArrays) for trial in trials):
-        raise InputError("trials: expected a list of TrialArrays")
-    tables = [_table(trial, number, len(joints), rate) for number, trial in enumerate(trials)]
-    entries = [table.entry for table in tables]
-    description = Description.model_validate(
-        {"format": 1, "rate_hz": rate, "joints": list(joints), "trials": entries} | described
-    )
-    recording = RecordingTables(description, _urdf_text(urdf), tables)
-    if folder is not None:
-        write_recording(Path(folder), recording)
-        return read_recording(folder)
-    with tempfile.TemporaryDirectory() as passing:
-        write_recording(Path(passing) / "arrays", recording)
-        return read_recording(Path(passing) / "arrays")
-
-
 def _table(trial: TrialArrays, number: int, joints: int, rate: float) -> TrialTable:
     given = {name: getattr(trial, name) for name in SIGNALS}
     signals = {name: None if one is None else _signal(one, name, number, joints) for name, one in given.items()}
-    command, position = signals["command"], signals["position"]
-    if command is None or position is None:
-        raise InputError(
-            f"trials[{number}]: {'command' if command is None else 'position'} is None; give (samples, joints)"
-        )
-    for name, signal in signals.items():
-        if signal is not None and len(signal) != len(command):
-            raise InputError(f"trials[{number}]: {name} has {len(signal)} samples, command has {len(command)}")
-    entry = TrialEntry(
-        file=f"trials/{trial.kind}_{number}.parquet", initialisation=trial.initialisation, kind=trial.kind
-    )
-    time = np.arange(len(command)) / rate
-    link_position, feedforward = signals["link_position"], signals["feedforward"]
-    return TrialTable(entry, time, command, position, signals["torque"], None, link_position, feedforward)
+    for name in ("command", "position"):
+        if signals[name] is None:
+            raise InputError(f"trials[{number}]: {name} is None; give (samples, joints)")
+    found: dict[str, Any] = {name: signal for name, signal in signals.items() if signal is not None}
+    samples, file = len(found["command"]), f"trials/{trial.kind}_{number}.parquet"
+    for name, signal in found.items():
+        if len(signal) != samples:
+            raise InputError(f"trials[{number}]: {name} has {len(signal)} samples, command has {samples}")
+    entry = TrialEntry(file=file, initialisation=trial.initialisation, kind=trial.kind)
+    return TrialTable(entry, np.arange(samples) / rate, **found)
 
 
 def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[np.float64]:
-    """The signal as (n, joints); a flat array will do for one joint."""
     try:
         signal = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -155,9 +135,3 @@ def _signal(values: ArrayLike, name: str, number: int, joints: int) -> NDArray[n
     if signal.ndim != 2 or signal.shape[1] != joints:
         raise InputError(f"trials[{number}]: {name} has shape {signal.shape}; expected (samples, {joints})")
     return signal
-
-
-def _urdf_text(urdf: str | Path) -> str:
-    if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
-        return urdf
-    return read_rig(Path(urdf)).text

@@ -1,33 +1,23 @@
 """Does recording.yaml agree with itself and with the URDF? Joints, couplings, gains, nominal values."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import suggestion
 from tactile_cube.drivetrain.model_file import MAY_BE_INFINITE
 from tactile_cube.errors import InputError
 from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
-from tactile_cube.measurement.recordings.trial import Gains
+from tactile_cube.measurement.recordings.trial import Array, Gains
 
-Array = NDArray[np.float64]
-DEFAULTS = {
-    "stiffness": np.inf,
-    "static_friction": 0.0,
-    "reflected_inertia": 0.0,
-    "friction_creep": 0.0,
-    "reading_delay": 0.0,
-}
+DEFAULTS = {"stiffness": np.inf}
+DEFAULTS |= dict.fromkeys(("static_friction", "reflected_inertia", "friction_creep", "reading_delay"), 0.0)
 """What may be stated of a drive, and its value where nothing is."""
-EFFECTS = {"viscous_friction": "damping"}
-"""Effects that may be stated too, by the value of one parameter."""
+EFFECTS = {"viscous_friction": "damping"}  # effects that may be stated too, by the value of one parameter
 SLOWER = 0.75  # share of the log's rate that rounding explains
 
 
@@ -163,7 +153,6 @@ def swap_warning(recording: Recording) -> list[str]:
 
 
 def _missing(tree: RigidBodyTree, gravity: Array, position: Array, torque: Array) -> float:
-    """RMS [N m] of measured torque minus the weight of the links."""
     still = np.zeros(tree.dofs)
     weight = np.stack([tree.coupling.T @ tree.equations(tree.expand(q), still, gravity)[1] for q in position])
     return float(np.sqrt(np.mean((torque - weight) ** 2)))

@@ -15,8 +15,7 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Mass = Annotated[Positive, Field(le=limits.MASS)]
 Rate = Annotated[Positive, Field(le=limits.RATE)]
-MOST_LATE = 64
-"""Rows by which commands may be logged late."""
+MOST_LATE = 64  # rows by which commands may be logged late
 Size = Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
 """Edge lengths of a box [m]; one number for a cube."""
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]

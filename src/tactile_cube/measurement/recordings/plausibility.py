@@ -5,14 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.columns import TrialColumns
 from tactile_cube.measurement.recordings.rig import RigJoint
-from tactile_cube.measurement.recordings.trial import Gains
+from tactile_cube.measurement.recordings.trial import Array, Gains
 
-Array = NDArray[np.float64]
 DEGREE = math.pi / 180.0
 MILLIMETRE = 1e-3
 IN_DEGREES = "this looks like degrees, recordings are in rad: import it by record source=csv source.angle_unit=deg"

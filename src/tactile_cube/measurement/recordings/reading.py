@@ -10,27 +10,20 @@ from tactile_cube import limits
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError
 from tactile_cube.hand.urdf_tree import with_own_files
-from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES, pick_columns, without_outliers
-from tactile_cube.measurement.recordings.consistency import (
-    check_coupling,
-    check_inertia,
-    check_joints,
-    check_nominal,
-    gains_of,
-    swap_warning,
+from tactile_cube.measurement.recordings import consistency, plausibility
+from tactile_cube.measurement.recordings.columns import (
+    MINIMUM_SAMPLES,
+    check_time,
+    on_grid,
+    pick_columns,
+    rows_of,
+    without_outliers,
 )
+from tactile_cube.measurement.recordings.consistency import check_nominal, gains_of
 from tactile_cube.measurement.recordings.description import Description, TrialEntry, per_joint
-from tactile_cube.measurement.recordings.plausibility import (
-    check_assignment,
-    check_links,
-    check_roles,
-    check_units,
-    without_wraps,
-)
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig, parse_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.timing import check_time, on_grid, rows_of
 from tactile_cube.measurement.recordings.trial import Trial, load_of
 from tactile_cube.untrusted_file import below, read_text
 
@@ -52,16 +45,16 @@ def read_recording(folder: str | Path) -> Recording:
     rig = parse_rig(read_text(path, "; recording.yaml names it under 'rig'"), path)
     urdf, not_drawn = with_own_files(rig.text, rig.path, folder)
     rig = replace(rig, text=urdf)
-    check_joints(description, rig, file)
+    consistency.check_joints(description, rig, file)
     try:
         recording = _assemble(folder, description, rig)
     except InputError:
         raise
     except ValueError as error:
         raise InputError(f"{file}: {error}") from None
-    check_inertia(recording)
+    consistency.check_inertia(recording)
     warnings = [f"{rig.path}: {line}" for line in recording.rigid_body().corrected]
-    warnings += [*recording.warnings, *swap_warning(recording)]
+    warnings += [*recording.warnings, *consistency.swap_warning(recording)]
     if not_drawn:
         warnings.append(f"{rig.path}: {len(not_drawn)} shapes are not drawn, the first for this: {not_drawn[0]}")
     return replace(recording, warnings=tuple(warnings))
@@ -71,7 +64,7 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
     file, joints = folder / DESCRIPTION, tuple(description.joints)
     nominal = {key: per_joint(value, joints, f"nominal.{key}") for key, value in description.nominal.items()}
     check_nominal(nominal, joints)
-    warnings = [f"{file}: {line}" for line in (*description.doubts, *check_coupling(description, rig))]
+    warnings = [f"{file}: {line}" for line in (*description.doubts, *consistency.check_coupling(description, rig))]
     trials, gains, left = [], gains_of(description, None, "controller"), limits.NUMBERS
     undamped = [joint for joint, kd in zip(joints, gains.kd, strict=True) if kd == 0]
     if description.controller.mode == "position" and undamped:
@@ -89,19 +82,18 @@ def _assemble(folder: Path, description: Description, rig: Rig) -> Recording:
 
 
 def _trial(path: Path, most: int, entry: TrialEntry, description: Description, rig: Rig, key: str) -> Trial:
-    """One trial, checked and on the uniform grid of the recording's rate."""
     joints, rate = tuple(description.joints), description.rate_hz
     gains = gains_of(description, entry, key)
     columns, warnings = pick_columns(read_table(path, most), joints, path)
     columns, time_warnings = check_time(columns, rate, path)
     ranges = [rig.joints[joint] for joint in joints]
-    columns, wrapped = without_wraps(columns, ranges, path)
+    columns, wrapped = plausibility.without_wraps(columns, ranges, path)
     warnings += wrapped
     if description.controller.mode == "position":
-        warnings += check_units(columns, ranges, gains, path)
-        warnings += check_assignment(columns, ranges, path) if entry.object is None else []
-        warnings += check_roles(columns, joints, path)
-    check_links(columns, joints, path)
+        warnings += plausibility.check_units(columns, ranges, gains, path)
+        warnings += plausibility.check_assignment(columns, ranges, path) if entry.object is None else []
+        warnings += plausibility.check_roles(columns, joints, path)
+    plausibility.check_links(columns, joints, path)
     columns, outlying, single = without_outliers(columns, joints, path)
     grid, valid = on_grid(columns, rate)
     stamps = (columns.time[outlying] - columns.time[0]) * rate

@@ -14,10 +14,8 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import rigid_body
 from tactile_cube.measurement.recordings.description import Coupling, Description
 from tactile_cube.measurement.recordings.rig import Rig
-from tactile_cube.measurement.recordings.trial import Gains, Trial
+from tactile_cube.measurement.recordings.trial import Array, Gains, Trial
 from tactile_cube.measurement.units import SLIDES, TURNS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -99,10 +97,10 @@ class Recording:
 
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
-        values = getattr(self.gains, constant, self.nominal.get(constant))
-        return (
-            None if values is None or constant in self.description.unknown else float(values[self.joints.index(joint)])
-        )
+        values: Array | None = getattr(self.gains, constant, self.nominal.get(constant))
+        if values is None or constant in self.description.unknown:
+            return None
+        return float(values[self.joints.index(joint)])
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
         """The mechanism.

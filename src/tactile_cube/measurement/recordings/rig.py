@@ -105,12 +105,8 @@ def parse_rig(text: str, path: Path) -> Rig:
         raise InputError(f"{path}: {error}") from None
     if not joints:
         raise InputError(f"{path}: not a URDF with movable joints")
-    leaders = {joint.name: joint.coupling.joint for joint in joints if joint.coupling is not None}
-    return Rig(
-        text,
-        path,
-        {
-            j.name: RigJoint(j.name, j.lower, j.upper, leaders.get(j.name), j.prismatic, j.velocity, j.effort)
-            for j in joints
-        },
-    )
+    found = {}
+    for j in joints:
+        leader = j.coupling.joint if j.coupling is not None else None
+        found[j.name] = RigJoint(j.name, j.lower, j.upper, leader, j.prismatic, j.velocity, j.effort)
+    return Rig(text, path, found)

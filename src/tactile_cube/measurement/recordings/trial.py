@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tactile_cube.measurement.recordings.columns import TrialColumns
 from tactile_cube.measurement.recordings.description import Grasp, HeldObject, KnownForce, Touch
 
 Array = NDArray[np.float64]
@@ -54,37 +55,27 @@ def load_of(held: HeldObject, grasp: Grasp) -> Load:
     )
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One trial; `command[k]` acts from `time[k]` to `time[k + 1]`, `sensors.read` says when `position[k]` was read.
+@dataclass(frozen=True, kw_only=True)
+class Trial(TrialColumns):
+    """One trial at uniform time steps from 0; `command[k]` acts from `time[k]` to `time[k + 1]`.
 
     Attributes:
         name: file name without its ending.
         file: path inside the recording's folder.
         kind: kind of excitation; trials of one kind repeat one command.
         initialisation: robot initialisation it belongs to; each has joint offsets of its own.
-        time: (n,) uniform, starts at 0 [s].
-        command: (n, joints) desired position [rad] ([N m] where the controller's mode is `torque`).
-        position: (n, joints) measured position, on the motor side [rad].
-        torque: (n, joints) measured torque [N m], or None.
         valid: (n,) False where a dropped sample was interpolated; such samples count in no error.
         gains: the controller in this trial.
         force: a known force on a link, or None.
         clamped: the links were held still.
         touch: the link ended at a known place, or None.
         load: the object that the hand held, or None.
-        link_position: (n, joints) measured on the link side [rad], nan where a joint has no sensor there; or None.
-        feedforward: (n, joints) torque that the controller added to its own [N m], acting like `command`; or None.
     """
 
     name: str
     file: str
     kind: str
     initialisation: int
-    time: Array
-    command: Array
-    position: Array
-    torque: Array | None
     valid: NDArray[np.bool_]
     gains: Gains
     force: KnownForce | None = None
@@ -92,8 +83,6 @@ class Trial:
     touch: Touch | None = None
     warnings: tuple[str, ...] = field(default=(), repr=False)
     load: Load | None = None
-    link_position: Array | None = None
-    feedforward: Array | None = None
 
     @property
     def linked(self) -> NDArray[np.int64]:

@@ -13,17 +13,15 @@ import yaml
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError, warn
-from tactile_cube.measurement.recordings.columns import SIGNALS
+from tactile_cube.measurement.recordings.columns import SIGNALS, rows_of
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.reading import DESCRIPTION, read_recording
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.timing import rows_of
 from tactile_cube.untrusted_file import below
 from tactile_cube.whole_file import whole_file, write_npz, write_whole, written_together
 
 Array = NDArray[np.float64]
-BLOCK = 100_000
-"""Rows of a table that are written at a time: signals may lie on the disk, as those of a log do."""
+BLOCK = 100_000  # rows of a table that are written at a time: signals may lie on the disk, as those of a log do
 
 
 @dataclass(frozen=True)
@@ -84,24 +82,20 @@ def _write_table(path: Path, table: TrialTable, joints: Sequence[str]) -> None:
                 columns[f"{joint}.{signal}"] = values[:, index]
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".npz":
-        write_npz(path, _narrow(columns))
-    elif path.suffix == ".csv":
-        write_whole(path, polars.DataFrame(_narrow(columns)).write_csv().encode())
-    else:
-        _write_parquet(path, columns)
+        return write_npz(path, _narrow(columns))
+    if path.suffix == ".csv":
+        return write_whole(path, polars.DataFrame(_narrow(columns)).write_csv().encode())
+    from pyarrow import parquet  # imports slowly
+    from pyarrow import table as rows
+
+    schema = rows(_narrow(columns, slice(0))).schema
+    with whole_file(path) as file, parquet.ParquetWriter(file, schema, compression="zstd") as writer:
+        for first in range(0, len(columns["time"]), BLOCK):
+            writer.write_table(rows(_narrow(columns, slice(first, first + BLOCK))))
 
 
 def _narrow(columns: Mapping[str, Array], rows: slice = slice(None)) -> dict[str, NDArray[np.floating]]:
     return {name: values[rows].astype("f8" if name == "time" else "f4") for name, values in columns.items()}
-
-
-def _write_parquet(path: Path, columns: Mapping[str, Array]) -> None:
-    from pyarrow import parquet, table  # imports slowly
-
-    schema = table(_narrow(columns, slice(0))).schema
-    with whole_file(path) as file, parquet.ParquetWriter(file, schema, compression="zstd") as writer:
-        for first in range(0, len(columns["time"]), BLOCK):
-            writer.write_table(table(_narrow(columns, slice(first, first + BLOCK))))
 
 
 def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
@@ -121,11 +115,7 @@ def cut_trial(trial: TrialTable, length: float | None) -> list[TrialTable]:
 
 
 def require_free(out: Path) -> None:
-    """Refuse a folder that holds something.
-
-    Raises:
-        InputError: it does.
-    """
+    """Refuse, by an InputError, a folder that holds something."""
     if (out / DESCRIPTION).exists():
         raise InputError(f"out={out}: holds a recording already; choose another folder or remove it")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -142,7 +132,10 @@ def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
     aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
         for name, tables in parts.items():
-            _say_understood(tables.understood)
+            if rows := tables.understood:
+                widths = [max(len(row[0]) for row in rows), max((len(row[1]) for row in rows if row[2]), default=0)]
+                lines = [f"  {what:<{widths[0]}}  {how:<{widths[1]}}  {by}".rstrip() for what, how, by in rows]
+                print("\n".join(["understood, and what told it:", *lines]))
             recording = _written(aside / name, tables, out / name)
             seconds = sum(trial.duration for trial in recording.trials)
             kinds = ", ".join(dict.fromkeys(trial.kind for trial in recording.trials))
@@ -152,13 +145,6 @@ def write_recordings(out: Path, parts: Mapping[str, RecordingTables]) -> None:
         aside.replace(out)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
-
-
-def _say_understood(rows: Sequence[tuple[str, str, str]]) -> None:
-    if rows:
-        widths = [max(len(row[0]) for row in rows), max((len(row[1]) for row in rows if row[2]), default=0)]
-        lines = [f"  {what:<{widths[0]}}  {how:<{widths[1]}}  {by}".rstrip() for what, how, by in rows]
-        print("\n".join(["understood, and what told it:", *lines]))
 
 
 def _written(folder: Path, tables: RecordingTables, place: Path) -> Recording:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tactile_cube.drivetrain.model_file import ModelFile
@@ -14,14 +14,13 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Load, Trial
+from tactile_cube.measurement.recordings.trial import Array, Load, Trial
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
 from tactile_cube.simulation.contact_effects import contact_catalogue
 from tactile_cube.simulation.engine import EngineName
 
-Array = NDArray[np.float64]
 NO_FILTER = 1e-6  # [s] a recording's commands are what reaches the controller, already filtered
 RIGID = 1e6  # [N m/rad] of a drive without a stated elasticity
 LEAST_INERTIA = 5e-4  # [kg m^2] below which the torque loop is unstable; the world's own value is taken instead
@@ -73,15 +72,9 @@ class HandReplay:
         hand: Hand = DLR_HAND2,
         engine: EngineName = "bullet",
     ) -> None:
-        """Builds the world.
+        """Builds the world of a recording of the whole hand; the model's joint offsets are not used.
 
-        Args:
-            recording: of the whole hand.
-            model: constants and effects of the drivetrain; its joint offsets are not used.
-            step: longest physics step [s].
-            iterations: of the contact solver.
-            hand: the hand that was recorded.
-            engine: of the world: bullet or mujoco.
+        Physics steps last `step` [s] at most, with so many iterations of the contact solver.
 
         Raises:
             InputError: the recording is of another mechanism, or its commands are torques.
@@ -102,17 +95,15 @@ class HandReplay:
         self._world.close()
 
     def simulate(self, trial: Trial, contact: ContactModel, offset: Array, until: float = np.inf) -> Simulated:
-        """One trial from its measured start.
+        """One trial with an object from its measured start, to `until` [s] at least.
 
-        Args:
-            trial: with an object.
-            contact: values of contact effects.
-            offset: what the sensors read too much (joints,) [rad].
-            until: time at which the simulation may end [s].
+        The sensors read `offset` (joints,) [rad] too much.
         """
         load = trial.load
         assert load is not None, "only trials with an object are simulated here"
-        constants = contact.apply(replace(self._of_load(load), joint_offset=offset[self._order]))
+        held: dict[str, Any] = {"cube_size": load.size, "cube_mass": load.mass, "cube_com": load.com}
+        held |= {"gravity_onset": round(load.released * self.recording.rate), "joint_offset": offset[self._order]}
+        constants = contact.apply(replace(self._nominal, **held))
         self._world.reset(constants, self._start(trial, load, offset, np.asarray(constants.stiffness)))
         rows = min(len(trial.time), round(min(until, trial.duration + trial.step) * self.recording.rate))
         position, torque = np.zeros((2, rows, len(self._order)))
@@ -126,7 +117,6 @@ class HandReplay:
         return Simulated(position[:, self._back], torque[:, self._back])
 
     def _constants(self) -> EpisodeConstants:
-        """What is known of the drivetrain, as the world names it."""
         own = {key: value[self._order] for key, value in self._model.constants.items()}
         inertia, default = own["reflected_inertia"], EpisodeConstants().reflected_inertia
         gravity = self.hand.rotation @ self.recording.gravity
@@ -142,10 +132,6 @@ class HandReplay:
             static_friction=own["static_friction"],
             reflected_inertia=np.where(inertia < LEAST_INERTIA, default, inertia),
         )
-
-    def _of_load(self, load: Load) -> EpisodeConstants:
-        onset = round(load.released * self.recording.rate)
-        return replace(self._nominal, cube_size=load.size, cube_mass=load.mass, cube_com=load.com, gravity_onset=onset)
 
     def _start(self, trial: Trial, load: Load, offset: Array, stiffness: Array) -> Start:
         position = trial.position[:START].mean(axis=0)

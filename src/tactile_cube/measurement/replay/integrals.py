@@ -1,13 +1,11 @@
 """Integrals of a controller where a window begins: they have grown by errors that are logged, whatever a model says."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.compiled import compiled_once
 from tactile_cube.drivetrain import Plant
-from tactile_cube.drivetrain.effects.controller import IntegralAction
+from tactile_cube.drivetrain.effects.command import IntegralAction
 from tactile_cube.drivetrain.signals import TORQUE
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.windows import Windows
@@ -36,24 +34,10 @@ def wind_up(plant: Plant, model: Model, windows: Windows, memory: Array) -> None
     position, command, speed = np.moveaxis(windows.trial_start[:, :, None], 1, 0).copy()
     begun, unmoved = memory.copy(), np.zeros((count, 2 * position.shape[2]))
     plant.reset(begun, position[:, 0], speed[:, 0])
-    plant.kernel.segments_batch(
-        command,
-        np.arange(count),
-        np.ones(count, dtype=np.int64),
-        0,
-        1,
-        1,
-        position,
-        speed,
-        unmoved,
-        unmoved,
-        begun,
-        np.zeros((count, 1)),
-        np.array([TORQUE]),
-        0,
-        count,
-        np.zeros((count, 1, 1, position.shape[2])),
-    )
+    which, lengths, starts = np.arange(count), np.ones(count, dtype=np.int64), (position, speed, unmoved, unmoved)
+    out, no_path = np.zeros((count, 1, 1, position.shape[2])), np.zeros((count, 1))
+    rows = np.array([TORQUE])
+    plant.kernel.segments_batch(command, which, lengths, 0, 1, 1, *starts, begun, no_path, rows, 0, count, out)
     balance = plant.view(begun, f"state:{IntegralAction.name}")[:, :, 1]
     values = {t.joint: t.values for t in model.terms if t.effect is IntegralAction}
     for j in joints:

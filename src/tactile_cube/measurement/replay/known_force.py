@@ -19,12 +19,10 @@ def force_torque(tree: RigidBodyTree, force: KnownForce, position: Array) -> Arr
     """
     if force.joint not in tree.dof_names:
         raise InputError(f"trials: key 'force.joint': '{force.joint}' is not a joint of the rig {list(tree.dof_names)}")
-    last = tree.dof_names.index(force.joint)
-    frames = link_frames(tree, position)
-    rotation, origin = frames[last]
+    dof, frames = tree.dof_names.index(force.joint), link_frames(tree, position)
+    rotation, origin = frames[dof]
     point, vector = origin + rotation @ np.asarray(force.point), np.asarray(force.vector)
     torque = np.zeros(len(tree.joint_names))
-    dof = last
     while dof >= 0:
         rotation, origin = frames[dof]
         axis = rotation @ tree.axis[dof]

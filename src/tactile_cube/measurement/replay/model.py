@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tactile_cube.drivetrain.effects import resolve
 from tactile_cube.drivetrain.effects.catalogue import catalogue
-from tactile_cube.drivetrain.effects.effect import Effect, Stage
+from tactile_cube.drivetrain.effects.effect import Array, Effect, Stage
 
-Array = NDArray[np.float64]
 EffectClass = type[Effect]
 
 

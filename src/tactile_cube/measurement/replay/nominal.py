@@ -14,8 +14,7 @@ from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.replay.model import Model, Term, terms_of
 
 Array = NDArray[np.float64]
-STATED = 0.5
-"""Part by which a stated effect may be wrong: damping is copied from one model to the next."""
+STATED = 0.5  # part by which a stated effect may be wrong: damping is copied from one model to the next
 CONTROLLER = ("kp", "kd", "torque_limit")
 TORQUE_MODE_GAIN = 1e-6  # [N m/rad] a commanded torque u is the position u / gain at this gain
 
@@ -27,8 +26,14 @@ def nominal_model(recording: Recording, known: ModelFile | None = None) -> Model
     two recordings. Else what was found on one would soak up what is new in another.
     """
     constants = {key: np.array([one.value for one in row]) for key, row in _estimates(recording, known).items()}
-    terms = tuple(term for one in _effects(recording, known) for term in _terms(one, recording))
-    return Model(constants, terms, no_offsets(recording))
+    terms = []
+    for one in _effects(recording, known):
+        given = {name: estimate.value for name, estimate in one.parameters.items()}
+        free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
+        expected = {name: (e.value, 0.5 * (e.high - e.low)) for name, e in one.parameters.items() if name in free}
+        placed = resolve([one.effect], recording.joints)
+        terms += [Term(kind, joint, kind(joint, **given).values, free, expected) for kind, joint in placed]
+    return Model(constants, tuple(terms), no_offsets(recording))
 
 
 def no_offsets(recording: Recording) -> dict[int, Array]:
@@ -39,14 +44,9 @@ def no_offsets(recording: Recording) -> dict[int, Array]:
 def draw_model(
     recording: Recording, known: ModelFile | None, spread: Mapping[str, float], rng: np.random.Generator
 ) -> Model:
-    """One randomised model.
+    """One randomised model about the owner's values; what has an interval in `known` is drawn from that.
 
-    Args:
-        recording: its owner's values are the centre.
-        known: values with an interval are drawn from the interval.
-        spread: relative half width for a constant without an interval; `offset` is the half width [rad] of joint
-            offsets.
-        rng: source of randomness.
+    `spread` is the relative half width of a constant without an interval; its `offset` that of joint offsets [rad].
     """
     constants = {
         key: np.array([_drawn(one, spread.get(key, 0.0), rng) for one in row])
@@ -56,12 +56,13 @@ def draw_model(
         (one.effect, {key: _drawn(value, 0.0, rng) for key, value in one.parameters.items()})
         for one in _effects(recording, known)
     ]
-    offset = _offset(recording, known, spread.get("offset", 0.0), rng)
+    width, offsets = spread.get("offset", 0.0), known.offsets if known is not None else {}
+    bounds = [(offsets[j].low, offsets[j].high) if j in offsets else (-width, width) for j in recording.joints]
+    offset = -np.array([rng.uniform(low, high) for low, high in bounds])
     return Model(constants, terms_of(effects, recording.joints), dict.fromkeys(no_offsets(recording), offset))
 
 
 def _effects(recording: Recording, known: ModelFile | None) -> list[EffectEstimate]:
-    """What is known of effects, or stated of them and may be wrong by `STATED`."""
     if known is not None:
         return known.drive_effects
     return _unknown_masses(recording) + [
@@ -79,32 +80,12 @@ def _unknown_masses(recording: Recording) -> list[EffectEstimate]:
     """Masses of links that are guesses: more or less where they are now, by as much as they are or less."""
     if "mass" not in recording.description.unknown:
         return []
-    return [
-        EffectEstimate(
-            effect=f"payload@{joint}",
-            parameters={
-                "mass": Estimate(value=0.0, low=-one.mass, high=one.mass),
-                "distance": Estimate.model_validate(one.lever),
-            },
-        )
-        for joint, one in zip(recording.joints, joint_scales(recording), strict=True)
-    ]
-
-
-def _terms(one: EffectEstimate, recording: Recording) -> list[Term]:
-    given = {name: estimate.value for name, estimate in one.parameters.items()}
-    free = tuple(name for name, estimate in one.parameters.items() if estimate.high > estimate.low)
-    expected = {name: (e.value, 0.5 * (e.high - e.low)) for name, e in one.parameters.items() if name in free}
-    return [
-        Term(effect, joint, effect(joint, **given).values, free, expected)
-        for effect, joint in resolve([one.effect], recording.joints)
-    ]
-
-
-def _offset(recording: Recording, known: ModelFile | None, width: float, rng: np.random.Generator) -> Array:
-    offsets = known.offsets if known is not None else {}
-    bounds = [(offsets[j].low, offsets[j].high) if j in offsets else (-width, width) for j in recording.joints]
-    return -np.array([rng.uniform(low, high) for low, high in bounds])
+    found = []
+    for joint, one in zip(recording.joints, joint_scales(recording), strict=True):
+        mass = Estimate(value=0.0, low=-one.mass, high=one.mass)
+        parameters = {"mass": mass, "distance": Estimate.model_validate(one.lever)}
+        found.append(EffectEstimate(effect=f"payload@{joint}", parameters=parameters))
+    return found
 
 
 def _drawn(estimate: Estimate, spread: float, rng: np.random.Generator) -> float:
@@ -133,10 +114,6 @@ def _estimates(recording: Recording, known: ModelFile | None) -> dict[str, list[
 
 
 def require_same_joints(recording: Recording, model: ModelFile) -> None:
-    """Refuse a model of another rig.
-
-    Raises:
-        InputError: the model's joints are not the recording's.
-    """
+    """Refuse, by an InputError, a model whose joints are not the recording's."""
     if set(model.joints) != set(recording.joints):
         raise InputError(f"model: joints {model.joints} are not those of the recording, {list(recording.joints)}")

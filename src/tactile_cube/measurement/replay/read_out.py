@@ -23,10 +23,7 @@ def jump_ratio(plant: Plant, memory: Array, command: Array) -> tuple[Array, Arra
     Two steps of a copy, with and without a jump in the second one. An effect that holds the command back, such as a
     delay, does not let the probe pass; then the plain drive's ratio holds, for the jump comes later.
 
-    Args:
-        plant: the drivetrain.
-        memory: (size,) the model at the start of a trial; left as it is.
-        command: (n,) [rad].
+    `memory` (size,) is the model at the start of a trial, `command` (n,) in [rad].
     """
     seen = []
     kp, compliance = plant.view(memory, "kp"), plant.view(memory, "compliance")
@@ -54,14 +51,9 @@ def gaps(plant: Plant, memory: Array) -> Array:
 
 
 def free_way(plant: Plant, memory: Array, jump: Array, lead: Array, gain: Array) -> Array:
-    """The part of a jump of the command that a motor makes freely, within the gap of a transmission.
+    """The part of a jump of the command [rad] that a motor makes freely, within the gap of a transmission.
 
-    Args:
-        plant: the drivetrain.
-        memory: (..., size).
-        jump: (..., n) of the command [rad].
-        lead: (..., n) signal LEAD after the jump [rad].
-        gain: (..., n) signal LOOP_GAIN [N m/rad].
+    Memory is (..., size), `jump` (..., n); `lead` and `gain` are the signals LEAD and LOOP_GAIN after the jump.
     """
     if Backlash not in plant.effects:
         return np.zeros_like(jump)
@@ -77,11 +69,7 @@ def simulated_jumps(acting: Array, windows: Windows) -> Array:
     """Simulated command at each reading less the one that the log feels (S, K segment, n).
 
     Known exactly unless an effect changes the command on its way; then half the change across the reading, smoothed
-    where a row is one step.
-
-    Args:
-        acting: (S, K segment substeps, n) what acted in each step [rad].
-        windows: what was simulated.
+    where a row is one step. `acting` (S, K segment substeps, n) acted in each step [rad].
     """
     first, fine = windows.history * windows.substeps, windows.substeps
     if np.array_equal(acting, windows.commands[:, first:]):
@@ -102,18 +90,11 @@ def read_out(
     torque_limit: Array,
     free: Array | float = 0.0,
 ) -> tuple[Array, Array]:
-    """Position [rad] and torque [N m] under the command that a log's instant feels.
+    """Position [rad] and torque [N m] (..., joints) under the command that a log's instant feels.
 
-    Args:
-        position: (..., joints) simulated motor positions at the instants of reading [rad].
-        torque: (..., joints) [N m].
-        jump: (..., joints) the simulated command less the one that the log feels [rad].
-        ratios: (..., joints) jump of position [1] and of torque [N m/rad] per jump of the command, see `jump_ratio`.
-        torque_limit: (..., joints) [N m]; a torque at its limit does not jump.
-        free: (..., joints) the part of the jump that the motor follows without torque [rad], see `free_way`.
-
-    Returns:
-        position and torque, (..., joints): without the jump in torque and in the drive's deflection.
+    What was simulated under a command that is `jump` [rad] more, of which the motor follows `free` without torque (see
+    `free_way`), is freed of the jump in torque and deflection (`ratios`, see `jump_ratio`), unless its torque is at the
+    limit.
     """
     felt = np.where(np.abs(torque) < 0.999 * torque_limit, jump - free, 0.0)
     return position - free - ratios[0] * felt, torque - ratios[1] * felt
@@ -122,15 +103,9 @@ def read_out(
 def before_steps(signals: Array, segment: int, substeps: int) -> tuple[Array, NDArray[np.bool_]]:
     """What a row would show had its command not changed: the line through the last two steps of the row before.
 
-    For a jump of the command that asks for much: `jump_ratio` does not know where a torque meets its limit.
-
-    Args:
-        signals: (S, K segment substeps, ..., joints) of every step.
-        segment: rows after which the simulation starts anew.
-        substeps: steps of a row; the first one takes the mean of two commands, so there must be three.
-
-    Returns:
-        (S, K segment, ..., joints), and which rows have a row before them (K segment,).
+    For a jump of the command that asks for much: `jump_ratio` does not know where a torque meets its limit. From
+    signals of every step (S, K segment substeps, ..., joints), three a row at least since the first one takes the mean
+    of two commands, it gives (S, K segment, ..., joints), and which rows have a row before them (K segment,).
     """
     shown = signals[:, ::substeps].copy()
     known = np.arange(shown.shape[1]) % segment > 0

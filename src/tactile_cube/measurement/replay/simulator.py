@@ -1,14 +1,12 @@
 """A recorded rig in simulation: many models at once, in segments started anew or freely, on all cores."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,31 +15,21 @@ from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.catalogue import catalogue
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
+from tactile_cube.drivetrain.plant import TREE_KEYS
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
 from tactile_cube.measurement.comparing.noise_floor import LEAST, sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.integrals import integrating_joints, wind_up
 from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
 
-Array = NDArray[np.float64]
 CLAMPED = 1e9  # [N m] brake torque of a clamped link
-MECHANICS = (
-    "ratio",
-    "offset",
-    "mass",
-    "placement_translation",
-    "axis",
-    "com",
-    "placement_rotation",
-    "inertia",
-    "gravity",
-)
-"""What the equations of motion of a path depend on, but for rotors."""
+DRIVE = ("kp", "kd", "stiffness", "static_friction", "reflected_inertia", "torque_limit")
+MECHANICS = (*TREE_KEYS, "gravity")  # what the equations of motion of a path depend on, but for rotors
 
 
 @dataclass(frozen=True)
@@ -68,13 +56,7 @@ class Path:
 
 
 def free_run(recording: Recording, model: Model, step: float = 0.002) -> list[Simulated]:
-    """Every trial of a recording simulated freely from its start.
-
-    Args:
-        recording: rig and trials.
-        model: with joint offsets for each of the trials' initialisations.
-        step: longest integration step [s].
-    """
+    """Every trial of a recording simulated freely from its start, in steps of `step` [s] at most."""
     simulator = Simulator(recording, [term.effect for term in model.terms], step)
     try:
         return simulator.free_runs([model])[0]
@@ -86,19 +68,12 @@ class Simulator:
     """The drivetrain that training uses as a recording's rig, with every effect that a model may have compiled in."""
 
     def __init__(
-        self,
-        recording: Recording,
-        effects: Sequence[type[Effect]] = (),
-        step: float = 0.002,
-        time: float = 1.0,
+        self, recording: Recording, effects: Sequence[type[Effect]] = (), step: float = 0.002, time: float = 1.0
     ) -> None:
         """Build the plant; its kernel is compiled once and kept on disk.
 
-        Args:
-            recording: rig, controller and sampling step.
-            effects: a user's classes that a model may use, beside those of the catalogue.
-            step: longest integration step [s]; a whole number of steps fits between two samples.
-            time: what a second of a finger stands for [s].
+        A model may use `effects` of a user beside the catalogue. A whole number of steps of `step` [s] at most fits
+        between two samples; `time` is what a second of a finger stands for [s].
         """
         self.recording = recording
         self.time = time
@@ -139,18 +114,13 @@ class Simulator:
         torques: bool = False,
         near: Path | None = None,
     ) -> Array:
-        """Each model through its windows, the start of each segment moved by the model's correction.
+        """Each of M models through its windows (of one shape), with its correction at the start of each segment.
 
-        Args:
-            models: M of them.
-            windows: one each, of one shape (S windows of K segments).
-            corrections: (M, 2 n) added to positions [rad] and speeds [rad/s] at every start.
-            torques: whether to give torques as well.
-            near: path of a model that they are close to: they follow it, at a third of the cost. Those of another
-                mechanism go their own way.
+        Corrections (M, 2 n) are added to positions [rad] and speeds [rad/s]. Models follow the path of one that they
+        are `near` to, at a third of the cost; those of another mechanism go their own way.
 
         Returns:
-            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and torques [N m].
+            What a log would show, (M, 1 or 2, S, K segment, sensors): positions [rad] and, if wanted, torques [N m].
         """
         out = np.zeros((len(models), 1 + torques, *windows[0].measured.shape))
         if corrections is None:
@@ -183,17 +153,9 @@ class Simulator:
 
     def memory(self, model: Model) -> Array:
         """Memory (size,) of the plant with a model's constants and effects."""
-        known = model.constants
-        constants = DrivetrainConstants(
-            kp=known["kp"],
-            kd=known["kd"],
-            stiffness=known["stiffness"],
-            static_friction=known["static_friction"],
-            reflected_inertia=known["reflected_inertia"],
-            torque_limit=known["torque_limit"],
-        )
-        memory: Array = self.plant.memory(constants, gravity=self.recording.gravity)
-        self.plant.view(memory, "friction_creep")[:] = known.get("friction_creep", 0.0)
+        known: dict[str, Any] = {key: model.constants[key] for key in DRIVE}
+        memory: Array = self.plant.memory(DrivetrainConstants(**known), gravity=self.recording.gravity)
+        self.plant.view(memory, "friction_creep")[:] = model.constants.get("friction_creep", 0.0)
         for term in model.terms:
             self.plant.set_effect(memory, term.effect, term.joint, term.values)
         return memory
@@ -236,7 +198,7 @@ class Simulator:
             _zero_links(out[0], windows, joints)
 
     def _as_read(self, position: Array, model: Model, windows: Windows) -> Array:
-        """Positions (S, K segment, M) as old as the log reads them, within each segment."""
+        """Positions (S, K segment, M) as old as the log reads them."""
         delay = model.constants.get("reading_delay", np.zeros(1))
         if not delay.any():
             return position
@@ -257,26 +219,12 @@ class Simulator:
     ) -> None:
         count, fine = len(windows), windows.substeps
         commands = np.ascontiguousarray(windows.commands[:, windows.history * fine - past :])
+        lengths, segment = np.full(count, signals.shape[1]), windows.segment * fine
+        starts = (windows.position, windows.speed, windows.initial_state, np.tile(correction, (count, 1)))
+        given = (commands, np.arange(count), lengths, past, 1, segment, *starts, memory, paths, rows)
 
         def run(first: int, last: int) -> None:
-            self.plant.kernel.segments_batch(
-                commands,
-                np.arange(count),
-                np.full(count, signals.shape[1]),
-                past,
-                1,
-                windows.segment * fine,
-                windows.position,
-                windows.speed,
-                windows.initial_state,
-                np.tile(correction, (count, 1)),
-                memory,
-                paths,
-                rows,
-                first,
-                last,
-                signals,
-            )
+            self.plant.kernel.segments_batch(*given, first, last, signals)
 
         if pool is None:
             run(0, count)
@@ -316,9 +264,8 @@ class Simulator:
         """What the sensors show at once of a jump of the command, see `jump_ratio`, (S, 1, n) each."""
         first = windows.commands[:, windows.history * windows.substeps]
         _, chosen, which = np.unique(windows.gains, axis=0, return_index=True, return_inverse=True)
-        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])
-        position, torque = np.moveaxis(found[which.ravel()], 1, 0)[:, :, None]
-        return position, torque
+        found = np.array([jump_ratio(self.plant, memory[k], first[k]) for k in chosen])[which.ravel(), :, None]
+        return found[:, 0], found[:, 1]
 
     def _links(self, model: Model, windows: Windows) -> Array:
         """Link positions (S, n) near those of the first row: measured less what the motor leads at the first torque."""

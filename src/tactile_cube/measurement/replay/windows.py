@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.nominal import TORQUE_MODE_GAIN
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
-SEGMENT = (
-    0.4  # [s] identification works best with 0.2-0.5 s: longer, and a wrong start is no longer told from a wrong model
-)
+SEGMENT = 0.4  # [s] identification works best with 0.2-0.5 s: a wrong start is no longer told from a wrong model beyond
 WINDOW = 11  # segments simulated without a break, so that effects with a memory keep it
 LEAD = 1  # segments at the beginning of a window that only wake such memories, unless a trial begins there
 HISTORY = 8.0  # [s] of commands before a window at most, for effects that remember them, such as a rate limit
@@ -28,25 +25,6 @@ FEWEST_AROUND = 3  # samples on either side of a start that its speed is read fr
 WELL = 0.1  # of the speed that has to be told, where fewer samples than usual are taken
 FEWEST = 4  # samples that a window after a trial's first one needs
 NO_LINKS = np.zeros(0, dtype=np.int64)
-ROWS = (
-    "commands",
-    "measured",
-    "jump",
-    "weight",
-    "position",
-    "speed",
-    "acceleration",
-    "start_noise",
-    "gains",
-    "trial",
-    "initialisation",
-    "time",
-    "clamped",
-    "initial_state",
-    "trial_start",
-    "wound",
-)
-"""Arrays with one row a window."""
 SMOOTHING = 0.025  # [s] half width of the polynomial that reads the speed at a segment's start
 START_SPEED = 0.02  # [rad/s] how well the speed at a segment's start is known beforehand
 SAFE = 0.25  # part of the torque limit below which a jump of the command is answered in proportion
@@ -115,15 +93,13 @@ class Windows:
         return int(self.position.shape[1])
 
     def __len__(self) -> int:
-        """S."""
         return len(self.commands)
 
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Windows:
         """Some of the windows."""
-        picked = {key: getattr(self, key)[chosen] for key in ROWS}
         places = [int(k) for k in np.arange(len(self))[chosen]]
-        forces, errors = tuple(self.forces[k] for k in places), tuple(self.errors[k] for k in places)
-        return replace(self, **picked, forces=forces, errors=errors)
+        picked: dict[str, Any] = {key: tuple(getattr(self, key)[k] for k in places) for key in ("forces", "errors")}
+        return replace(self, **{key: getattr(self, key)[chosen] for key in ROWS}, **picked)
 
     def first_segments(self) -> Windows:
         """The first segment of each window alone."""
@@ -140,6 +116,9 @@ class Windows:
         return values.reshape(len(self) * self.segments, -1)
 
 
+ROWS = tuple(field.name for field in fields(Windows))[:16]  # arrays with one row a window
+
+
 def cut(
     recording: Recording,
     noise: Array,
@@ -148,15 +127,10 @@ def cut(
     time: float = 1.0,
     speed: Array | float = np.inf,
 ) -> Windows:
-    """The trials of a recording as windows.
+    """The trials of a recording, all by default, as windows of segments of `segment` rows, short ones by default.
 
-    Args:
-        recording: gives the joints and the sampling step.
-        noise: (n,) standard deviation of the position sensor of each joint, or (2 n,) with those on links [rad].
-        trials: all of the recording's by default.
-        segment: rows of a segment; as short as identification likes it by default.
-        time: what a second of a finger stands for [s].
-        speed: (n,) as well as speeds should be known where a segment starts [rad/s].
+    `noise` (n,) [rad] is the standard deviation of each joint's position sensor, (2 n,) with those on links, `time`
+    what a second of a finger stands for [s]; speeds are to be known as well as `speed` (n,) [rad/s] at their starts.
     """
     trials = recording.trials if trials is None else trials
     longest = max(len(trial.time) for trial in trials)
@@ -168,12 +142,7 @@ def cut(
     links = np.unique(np.concatenate([trial.linked for trial in trials]))
     joints = len(recording.joints)
     noise = noise[[*range(joints), *(joints + links)]]
-    pieces = [
-        piece
-        for k, trial in enumerate(trials)
-        for piece in _pieces(recording, trial, k, rows, forward, segment, history, noise, time, speed, substeps, links)
-    ]
-    return _stacked(pieces, history, segment, substeps, links)
+    return _windows(recording, trials, rows, forward, segment, history, noise, time, speed, substeps, links)
 
 
 def whole_trials(
@@ -194,29 +163,28 @@ def whole_trials(
     noise = np.broadcast_to(noise, len(recording.joints))
     if not _tells(recording.step, _usual(recording.step, time), noise, speed):
         speed = np.inf  # more samples than usual would misread a start that moves
-    pieces = [
-        piece
-        for k, trial in enumerate(trials)
-        for piece in _pieces(recording, trial, k, longest, longest, longest, history, noise, time, speed, substeps)
-    ]
-    return _stacked(pieces, history, longest, substeps)
+    return _windows(recording, trials, longest, longest, longest, history, noise, time, speed, substeps, NO_LINKS)
 
 
-def _stacked(
-    pieces: Sequence[Mapping[str, object]], history: int, segment: int, substeps: int, links: Rows = NO_LINKS
+def _windows(
+    recording: Recording,
+    trials: Sequence[Trial],
+    rows: int,
+    forward: int,
+    segment: int,
+    history: int,
+    noise: Array,
+    time: float,
+    speed: Array | float,
+    substeps: int,
+    links: Rows,
 ) -> Windows:
-    columns = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
-    forces, errors = (tuple(piece[key] for piece in pieces) for key in ("force", "errors"))
-    joints = columns["position"].shape[2]
-    return Windows(
-        **columns,
-        forces=forces,  # type: ignore[arg-type]
-        errors=errors,  # type: ignore[arg-type]
-        joint_of=np.concatenate([np.arange(joints), links]),
-        history=history,
-        segment=segment,
-        substeps=substeps,
-    )
+    sizes = (rows, forward, segment, history, noise, time, speed, substeps, links)
+    pieces = [piece for k, trial in enumerate(trials) for piece in _pieces(recording, trial, k, *sizes)]
+    columns: dict[str, Any] = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
+    columns |= {key: tuple(piece[key] for piece in pieces) for key in ("forces", "errors")}
+    joint_of = np.concatenate([np.arange(len(recording.joints)), links])
+    return Windows(**columns, joint_of=joint_of, history=history, segment=segment, substeps=substeps)
 
 
 def _pieces(
@@ -231,7 +199,7 @@ def _pieces(
     time: float,
     speed_known: Array | float,
     substeps: int,
-    links: Rows = NO_LINKS,
+    links: Rows,
 ) -> Iterator[dict[str, object]]:
     measured, seen = _shown(trial, links)
     noise, every = noise[: trial.position.shape[1]], noise
@@ -272,7 +240,7 @@ def _pieces(
             "trial_start": trial_start,
             "wound": np.zeros(position.shape[1]),
             "errors": errors[:first],
-            "force": trial.force,
+            "forces": trial.force,
         }
 
 
@@ -302,13 +270,12 @@ def _as_simulated(recording: Recording, trial: Trial, substeps: int) -> tuple[Ar
     drive = _drive(recording, trial)
     most = drive.limit / np.maximum(drive.kp, np.finfo(float).tiny)
     jump = 0.5 * np.clip(after - before, -most, most)
-    return _impulses(before, after, jump, substeps), jump
-
-
-def _soft(drive: Drive) -> Array:
-    """How far the sensor follows a jump of the command, by the drive's deflection (n,) [1]."""
-    soft = drive.kp * drive.compliance
-    return soft / (1.0 + soft)
+    # A step acts like an impulse at its beginning, a held command from there on; so the first step of a row takes the
+    # mean of the commands before and after it is read, which makes the simulation second order in its step. A command
+    # that jumps further than the torque reaches adds no more than half of it: the impulse is the mean of torques.
+    fine = np.repeat(after[:, None], substeps, axis=1)
+    fine[:, 0] = before + jump
+    return fine, jump
 
 
 def _rows(fine: Array, first: int, last: int) -> Array:
@@ -354,18 +321,6 @@ def _drive(recording: Recording, trial: Trial) -> Drive:
         return Drive(np.full(joints, TORQUE_MODE_GAIN), np.zeros(joints), np.full(joints, np.inf), 1.0 / stiffness)
     gains = trial.gains
     return Drive(np.array(gains.kp), np.array(gains.kd), np.array(gains.torque_limit), 1.0 / stiffness)
-
-
-def _impulses(before: Array, after: Array, jump: Array, substeps: int) -> Array:
-    """Commands as the simulation's steps take them, (T, substeps, n), from the instant at which each row is read.
-
-    A step acts like an impulse at its beginning, a held command from there on; so the first step of a row takes the
-    mean of the commands before and after that instant, which makes the simulation second order in its step. A command
-    that jumps further than the torque reaches adds no more than half of that reach: the impulse is the mean of torques.
-    """
-    fine = np.repeat(after[:, None], substeps, axis=1)
-    fine[:, 0] = before + jump
-    return fine
 
 
 def _around(command: Array, reading: str) -> tuple[Array, Array]:
@@ -414,18 +369,15 @@ def _unsteady(starts: Rows, kinks: Rows, rows: int) -> NDArray[np.bool_]:
 
 
 def _terms(half: int) -> int:
-    """Coefficients of the polynomial through so many rows on either side."""
     return 5 if 2 * half >= MANY else 3
 
 
 def _states(
     trial: Trial, command: Array, jump: Array, drive: Drive, kinks: Rows, rows: Rows, half: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Position of the sensor, speed and acceleration of the link (K, n) at some rows, and the speed's share of noise.
+    """Position of the sensor, speed and acceleration of the link (K, n) at some rows, and the speed's noise.
 
-    The last one is its standard deviation where that of a sample is one [1/s].
-
-    `command` (T, n) is the one that each row feels [rad].
+    The last one is its standard deviation where that of a sample is one [1/s]. `command` (T, n) is felt by each row.
 
     The sensor follows every kink of the command, for the drive deflects with its torque; the link does not. So speed
     and acceleration come from a polynomial through the samples around, with the drive's deflection taken off: of
@@ -447,5 +399,6 @@ def _states(
         spread.append(np.linalg.norm(slope_of + 2.0 * damping[:, None] * bend_of, axis=1))
     slope, half_curvature = np.moveaxis(np.array(found), 1, 0)
     acceleration = 2.0 * half_curvature
-    position = trial.position[rows] + _soft(drive) * jump[rows]
+    soft = drive.kp * drive.compliance  # of a jump of the command the sensor follows a part, for the drive deflects
+    position = trial.position[rows] + soft / (1.0 + soft) * jump[rows]
     return position, slope + damping * acceleration, acceleration, np.array(spread)

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tactile_cube import limits
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.csv_dialect import Dialect
-from tactile_cube.measurement.recordings.tables import CSV, Table, read_frame, unknown_ending
+from tactile_cube.measurement.recordings.tables import CSV, Dialect, Table, read_frame, unknown_ending
 from tactile_cube.measurement.sources.column_map import time_of
 from tactile_cube.untrusted_file import below, read_npz, read_text, regular
 

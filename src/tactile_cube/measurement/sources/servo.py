@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_cube.command_help import CONFIG
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import CONFIG, suggestion
 from tactile_cube.drivetrain.model_file import Strict
 from tactile_cube.drivetrain.plain_yaml import read_schema
 from tactile_cube.errors import InputError

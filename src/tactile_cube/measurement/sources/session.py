@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.measurement.excitation import excitation, safe_range
+from tactile_cube.measurement.bench import excitation, safe_range
 from tactile_cube.measurement.recordings.description import Coupling, Description, TrialEntry, per_joint
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import Rig
@@ -106,7 +106,6 @@ def silent_trial(command: Array, rig: Recording, entry: TrialEntry) -> Trial:
     """A trial that starts at rest at its first command (joints,) [rad]."""
     time = np.arange(len(command)) / rig.rate
     still = np.broadcast_to(command[0], command.shape)
-    valid = np.ones(len(command), dtype=bool)
-    torque = np.zeros_like(command)
-    return Trial(entry.kind, entry.file, entry.kind, entry.initialisation, time, command, still, torque, valid,
-                 rig.gains, entry.force, entry.clamped)  # fmt: skip
+    signals, valid = (time, command, still, np.zeros_like(command)), np.ones(len(command), dtype=bool)
+    said = {key: getattr(entry, key) for key in ("file", "kind", "initialisation", "force", "clamped")}
+    return Trial(*signals, name=entry.kind, valid=valid, gains=rig.gains, **said)

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from tactile_cube.drivetrain.effects import parse_effect
 from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, grasp_angles
-from tactile_cube.measurement.excitation import KINDS as EXCITATIONS
+from tactile_cube.measurement.bench import KINDS as EXCITATIONS
 from tactile_cube.measurement.recordings.description import Coupling, Description, Grasp, TrialEntry
 from tactile_cube.measurement.recordings.rig import parse_rig
 from tactile_cube.measurement.recordings.trial import load_of

@@ -11,9 +11,7 @@ from hydra.utils import get_class
 from numpy.typing import NDArray
 from omegaconf import OmegaConf
 
-from tactile_cube.command_help import CONFIG
-from tactile_cube.composition import composed
-from tactile_cube.did_you_mean import suggestion
+from tactile_cube.composition import CONFIG, composed, suggestion
 from tactile_cube.errors import InputError
 from tactile_cube.measurement.recordings.description import Description, TrialEntry
 from tactile_cube.measurement.recordings.writing import RecordingTables

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.columns import MINIMUM_SAMPLES
+from tactile_cube.measurement.recordings.columns import LONGEST_GAP, MINIMUM_SAMPLES
 from tactile_cube.measurement.recordings.tables import Table
-from tactile_cube.measurement.recordings.timing import LONGEST_GAP
 from tactile_cube.measurement.sources.column_map import ColumnMap, time_of
 from tactile_cube.measurement.sources.log_file import Log
 from tactile_cube.measurement.sources.units import words

@@ -1,8 +1,0 @@
-"""`python -m tactile_cube.export`."""
-
-from tactile_cube.cli import command_line
-
-main = command_line("export")
-
-if __name__ == "__main__":
-    main()

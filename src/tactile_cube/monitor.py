@@ -1,8 +1,0 @@
-"""`python -m tactile_cube.monitor`."""
-
-from tactile_cube.cli import command_line
-
-main = command_line("monitor")
-
-if __name__ == "__main__":
-    main()

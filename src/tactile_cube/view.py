@@ -1,8 +1,0 @@
-"""`python -m tactile_cube.view`."""
-
-from tactile_cube.cli import command_line
-
-main = command_line("view")
-
-if __name__ == "__main__":
-    main()
