@@ -70,12 +70,12 @@ class DiagnosisResult:
         from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
         from tactile_cube.visualization.report import write_report
 
-        path, made = str(Path(folder) / "model.yaml"), self.model.provenance
+        path = str(Path(folder) / "model.yaml")
         with written_together(Path(folder), "diagnosis.json") as aside:
             write_model(self.model, aside / "model.yaml")
             write_json(aside / "diagnosis.json", self.data)
             if self.free is None:
-                page = contact_diagnosis_report(self.data, self.model.rig, made.command, made.recording, path)
+                page = contact_diagnosis_report(self.data, self.recording, self.job.command, path)
             else:
                 page = self._free_page(aside, path, self.free)
             write_report(page, aside / "report.html")

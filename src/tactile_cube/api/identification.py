@@ -70,12 +70,13 @@ class IdentificationResult:
 
     def _free_page(self, folder: Path, path: str, found: Identification) -> Any:
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.diagnosis_report import contact_sections, identification_report
+        from tactile_cube.visualization.diagnosis_report import identification_report
+        from tactile_cube.visualization.diagnosis_sections import held_section
 
         config, recording = self.job.config, without_touches(self.recording)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "identification.rrd")
-        held = contact_sections(self.contact, alone=False) if self.contact else []
+        held = [held_section(self.contact.errors, self.contact.joint_errors)] if self.contact else []
         stages, joints = self.data["error"], self.data["joints"]
         return identification_report(after, stages, joints, self.job.command, path, held)
 

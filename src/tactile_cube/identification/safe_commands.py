@@ -294,21 +294,17 @@ class PossibleMotions:
     def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
         """What commands (T, n) do from rest, simulated freely until they end or a model leaves the limits."""
         trials = trials_from_rest(self.recording, kind, commands)
-        reached = Envelope.around(map(self._commanded, trials))
+        low, high, still = commands.min(axis=0), commands.max(axis=0), np.zeros(commands.shape[1])
+        reached = Envelope(low, high, still, still)
+        if open_loop := self.recording.torque_controlled:
+            reached = Envelope.around(Envelope.of_motion(t.position, t.command, t.step) for t in trials)
         for one in self._simulated(trials):
             reached = Envelope.around([reached, one])
             if not within_limits(reached, self.limits, self.margin):
                 break
         count = len(self.fits) + sum(map(len, self.ends))
-        open_loop = self.recording.torque_controlled
         starts = np.array([trial.position[0] for trial in trials])
         return Safety(self.limits, self.margin, reached, scale, count, starts, open_loop)
-
-    def _commanded(self, trial: Trial) -> Envelope:
-        if self.recording.torque_controlled:
-            return Envelope.of_motion(trial.position, trial.command, trial.step)
-        still = np.zeros(len(self.recording.joints))
-        return Envelope(trial.command.min(axis=0), trial.command.max(axis=0), still, still)
 
     def _simulated(self, trials: Sequence[Trial]) -> Iterator[Envelope]:
         """What each model does, fitted ones in every trial; positions as the sensors read them and as they are."""

@@ -8,6 +8,7 @@ from tactile_cube.identification.in_words import answer
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import common_unit, milli
 from tactile_cube.visualization.comparison_report import (
     overlay_section,
@@ -16,7 +17,6 @@ from tactile_cube.visualization.comparison_report import (
     where_section,
 )
 from tactile_cube.visualization.diagnosis_sections import (
-    HELD,
     effect_section,
     held_section,
     next_section,
@@ -26,7 +26,7 @@ from tactile_cube.visualization.diagnosis_sections import (
     train_section,
     value_section,
 )
-from tactile_cube.visualization.report import Listing, Report, Section, Tone
+from tactile_cube.visualization.report import Report, Section, Tone
 
 
 def _tone(diagnosis: Mapping[str, Any]) -> Tone:
@@ -61,11 +61,11 @@ def diagnosis_report(
         tone=_tone(diagnosis),
         sections=[
             stage_section(diagnosis["error"], diagnosis.get("error_joints", {}), units=units),
-            *([held_section(diagnosis["contact"])] if "contact" in diagnosis else []),
+            *(held_section(one["error"], one["error_joints"]) for one in [diagnosis.get("contact")] if one),
             *effect_section(diagnosis["effects"], units),
             *shape_section(shapes, units),
             *ranking_section(diagnosis["ranking"]),
-            next_section(diagnosis, model_path, before, experiment),
+            next_section(diagnosis, model_path, before.recording, experiment),
             recording_section(before.recording, before.model),
             where_section(before, "Where the stated model fails"),
             overlay_section(after, "Measured and simulated, before and after what was found", before),
@@ -118,36 +118,17 @@ def identification_report(
     )
 
 
-def contact_sections(found: ContactIdentification, alone: bool = True) -> list[Section]:
-    """What was found of fingertips and object; values only if they stand `alone`, not beside those of the drives."""
-    effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
-    stages = stage_section(found.errors, found.joint_errors, HELD)
-    return [stages, *(effect_section(effects) if alone else [])]
-
-
-def contact_diagnosis_report(
-    result: dict[str, Any], name: str, command: str, recording: str, model_path: str
-) -> Report:
+def contact_diagnosis_report(result: dict[str, Any], recording: Recording, command: str, model_path: str) -> Report:
     """The page of a diagnosis of fingertips and object alone, from the content of diagnosis.json."""
-    effects = ",".join(one["name"] for one in result["effects"])
-    train = f"python -m tactile_cube.train +experiment=adapt model={model_path}"
-    fit = f"python -m tactile_cube.identify recording={recording} effects=[{effects}]"
-    known: dict[str, tuple[str, list[str]]] = {
-        "adequate": ("Train in the world as it is stated:", [train]),
-        "missing_effect": ("Fit exactly this on all trials, and train with the result:", [fit, train]),
-        "ambiguous": ("Record more loads and initialisations and diagnose again, or see what each would be:", [fit]),
-    }
-    open_still = "Record free motion too: the drivetrain may lack something that the grasps show."
-    said, lines = known.get(result["verdict"], (open_still, []))
     return Report(
-        title=f"What is missing? {name}",
+        title=f"What is missing? {recording.name}",
         answer=answer(result, None),
         tone=_tone(result),
         sections=[
-            held_section(result),
+            held_section(result["error"], result["error_joints"]),
             *effect_section(result["effects"]),
             *ranking_section(result["ranking"]),
-            Section("What to do next", [said], [Listing(lines, code=True)] if lines else []),
+            next_section(result, model_path, recording, None),
         ],
         footer=f"Made by tactile_cube in {result['seconds']:.0f} s: {command}",
     )
@@ -155,11 +136,12 @@ def contact_diagnosis_report(
 
 def contact_report(found: ContactIdentification, name: str, command: str, model_path: str) -> Report:
     """The page of an identification of contact effects alone."""
+    effects = [{"name": one.effect, "joints": ["object"], "parameters": one.parameters} for one in found.effects()]
     return Report(
         title=f"Identified: {name}",
         answer=f"The error on trials that the fit never saw fell from {milli(found.errors['nominal'])} to "
         f"{milli(found.errors['with_effects'])}.",
         tone="plain" if found.silent else "good",
-        sections=[*contact_sections(found), train_section(model_path)],
+        sections=[held_section(found.errors, found.joint_errors), *effect_section(effects), train_section(model_path)],
         footer=f"Made by tactile_cube: {command}",
     )

@@ -7,6 +7,7 @@ from tactile_cube.identification.in_words import joint_rows, proposal, watch_for
 from tactile_cube.identification.next_experiment import Experiment
 from tactile_cube.identification.search.residual_shape import Shape
 from tactile_cube.measurement.comparing.comparison import Comparison
+from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.units import THOUSANDTHS, TURNS, common_unit, milli, of_joint, short
 from tactile_cube.visualization.charts import (
     PALETTE,
@@ -63,10 +64,9 @@ def stage_section(
     return Section(title, (), blocks)
 
 
-def held_section(contact: Mapping[str, Any]) -> Section:
-    """The error of each stage in the trials with an object, from what diagnosis.json says under `contact`."""
-    # grasps refit no constants
-    return stage_section({k: v for k, v in contact["error"].items() if k != "refitted"}, contact["error_joints"], HELD)
+def held_section(stages: Mapping[str, float], joints: Mapping[str, Mapping[str, float]]) -> Section:
+    """The same of the trials with an object, which refit no constants."""
+    return stage_section({k: v for k, v in stages.items() if k != "refitted"}, joints, HELD)
 
 
 def effect_section(effects: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None) -> list[Section]:
@@ -147,11 +147,11 @@ def train_section(model_path: str) -> Section:
 
 
 def next_section(
-    diagnosis: Mapping[str, Any], model_path: str, before: Comparison, experiment: Experiment | None
+    diagnosis: Mapping[str, Any], model_path: str, recording: Recording, experiment: Experiment | None
 ) -> Section:
     """What to record or to type next."""
     if experiment is not None:
-        return _experiment_section(experiment, before.recording.units)
+        return _experiment_section(experiment, recording.units)
     # Effects of fingertips and object belong to no joint.
     found = [
         one["name"] if joint == "object" else f"{one['name']}@{joint}"
@@ -160,11 +160,19 @@ def next_section(
     ]
     names = [*diagnosis.get("known_effects", []), *found]
     own = f"my_rig.MyEffect@{(diagnosis['unexplained_joints'] or ['JOINT'])[0]}"
-    identify = f"python -m tactile_cube.identify recording={before.recording.folder} effects"
+    identify = f"python -m tactile_cube.identify recording={recording.folder} effects"
     train = f"python -m tactile_cube.train +experiment=adapt model={model_path}"
-    own_law = ("Look at the shapes above, write the law as an effect of your own, and fit it:", [f"{identify}=[{own}]"])
+    otherwise: tuple[str, list[str]] = (
+        "Look at the shapes above, write the law as an effect of your own, and fit it:",
+        [f"{identify}=[{own}]"],
+    )
+    if diagnosis.get("noise_floor_source") == "contact":
+        otherwise = (
+            "Record more loads and initialisations, and free motion, which shows the drives; diagnose again.",
+            [],
+        )
     said, lines = {
-        "adequate": ("Train with the refitted constants:", [train]),
+        "adequate": ("Train with this model:", [train]),
         "missing_effect": (
             "Fit exactly these effects, and train with the result:",
             [f"{identify}=[{','.join(names)}]", train],
@@ -173,8 +181,8 @@ def next_section(
             "The model holds what was found: train with it. For the rest, write a law of the shapes and fit both:",
             [train, f"{identify}=[{','.join([*names, own])}]"],
         ),
-    }.get(diagnosis["verdict"], own_law)
-    return Section("What to do next", [said], [Listing(lines, code=True)])
+    }.get(diagnosis["verdict"], otherwise)
+    return Section("What to do next", [said], [Listing(lines, code=True)] if lines else [])
 
 
 def _experiment_section(experiment: Experiment, units: Mapping[str, str]) -> Section:

@@ -94,7 +94,9 @@ class Grasp:
             self._begin = self._fitted_grip(ContactModel({}))
         unknown, target = self._begin, self._target(contact, self._begin)
         if self._slopes is None:
-            self._slopes = self._gradients(contact, unknown, target)
+            steps = np.diag(self._width)[self.free]
+            columns = [(self._target(contact, unknown + step) - target) / step.max() for step in steps]
+            self._slopes = np.stack(columns, axis=1)
         return self._descended(contact, unknown, target, self._slopes)
 
     def _descended(self, contact: ContactModel, unknown: Array, target: Array, slopes: Array) -> Array:
@@ -122,11 +124,6 @@ class Grasp:
     def _target(self, contact: ContactModel, unknown: Array) -> Array:
         grip = self._simulate(contact, unknown, self._grip) - self.trial.position[: self._grip]
         return np.concatenate([grip[::EVERY].ravel() / LEFT, np.sqrt(ALIKE) * unknown / self.spread])
-
-    def _gradients(self, contact: ContactModel, unknown: Array, target: Array) -> Array:
-        steps = np.diag(self._width)[self.free]
-        columns = [(self._target(contact, unknown + step) - target) / step.max() for step in steps]
-        return np.stack(columns, axis=1)
 
     def _simulate(self, contact: ContactModel, unknown: Array, rows: int) -> Array:
         moved = replace(self._load, position=self._load.position + unknown[-3:])
