@@ -27,11 +27,13 @@ RECIPE = {"train": "curriculum"}  # the experiment that a command takes where th
 def help_text(name: str) -> str:
     """What `--help` prints of a command: its groups and keys."""
     path = CONFIG / f"{name}.yaml"
+    lines = [line for line in path.read_text().splitlines() if line and line[0] not in " #-"]
+    keys = [f"  {line}" for line in lines if not line.startswith("defaults:")]
     return "\n".join(
         [
             f"python -m tactile_cube.{name}: {commands()[name]}",
             *("", "Groups (choose with group=option):", *_group_lines(path)),
-            *("", "Keys (set with key=value):", *_key_lines(path), ""),
+            *("", "Keys (set with key=value):", *keys, ""),
             "--cfg job shows the configuration; -m runs every combination of comma-separated values; "
             "--hydra-help shows Hydra's own options; tactile-cube --help lists the other commands.",
         ]
@@ -81,11 +83,6 @@ def _groups(path: Path) -> dict[str, str | None]:
                 groups[group] = option
     added = dict.fromkeys(ADDED) | {"experiment": RECIPE["train"]}
     return groups | (added if path.stem == "train" else {})
-
-
-def _key_lines(path: Path) -> list[str]:
-    lines = [line for line in path.read_text().splitlines() if line and line[0] not in " #-"]
-    return [f"  {line}" for line in lines if not line.startswith("defaults:")]
 
 
 if TYPE_CHECKING:
@@ -168,23 +165,18 @@ def meaning(key: str) -> str:
 
 def near_key(name: str) -> str:
     """Return the suggestion for a key of the configuration that does not exist, e.g. `agent.gama`."""
-    keys = sorted(_keys())
+    found = {folder.name for folder in CONFIG.iterdir() if folder.is_dir()}
+    for path in CONFIG.rglob("*.yaml"):
+        text = path.read_text(encoding="utf-8")
+        groups = () if "@package _global_" in text else path.relative_to(CONFIG).parent.parts
+        found.update(_dotted(yaml.safe_load(text), ".".join(groups)))
+    keys = sorted(found)
     if name in keys:  # another command may have that very key
         return ""
     last = name.rpartition(".")[2]
     same_name = [known for known in keys if known.rpartition(".")[2] == last]
     near = difflib.get_close_matches(name, keys, 1, 0.75) or difflib.get_close_matches(name, same_name, 1, 0.0)
     return suggestion(near[0], near) if near else ""
-
-
-def _keys() -> set[str]:
-    """Dotted keys and groups of the configuration, as far as its files name them."""
-    keys = {folder.name for folder in CONFIG.iterdir() if folder.is_dir()}
-    for path in CONFIG.rglob("*.yaml"):
-        text = path.read_text(encoding="utf-8")
-        groups = () if "@package _global_" in text else path.relative_to(CONFIG).parent.parts
-        keys.update(_dotted(yaml.safe_load(text), ".".join(groups)))
-    return keys
 
 
 def _dotted(value: Any, prefix: str) -> Iterator[str]:

@@ -29,11 +29,15 @@ def configuration_in(folder: Path, config: DictConfig, log: str) -> Iterator[Non
     Hydra would write it over that of an earlier run before anybody can refuse. A folder in which nothing else than
     `log` was written goes altogether.
     """
-    place = folder / CONFIGURATION
+    from hydra.core.hydra_config import HydraConfig
+    from omegaconf import OmegaConf
+
+    place, hydra = folder / CONFIGURATION, HydraConfig.instance().cfg
     before = {path: path.read_bytes() for path in place.glob("*.yaml")}
     place.mkdir(parents=True, exist_ok=True)
-    for name, text in _configuration(config).items():
-        write_whole(place / name, text.encode())
+    parts = {"config": config, "hydra": hydra, "overrides": HydraConfig.get().overrides.task}
+    for name, text in {name: OmegaConf.to_yaml(part) for name, part in parts.items()}.items():
+        write_whole(place / f"{name}.yaml", text.encode())
     try:
         yield
     except SystemExit as refusal:
@@ -41,24 +45,11 @@ def configuration_in(folder: Path, config: DictConfig, log: str) -> Iterator[Non
             for path, content in before.items():
                 write_whole(path, content)
             if not before:
-                _remove(folder, log)
+                shutil.rmtree(place, ignore_errors=True)
+                written = {path.name for path in folder.iterdir()} - {".lock", log}
+                if not written and folder.resolve() != Path.cwd():
+                    shutil.rmtree(folder, ignore_errors=True)
         raise
-
-
-def _configuration(config: DictConfig) -> dict[str, str]:
-    from hydra.core.hydra_config import HydraConfig
-    from omegaconf import OmegaConf
-
-    own = HydraConfig.instance().cfg
-    parts = {"config": config, "hydra": own, "overrides": HydraConfig.get().overrides.task}
-    return {f"{name}.yaml": OmegaConf.to_yaml(part) for name, part in parts.items()}
-
-
-def _remove(folder: Path, log: str) -> None:
-    shutil.rmtree(folder / CONFIGURATION, ignore_errors=True)
-    written = {path.name for path in folder.iterdir()} - {".lock", log}
-    if not written and folder.resolve() != Path.cwd():
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 _ENDS = re.compile(r"[\r\n]+")

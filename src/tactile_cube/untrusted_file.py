@@ -56,11 +56,7 @@ def regular(path: Path, most: int = limits.TABLE, lacking: str = "") -> Path:
 
 
 def read_text(path: Path, lacking: str = "") -> str:
-    """Return the text of a file.
-
-    Raises:
-        InputError: as `regular`, or it is no UTF-8.
-    """
+    """Return the text of a file. Raises InputError: as `regular`, or it is no UTF-8."""
     try:
         return regular(path, limits.TEXT, lacking).read_text(encoding="utf-8")
     except OSError as error:

@@ -9,6 +9,7 @@ from tactile_cube.drivetrain.model_file import ModelFile
 from tactile_cube.identification.in_words import (
     OPENING,
     UNRELATED,
+    answer,
     disturbed,
     headline,
     left_over,
@@ -38,8 +39,15 @@ def test_what_is_left_stands_in_the_headline() -> None:
 def test_an_unstable_machine_is_told_by_short_windows() -> None:
     unstable = result("missing_effect") | {"error_over_noise": {"with_effects": 1.05}}
     assert (
-        left_over(unstable) == " (1.1 sensor noises remain in short windows; run freely, the model parts by 4.3 mrad)"
+        left_over(unstable) == " (1.05 sensor noises remain in short windows; run freely, the model parts by 4.3 mrad)"
     )
+
+
+def test_the_error_over_noise_is_stated_as_the_workbench_states_it_and_degrees_stay_degrees() -> None:
+    found = result("adequate") | {"effects": [], "unexplained": [], "units": {"q1": "rad"}, "shown_in": {"q1": "deg"}}
+    text = answer(found | {"error_over_noise": {"refitted": 4.834, "with_effects": 1.047}}, None)
+    assert "over sensor noise in short windows: 4.83 with constants refitted, 1.05 with the recommended model" in text
+    assert "1.15 deg as stated" in text
 
 
 def test_constants_found_far_from_what_was_stated_are_told(tmp_path: Path) -> None:

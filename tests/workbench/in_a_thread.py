@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from tactile_cube.workbench.desk import Desk
-from tactile_cube.workbench.server import start
+from tactile_cube.workbench.door import start
 
 
 @contextmanager

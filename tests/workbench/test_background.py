@@ -11,13 +11,16 @@ import pytest
 
 from tactile_cube.errors import InputError
 from tactile_cube.identification.in_words import PARTIAL
-from tactile_cube.workbench.background import Diagnosing
+from tactile_cube.workbench.background import PHASES, Diagnosing
 from tests.workbench.small_bench import STRIBECK, partly_known, stribeck_recording
 
 
 def test_a_diagnosis_tells_its_progress_and_its_answer(tmp_path: Path) -> None:
     running = Diagnosing(stribeck_recording(tmp_path), None, (), 0, tmp_path / "found")
-    assert any("best so far" in line for line in list(running.lines()))
+    shares = [running.share for _ in running.lines()]
+    assert shares == sorted(shares)
+    assert set(PHASES.values()) <= set(shares), "what a diagnosis says is that by which its share is known"
+    assert STRIBECK in running.best.replace("(excess, velocity)", "")
     assert running.found is not None
     assert running.found.effects == [STRIBECK]
     assert (tmp_path / "found" / "report.html").is_file()
@@ -25,10 +28,7 @@ def test_a_diagnosis_tells_its_progress_and_its_answer(tmp_path: Path) -> None:
 
 def test_an_answer_that_names_no_effect_for_certain_has_those_of_its_model(tmp_path: Path) -> None:
     running = Diagnosing(partly_known(tmp_path), None, (), 0, tmp_path / "found")
-    shares = [running.progress.share for _ in running.lines()]
-    assert shares == sorted(shares)
-    assert STRIBECK in running.progress.best.replace("(excess, velocity)", "")
-    found = running.found
+    found = running.wait()
     assert found is not None
     assert PARTIAL in found.text
     assert STRIBECK in found.effects

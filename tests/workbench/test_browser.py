@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -23,7 +24,7 @@ from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.identification.in_words import PARTIAL
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.workbench.background import Found, Progress
+from tactile_cube.workbench.background import Found
 from tests.measurement.sources.bare_joint import played
 from tests.workbench.small_bench import STRIBECK, stribeck_recording
 
@@ -176,7 +177,7 @@ def test_from_dropped_logs_to_the_error_at_the_noise(
     window.get_by_label("where it fails").select_option(index=1)
     picture(window, "4_zoomed")
     window.get_by_role("button", name="Propose").click()
-    window.get_by_text("times what decides").wait_for()
+    window.get_by_text("times the evidence needed").wait_for()
     with window.expect_download() as download:
         window.get_by_role("link", name="Download CSV").click()
     assert Path(download.value.path()).read_text().startswith("time,a.command\n")
@@ -312,8 +313,9 @@ def test_what_a_partial_answer_found_is_added(browser: Any, measured: Recording,
     stage = (bench := Workbench(measured)).add(STRIBECK)
     fitted = Fitted(stage.fit.model, stage.fit, stage.half_width, 0.0 * stage.half_width)
     bench.undo()
-    desk.bench, desk.progress = bench, Progress()
-    desk.found = Found(PARTIAL, [STRIBECK], fitted, stage.over_noise, False)
+    found = Found(PARTIAL, [STRIBECK], fitted, stage.over_noise, False)
+    desk.bench, desk.outcome = bench, "done"
+    desk.diagnosing = SimpleNamespace(found=found, said=[], stop=lambda: None)
     with served_in_a_thread(desk) as address:
         page = browser.new_page()
         page.set_default_timeout(PATIENCE)

@@ -30,17 +30,20 @@ def waiting(folder: Path, text: str) -> Waiting:
 def test_a_preview_shows_rows_and_guesses_columns(tmp_path: Path) -> None:
     seen = waiting(tmp_path, HEAD + "\n".join(ROWS)).preview()
     assert seen is not None
-    assert seen.joints == ["a", "b"]
     assert seen.columns == ["t", "a_cmd", "a_pos", "b_cmd", "b_pos"]
     assert seen.rows[1] == [0.01, 0.1, 0.1, 0.1, 0.1]
-    assert seen.guess is not None
-    assert seen.guess.joints["b"] == {"command": "b_cmd", "position": "b_pos"}
+    assert list(seen.guess) == ["time", "a", "b"]
+    assert known(seen.guess["b"]) == {"command": "b_cmd", "position": "b_pos"}
+
+
+def known(columns: dict[str, str]) -> dict[str, str]:
+    return {signal: column for signal, column in columns.items() if column}
 
 
 def test_what_the_names_leave_open_is_a_doubt_and_no_error(tmp_path: Path) -> None:
     seen = waiting(tmp_path, (HEAD + "\n".join(ROWS)).replace("a_", "x_").replace("b_", "y_")).preview()
     assert seen is not None
-    assert seen.guess is None
+    assert known(seen.guess["a"]) == {}
     assert "of which joint" in seen.doubt
 
 
@@ -48,7 +51,7 @@ def test_without_a_column_of_commands_it_may_be_a_swing(tmp_path: Path) -> None:
     (tmp_path / "swing.csv").write_text("time,angle\n0,0.1\n0.01,0.2\n")
     seen = Waiting((tmp_path / "swing.csv",), robot="pendulum").preview()
     assert seen is not None
-    assert (seen.mode, seen.joints) == ("free", ["pendulum"])
+    assert (seen.mode, list(seen.guess)) == ("free", ["time", "pendulum"])
     assert "no column of commands" in seen.doubt
 
 
@@ -93,6 +96,7 @@ def test_page_command_and_program_write_the_same_recording(tmp_path: Path) -> No
     for other in ("page", "program"):
         assert (tmp_path / other / "recording.yaml").read_text() == text
     assert "read: before" in text
+    assert "shown_in" not in text, "a log in rad"
     for file in sorted((tmp_path / "command" / "trials").iterdir()):
         assert (tmp_path / "page" / "trials" / file.name).read_bytes() == file.read_bytes()
 
@@ -108,6 +112,17 @@ def test_the_page_takes_every_kind_of_log_that_the_command_reads(tmp_path: Path)
         seen = Waiting((file,), tmp_path / "rig.urdf", robot="wheel")
         assert seen.with_files([file]).logs == (file,)
         assert import_logs(tmp_path / ending, {**two_joints(tmp_path), "files": [str(file)]})[0].joints == ("a", "b")
+
+
+def test_a_recording_keeps_the_unit_of_its_log(tmp_path: Path) -> None:
+    log = played("pendulum")
+    log |= {name: np.degrees(log[name]) for name in ("goal", "position")}
+    polars.DataFrame({f"{name}_deg" if name != "time" else name: values for name, values in log.items()}).write_csv(
+        tmp_path / "run.csv"
+    )
+    recording, _ = import_logs(tmp_path / "out", Waiting((tmp_path / "run.csv",), robot="pendulum").settings)
+    assert (recording.units, recording.shown) == ({"pendulum": "rad"}, {"pendulum": "deg"})
+    assert np.allclose(recording.trials[0].position[:, 0], np.radians(log["position"]), atol=1e-9)
 
 
 def two_joints(folder: Path) -> dict[str, Any]:
@@ -133,8 +148,7 @@ def test_files_of_lerobot_are_told_apart_by_what_they_hold(tmp_path: Path) -> No
     (tmp_path / "rig.urdf").write_text(URDF)
     seen = found.with_files([tmp_path / "rig.urdf"]).preview()
     assert seen is not None
-    assert seen.guess is not None
-    assert seen.guess.joints["b"] == {"command": "action.b.pos", "position": "observation.state.b.pos"}
+    assert known(seen.guess["b"]) == {"command": "action.b.pos", "position": "observation.state.b.pos"}
 
 
 def test_one_joint_needs_no_urdf(tmp_path: Path) -> None:

@@ -1,11 +1,11 @@
 """The missing torque as it is drawn, against a torque that is known."""
 
-import numpy as np
-import pytest
+from dataclasses import replace
 
-from tactile_cube.drivetrain.effects import catalogue
+import numpy as np
+
 from tactile_cube.identification.search.residual_shape import Missing
-from tactile_cube.workbench.missing_torque import BY_NAME, curve, signal_of
+from tactile_cube.workbench.missing_torque import curve, signals
 
 SPEED = "velocity of a [rad/s]"
 
@@ -36,10 +36,8 @@ def test_a_law_of_the_angle_has_a_curve_for_either_direction() -> None:
     assert up.max() < 0.0 < down.min()
 
 
-@pytest.mark.parametrize(
-    ("name", "signal"),
-    [("stribeck_friction", "velocity"), ("elasticity", "torque"), ("payload", "position"), ("friction_drift", "time")],
-)
-def test_an_effect_is_shown_over_its_own_signal(name: str, signal: str) -> None:
-    assert signal_of(catalogue()[name]) == signal
-    assert set(BY_NAME) <= set(catalogue())
+def test_a_torque_is_shown_over_the_signal_that_it_is_a_law_of() -> None:
+    assert signals(missing(0.03))[0] == SPEED
+    law = missing(0.0)
+    turned = replace(law, torque=np.sin(law.signals["position of a [rad]"]))
+    assert signals(turned)[0] == "position of a [rad]"

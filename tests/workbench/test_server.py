@@ -24,7 +24,7 @@ from tactile_cube.errors import InputError
 pytest.importorskip("bokeh")
 
 from tactile_cube.workbench.desk import Desk
-from tactile_cube.workbench.server import MESSAGE, start
+from tactile_cube.workbench.door import MESSAGE, start
 from tests.workbench.in_a_thread import served_in_a_thread
 
 

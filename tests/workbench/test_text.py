@@ -41,7 +41,7 @@ def raw(tree: ast.AST) -> list[str]:
         if isinstance(node, ast.Call):
             named = {word.arg: word.value for word in node.keywords}
             found += [value for name, value in named.items() if name in SHOWN and not ours(value)]
-            called = ast.unparse(node.func)
+            called = ast.unparse(node.func).rpartition(".")[2]
             if called == "Div" and not ("disable_math" in named and ast.unparse(named["disable_math"]) == "True"):
                 found.append(node)  # which would render TeX
             if called in ("Html", "Markup") and not all(isinstance(one, ast.Constant) for one in node.args):

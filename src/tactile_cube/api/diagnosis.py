@@ -63,7 +63,8 @@ class DiagnosisResult:
     def text(self) -> str:
         """The answer in plain words."""
         constants = restated(self.recording, self.model) if self.free else []
-        return answer(self.data, self.free.experiment if self.free else None, constants)
+        units = {"shown_in": self.recording.shown}
+        return answer(self.data | units, self.free.experiment if self.free else None, constants)
 
     def write(self, folder: PathLike) -> None:
         """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""

@@ -84,23 +84,15 @@ def evaluate(
 ) -> EvaluationResult:
     """Evaluate a policy by a protocol, with a verdict for every episode.
 
-    Args:
-        policy: a policy file, a training run's folder, a policy that ships with the package, `hold`, `random` or
-            `scripted`; None: the shipped one.
-        protocol: option of conf/protocol: which episodes, and in which worlds.
-        hand: option of conf/hand; this and the next six: None: as in training.
-        object: option of conf/object.
-        task: option of conf/task.
-        reward: option of conf/reward.
-        randomization: option of conf/randomization.
-        start: option of conf/start.
-        engine: of the world.
-        model: model.yaml of the world; None: as in training.
-        effects: of the world, e.g. ["backlash@q2: play=0.05"]; []: none; None: those in training.
-        own_effects: classes of your own that model or policy name, as dotted paths.
-        seed: of the episodes.
-        values: other keys of conf/evaluate.yaml, e.g. {"protocol.episodes": 3, "task.filter_time": 0.25}.
-        say: takes a line for each episode.
+    `policy` is a policy file, a training run's folder, a policy that ships with the package, `hold`, `random` or
+    `scripted`; None: the shipped one. `protocol` is an option of conf/protocol: which episodes, and in which worlds.
+
+    From `hand` to `start` they are options of the groups of conf/ with these names; `engine`, `model` (its file) and
+    `effects`, e.g. ["backlash@q2: play=0.05"], are of the world; None: as in training. `own_effects` names classes of
+    your own that model or policy name, as dotted paths; `seed` is of the episodes.
+
+    `values` sets other keys of conf/evaluate.yaml, e.g. {"protocol.episodes": 3, "task.filter_time": 0.25}; `say` takes
+    a line for each episode.
 
     Raises:
         InputError: there is no such policy, or a value that cannot be used.

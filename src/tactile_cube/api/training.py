@@ -18,6 +18,7 @@ from tactile_cube.agent.policy_file import save_policy
 from tactile_cube.api.environment import grasps_of
 from tactile_cube.api.evaluation import run_evaluation
 from tactile_cube.api.job import Job, PathLike, as_input_errors, as_word, called_job, worded_job
+from tactile_cube.composition import composed
 from tactile_cube.drivetrain.model_file import read_model
 from tactile_cube.errors import InputError
 from tactile_cube.evaluation.policy_path import networks_path
@@ -39,7 +40,6 @@ PUBLISHED: dict[str, dict[str, Any]] = {
 KEY = re.compile(r"[+~]*([\w./@]+)")  # what a word of a command line sets
 NOT_A_STAGES = re.compile(r"(experiment|stages|judgement|name)\b")  # keys of the training as a whole
 ENGINES = ("bullet", "mujoco")
-AVERAGED = 5  # policies whose mean is what comes out, as in conf/average.yaml
 GRASPS = 1000  # as many as those that come with the package
 COUNTED = ("steps", "updates", "episodes", "wall_hours", "simulating_hours", "learning_hours")
 """Columns of metrics.csv that go on from stage to stage."""
@@ -99,29 +99,13 @@ def train(
 ) -> TrainingResult:
     """Train a policy, or go on training it: the same call resumes.
 
-    Args:
-        experiment: option of conf/experiment, which changes several choices at once; None: `curriculum`.
-        hand: option of conf/hand; this and the next fourteen: None: as the experiment says.
-        object: option of conf/object.
-        task: option of conf/task.
-        reward: option of conf/reward.
-        randomization: option of conf/randomization.
-        start: option of conf/start.
-        exploration: option of conf/exploration.
-        curriculum: option of conf/curriculum.
-        env: option of conf/env.
-        agent: option of conf/agent.
-        replay: option of conf/replay.
-        collector: option of conf/collector.
-        training: option of conf/training.
-        logger: option of conf/logger.
-        without: option of conf/without, with experiment="ablations".
-        engine: of the worlds.
-        model: model.yaml that describes the hand.
-        own_effects: classes of your own that the model names, as dotted paths.
-        seed: of everything random.
-        values: other keys of the configuration, dotted -> value, e.g. {"task.filter_time": 0.25}.
-        folder: run folder; None: outputs/train/<name>-seed<seed>.
+    `experiment` is an option of conf/experiment, which changes several choices at once; None: `curriculum`. From `hand`
+    to `logger` they are options of the groups of conf/ with these names, None: as the experiment says, and so is
+    `without`, with experiment="ablations". `engine` is that of the worlds, `model` the model.yaml of the hand;
+    `own_effects` names classes of your own that the model has, as dotted paths; `seed` is of everything random.
+
+    `values` sets other keys of the configuration, dotted -> value, e.g. {"task.filter_time": 0.25}; `folder` is the run
+    folder; None: outputs/train/<name>-seed<seed>.
 
     Raises:
         InputError: a value that cannot be used, or the folder is in use.
@@ -176,10 +160,8 @@ def run_training(job: Job, stage: str = "", later: int = 0) -> TrainingResult:
     if before is not None:
         print(f"{job.folder}: finished before ({before.reason}); training.resume=never starts over")
         return TrainingResult(job.folder, before.reason, before.steps, before.final_angle)
-    return _in_stages(job, plain) if job.config.stages else _in_one(job, plain, stage, later)
-
-
-def _in_one(job: Job, plain: dict[str, Any], stage: str, later: int) -> TrainingResult:
+    if job.config.stages:
+        return _in_stages(job, plain)
     start = partial(_training_run, job, plain, stage, later)
     run, reason = train_on(start, partial(start, resume="auto"))  # what starts over does so once
     return TrainingResult(job.folder, reason, run.learner.steps, float(run.learner.episodes.mean_angle))
@@ -254,9 +236,9 @@ def _overview(stages: Sequence[Job], results: Sequence[TrainingResult]) -> str:
 
 def judged(job: Job, last: Path) -> str:
     """Write the mean of the last stage's policies, and judge it in fresh draws of its worlds, in both engines."""
-    kept = len(list(last.glob("policy_[0-9]*.safetensors")))
+    kept = min(composed("average", []).last, len(list(last.glob("policy_[0-9]*.safetensors"))))
     policy = job.folder / POLICY
-    save_policy(policy, *averaged(kept_policies(last, min(AVERAGED, kept)) if kept else [last / POLICY]))
+    save_policy(policy, *averaged(kept_policies(last, kept) if kept else [last / POLICY]))
     said, named = [], {_key(word) for word in job.words} & {"hand", "object"}  # which no policy's file has read
     again = [word for word in job.words if _key(word).partition(".")[0] in named]
     for engine in ENGINES:

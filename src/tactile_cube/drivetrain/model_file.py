@@ -176,11 +176,7 @@ class ModelFile(Strict):
 
 
 def read_model(path: str | Path) -> ModelFile:
-    """The model in a YAML file.
-
-    Raises:
-        InputError: naming the file, the key and the value received.
-    """
+    """The model in a YAML file. Raises InputError: naming the file, the key and the value received."""
     return read_schema(Path(path), ModelFile)
 
 

@@ -61,7 +61,11 @@ class Plant:
         self.dt = float(dt)
         self.effects = tuple(dict.fromkeys(effects))
         self.topology = _common_topology(self.trees)
-        self.joint_names = _joint_names(self.trees, joint_names)
+        chains = enumerate(self.trees)
+        own = [name if len(self.trees) == 1 else f"{c}/{name}" for c, tree in chains for name in tree.joint_names]
+        self.joint_names = tuple(own if joint_names is None else joint_names)
+        if len(self.joint_names) != len(own):
+            raise InputError(f"{len(self.joint_names)} joint names for {len(own)} actuated joints; name each once")
         self.trace_rows = trace_rows
         self.layout: MemoryLayout = plan_memory(self.topology, self.effects, self.dt, trace_rows)
 
@@ -182,11 +186,3 @@ def _common_topology(trees: Sequence[RigidBodyTree]) -> Topology:
     if not found or any(topology != found[0] for topology in found):
         raise InputError(f"a plant needs chains of equal structure; got {len(found)} that differ; use one tree for all")
     return found[0]
-
-
-def _joint_names(trees: Sequence[RigidBodyTree], names: Sequence[str] | None) -> tuple[str, ...]:
-    chains = enumerate(trees)
-    own = [name if len(trees) == 1 else f"{c}/{name}" for c, tree in chains for name in tree.joint_names]
-    if names is not None and len(names) != len(own):
-        raise InputError(f"{len(names)} joint names for {len(own)} actuated joints; name each once")
-    return tuple(names) if names is not None else tuple(own)

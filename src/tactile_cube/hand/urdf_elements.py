@@ -142,11 +142,7 @@ def _strength(limit: ElementTree.Element | None, key: str, joint: str) -> float:
 
 
 def body_of(link: ElementTree.Element) -> Body:
-    """The <inertial> of a <link>; without one it has no mass.
-
-    Raises:
-        InputError: no body has this mass.
-    """
+    """The <inertial> of a <link>; without one it has no mass. Raises InputError: no body has this mass."""
     inertial, where = link.find("inertial"), f"link '{link.get('name')}'"
     if inertial is None:
         return Body()

@@ -62,18 +62,20 @@ def _shape(element: ElementTree.Element, at: Placement, where: str) -> Collision
     raise InputError(f"URDF: {where} has the shape <{kind}>; use box, sphere, cylinder, capsule or mesh")
 
 
-def read_finger(
-    text: str, name: str, joints: tuple[str, ...], tip: str, face: Array, where: str
-) -> tuple[Finger, tuple[int, ...]]:
-    """Cut a finger out of a URDF whose files have absolute names; also the actuated joint that each joint moves with.
+def _finger(name: str, one: Mapping[str, Any], text: str) -> tuple[Finger, tuple[int, ...]]:
+    """A described finger, cut out of a URDF, and the actuated joint that each of its joints moves with.
 
     Products of inertia about a joint's axis are left out: beside the rotor's inertia, which acts there, they vanish.
-    `joints` are actuated, from the palm to the tip; the origin of link `tip` is the middle of the fingertip; errors
-    begin with `where`.
-
-    Raises:
-        InputError: joints that form no chain of revolute joints, a tip elsewhere, links without mass.
     """
+    where = f"hand.fingers.{name}"
+    for key in ("joints", "tip", "side"):
+        if key not in one:
+            raise InputError(f"{where}: lacks '{key}'; give joints, tip and side")
+    side = _vector(f"fingers.{name}.side", one["side"])
+    length = float(np.linalg.norm(side[:2]))
+    if length < 1e-9:
+        raise InputError(f"{where}.side is {side.tolist()}; give a horizontal direction")
+    joints, tip = tuple(one["joints"]), str(one["tip"])
     tree = RigidBodyTree.from_urdf(text, joints)
     _require_chain(tree, joints, where)
     last, tip_place = tree.homes.get(tip, (-1, Placement()))
@@ -89,7 +91,7 @@ def read_finger(
         name=name,
         position=translations[0],
         rotation=rotations[0],
-        face=face,
+        face=side * [1.0, 1.0, 0.0] / length,
         joints=tree.dof_names,
         links=tree.link_names,
         limits=np.stack([tree.lower, tree.upper], axis=1),
@@ -227,19 +229,6 @@ def urdf_file(urdf: str) -> Path:
     if file is None:
         raise InputError(f"hand.urdf={urdf}: no such file, nor one of the package's in {DESCRIPTIONS.name}/")
     return file
-
-
-def _finger(name: str, one: Mapping[str, Any], text: str) -> tuple[Finger, tuple[int, ...]]:
-    where = f"hand.fingers.{name}"
-    for key in ("joints", "tip", "side"):
-        if key not in one:
-            raise InputError(f"{where}: lacks '{key}'; give joints, tip and side")
-    side = _vector(f"fingers.{name}.side", one["side"])
-    length = float(np.linalg.norm(side[:2]))
-    if length < 1e-9:
-        raise InputError(f"{where}.side is {side.tolist()}; give a horizontal direction")
-    across = side * [1.0, 1.0, 0.0] / length
-    return read_finger(text, name, tuple(one["joints"]), str(one["tip"]), across, where)
 
 
 def _action_limits(action: Mapping[str, Sequence[float]] | None, limits: Array, fingers: int) -> tuple[Array, Array]:

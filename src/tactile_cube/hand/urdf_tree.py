@@ -86,11 +86,7 @@ def read_joints(text: str) -> tuple[list[Joint], dict[str, Body]]:
 
 
 def robot_of(text: str) -> ElementTree.Element:
-    """The root element of a URDF.
-
-    Raises:
-        InputError: it is no URDF.
-    """
+    """The root element of a URDF. Raises InputError: it is no URDF."""
     try:
         robot = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t"))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # an encoding that is none

@@ -29,7 +29,7 @@ HELD = "Nothing is missing that these grasps show: the world follows them about 
 
 def answer(result: dict[str, Any], experiment: Experiment | None, constants: Sequence[str] = ()) -> str:
     """A few lines for the terminal, from the content of diagnosis.json; `constants` are said to be stated otherwise."""
-    units = result.get("units", {})
+    units = result.get("shown_in", result.get("units", {}))
     grasps, unproven = result.get("noise_floor_source") == "contact", result.get("unproven_effects")
     opening = headline(result)
     if unproven and result["verdict"] == "unknown_effect":
@@ -56,11 +56,16 @@ def answer(result: dict[str, Any], experiment: Experiment | None, constants: Seq
         f"{milli(error['with_effects'], unit)} with the recommended model; "
         f"noise floor {milli(error['noise_floor'], unit)}."
     )
+    if over := result.get("error_over_noise"):
+        lines.append(
+            f"Error over sensor noise in short windows: {over['refitted']:.2f} with constants refitted, "
+            f"{over['with_effects']:.2f} with the recommended model."
+        )
     if standard := result.get("standard_model"):
         named = ", ".join(standard["otherwise"]) or "nothing otherwise than stated"
         lines.append(f"The field's standard model: {milli(standard['error'], unit)} on held-out trials ({named}).")
     if experiment is not None:
-        lines += next_steps(experiment, units)
+        lines += next_steps(experiment, result.get("units", {}))
     return "\n".join(lines)
 
 
@@ -103,10 +108,10 @@ def left_over(result: Mapping[str, Any]) -> str:
     if result["verdict"] in ("adequate", "unknown_effect") or not error.get("noise_floor"):
         return ""
     floors = error["with_effects"] / error["noise_floor"]
-    left = milli(error["with_effects"], common_unit(result.get("units", {}).values()))
+    left = milli(error["with_effects"], common_unit(result.get("shown_in", result.get("units", {})).values()))
     windows = result.get("error_over_noise", {}).get("with_effects", floors)
     if windows < LEFT < floors:
-        return f" ({short(windows, 2)} sensor noises remain in short windows; run freely, the model parts by {left})"
+        return f" ({windows:.2f} sensor noises remain in short windows; run freely, the model parts by {left})"
     return f" ({left} remain, {short(floors, 2)} noise floors)" if floors > LEFT else ""
 
 

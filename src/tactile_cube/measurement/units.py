@@ -1,12 +1,15 @@
-"""In which units people read a joint's numbers: mrad and N m where it turns, mm and N where it slides."""
+"""In which units people read a joint's numbers: mrad or deg and N m where it turns, mm and N where it slides."""
 
+import math
 import re
 from collections.abc import Iterable
 
-TURNS, SLIDES = "rad", "m"
+TURNS, SLIDES, DEGREES = "rad", "m", "deg"
 EITHER = "rad or m"
 MILLION = 1e6  # beyond it numbers are written as powers of ten
 THOUSANDTHS = {TURNS: "mrad", SLIDES: "mm", EITHER: "mrad or mm"}
+SMALL = {unit: (name, 1e3) for unit, name in THOUSANDTHS.items()} | {DEGREES: (DEGREES, math.degrees(1.0))}
+"""Unit of a position -> unit of its errors, and how many of them make a rad or m."""
 SLIDING = (("N m", "N"), ("kg m^2", "kg"), ("rad", "m"))
 
 
@@ -17,8 +20,9 @@ def common_unit(units: Iterable[str]) -> str:
 
 
 def milli(value: float, unit: str = TURNS, digits: int = 3) -> str:
-    """A position [rad or m] in thousandths, three digits: 0.0471 mrad, 12.3 mm."""
-    return f"{short(1e3 * value, digits)} {THOUSANDTHS[unit]}"
+    """A position [rad or m] in thousandths, or degrees, three digits: 0.0471 mrad, 12.3 mm, 0.624 deg."""
+    name, size = SMALL[unit]
+    return f"{short(size * value, digits)} {name}"
 
 
 def short(value: float, digits: int = 3) -> str:
@@ -34,3 +38,15 @@ def of_joint(text: str, unit: str) -> str:
     for turning, sliding in SLIDING:
         text = re.sub(rf"(?<![A-Za-z]){re.escape(turning)}(?![A-Za-z])", sliding, text)
     return text
+
+
+def shown(label: str, unit: str) -> tuple[str, float]:
+    """A signal's label as a joint of `unit` has it, and what its SI values are to be multiplied by.
+
+    Example:
+        >>> shown("velocity of elbow [rad/s]", "deg")
+        ('velocity of elbow [deg/s]', 57.29577951308232)
+    """
+    if unit == DEGREES and "[rad" in label:
+        return label.replace("[rad", "[deg"), math.degrees(1.0)
+    return of_joint(label, unit), 1.0

@@ -127,11 +127,7 @@ class Grasps:
 
     @classmethod
     def load(cls, path: Path) -> Grasps:
-        """Reads what `save` wrote.
-
-        Raises:
-            InputError: there is no such file, or it is no file of grasps.
-        """
+        """Reads what `save` wrote. Raises InputError: there is no such file, or it is no file of grasps."""
         data = read_npz(path)
         try:
             angles, targets, positions, quaternions = (np.asarray(data[name], np.float64) for name in COLUMNS)

@@ -83,10 +83,9 @@ class BulletEngine:
     def __init__(self, hand: Hand, options: SimulationOptions, drive: HandDrive) -> None:
         self._hand, self._drive = hand, drive
         self.client = connect(options)
+        self._here = {"physicsClientId": self.client}
         half = (0.5 * _TABLE_SIZE).tolist()
-        self._table_shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
-        )
+        self._table_shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **self._here)
         self._cube_shape = -1
         self._cube_size = self._cube_com = np.zeros(3)
         self._cube_kind: ObjectShape = "box"
@@ -98,41 +97,37 @@ class BulletEngine:
             load_chain(self.client, urdf, *base) for urdf, base in zip(drive.finger_urdfs(), bases, strict=True)
         ]
         self._inertias = [
-            [pybullet.getDynamicsInfo(body, link, physicsClientId=self.client)[2] for link in self._links]
-            for body in self.fingers
+            [pybullet.getDynamicsInfo(body, link, **self._here)[2] for link in self._links] for body in self.fingers
         ]
         for body, bare in zip(self.fingers, self._bare, strict=True):  # Bullet boxes links without a shape too
             for link in (-1, *bare):
-                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, physicsClientId=self.client)
+                pybullet.setCollisionFilterGroupMask(body, link, 0, 0, **self._here)
         self.q, self.v = np.zeros((2, len(hand.fingers), hand.links_per_finger))
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
-        """See `Engine.place`."""
         self._constants = constants
         self.q[:], self.v[:] = q, v
         # the table goes last: a new body gets the place in the broadphase that was left last, and the solver goes
         # through contacts in the order of these places, which must be the same in every episode
         for body in (self.cube, self.table):
             if body >= 0:
-                pybullet.removeBody(body, physicsClientId=self.client)
+                pybullet.removeBody(body, **self._here)
         self.table = -1
         if constants.table_height is not None:  # even a distant body takes 6 % of the time
             self.table = self._new_table(constants.table_height)
             friction = {"lateralFriction": constants.table_friction}
-            pybullet.changeDynamics(self.table, -1, **friction, physicsClientId=self.client)
+            pybullet.changeDynamics(self.table, -1, **friction, **self._here)
         self._set_cube(constants, start)
         for body, position, velocity in zip(self.fingers, q, v, strict=True):
             for k in self._links:
-                pybullet.resetJointState(body, k, position[k], velocity[k], physicsClientId=self.client)
+                pybullet.resetJointState(body, k, position[k], velocity[k], **self._here)
         self._set_links(constants)
         self._forget_contacts()
 
     def set_gravity(self, acceleration: Array) -> None:
-        """See `Engine.set_gravity`."""
-        pybullet.setGravity(*acceleration, physicsClientId=self.client)
+        pybullet.setGravity(*acceleration, **self._here)
 
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
-        """See `Engine.run`."""
         states = np.empty((steps + 1, OBJECT_STATE)) if record else None
         control, memory = self._drive.plant.kernel.control_step, self._drive.memory
         torque = np.zeros_like(self.q)
@@ -140,13 +135,16 @@ class BulletEngine:
             control(i, self.q.reshape(-1), self.v.reshape(-1), torque.reshape(-1), memory)
             for body, forces in zip(self.fingers, torque.tolist(), strict=True):
                 pybullet.setJointMotorControlArray(
-                    body, self._links, pybullet.TORQUE_CONTROL, forces=forces, physicsClientId=self.client
+                    body, self._links, pybullet.TORQUE_CONTROL, forces=forces, **self._here
                 )
             if states is not None:
                 states[i] = self.cube_state()
             if wrench is not None:
-                self._push(wrench)
-            pybullet.stepSimulation(physicsClientId=self.client)
+                centre, _ = pybullet.getBasePositionAndOrientation(self.cube, **self._here)
+                force, torque_on, frame = wrench[:3].tolist(), wrench[3:].tolist(), pybullet.WORLD_FRAME
+                pybullet.applyExternalForce(self.cube, -1, force, centre, frame, **self._here)
+                pybullet.applyExternalTorque(self.cube, -1, torque_on, frame, **self._here)
+            pybullet.stepSimulation(**self._here)
             read = [one for body in self.fingers for one in pybullet.getJointStates(body, self._links, self.client)]
             self.q.reshape(-1)[:] = [state[0] for state in read]
             self.v.reshape(-1)[:] = [state[1] for state in read]
@@ -155,9 +153,8 @@ class BulletEngine:
         return states
 
     def cube_state(self) -> Array:
-        """See `Engine.cube_state`."""
-        position, quaternion = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
-        linear, angular = pybullet.getBaseVelocity(self.cube, physicsClientId=self.client)
+        position, quaternion = pybullet.getBasePositionAndOrientation(self.cube, **self._here)
+        linear, angular = pybullet.getBaseVelocity(self.cube, **self._here)
         state = np.array([*position, *quaternion, *linear, *angular])
         if np.asarray(self._constants.cube_com).any():  # Bullet speaks of the centre of mass
             arm = com_arm(self._constants, state[3:7])
@@ -166,16 +163,14 @@ class BulletEngine:
         return state
 
     def gaps(self) -> list[float]:
-        """See `Engine.gaps`."""
-        return [row[8] for row in pybullet.getContactPoints(physicsClientId=self.client)]
+        return [row[8] for row in pybullet.getContactPoints(**self._here)]
 
     def contacts(self) -> list[Contact]:
-        """See `Engine.contacts`."""
         names = {(body, -1): (name, "") for body, name in ((self.cube, "cube"), (self.table, "table"))}
         for body, finger in zip(self.fingers, self._hand.fingers, strict=True):
             names |= {(body, k): (finger.name, link) for k, link in enumerate(finger.links)}
         found = []
-        for row in pybullet.getContactPoints(physicsClientId=self.client):
+        for row in pybullet.getContactPoints(**self._here):
             first, second = names[row[1], row[3]], names[row[2], row[4]]
             middle = 0.5 * (np.array(row[5]) + np.array(row[6]))
             friction_on_first = row[10] * np.array(row[11]) + row[12] * np.array(row[13])
@@ -183,9 +178,8 @@ class BulletEngine:
         return found
 
     def normal_forces(self) -> Array:
-        """See `Engine.normal_forces`."""
         force, tip = np.zeros((2, len(self.fingers))), self._links[-1]
-        for row in pybullet.getContactPoints(physicsClientId=self.client):
+        for row in pybullet.getContactPoints(**self._here):
             body, link = (row[2], row[4]) if row[1] == self.cube else (row[1], row[3])
             if self.cube in row[1:3] and body in self.fingers:
                 force[int(link == tip), self.fingers.index(body)] += row[9]
@@ -196,17 +190,11 @@ class BulletEngine:
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
 
-    def _push(self, wrench: Array) -> None:
-        centre, _ = pybullet.getBasePositionAndOrientation(self.cube, physicsClientId=self.client)
-        frame = pybullet.WORLD_FRAME
-        pybullet.applyExternalForce(self.cube, -1, wrench[:3].tolist(), centre, frame, physicsClientId=self.client)
-        pybullet.applyExternalTorque(self.cube, -1, wrench[3:].tolist(), frame, physicsClientId=self.client)
-
     def _new_table(self, height: float) -> int:
         centre = [0.0, 0.0, height - 0.5 * float(_TABLE_SIZE[2])]
         return int(
             pybullet.createMultiBody(
-                0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, physicsClientId=self.client
+                0.0, self._table_shape, basePosition=centre, useMaximalCoordinates=True, **self._here
             )
         )
 
@@ -224,7 +212,7 @@ class BulletEngine:
                 basePosition=list(np.asarray(start.cube_position) + arm),
                 baseOrientation=list(np.asarray(start.cube_quaternion)),
                 useMaximalCoordinates=True,
-                physicsClientId=self.client,
+                **self._here,
             )
         )
         pybullet.changeDynamics(
@@ -235,23 +223,23 @@ class BulletEngine:
             rollingFriction=0.0,
             activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
             **_NO_DAMPING,
-            physicsClientId=self.client,
+            **self._here,
         )
         if constants.object_shape not in ("box", "cylinder"):  # Bullet takes that of a box for the others
             # without its mass it would lose the inertia; without a margin a mesh ends where its corners are
             inertia = constants.cube_mass * unit_inertia(constants.object_shape, np.asarray(constants.cube_size))
             heavy = {"mass": constants.cube_mass, "localInertiaDiagonal": np.diag(inertia).tolist()}
             heavy |= {"collisionMargin": 0.0} if isinstance(constants.object_shape, ObjectMesh) else {}
-            pybullet.changeDynamics(self.cube, -1, **heavy, physicsClientId=self.client)
+            pybullet.changeDynamics(self.cube, -1, **heavy, **self._here)
         if constants.tip_compliance > 0.0:
             skin = {
                 "contactStiffness": 1.0 / constants.tip_compliance,
                 "contactDamping": SKIN_RELAXATION / constants.tip_compliance,
             }
-            pybullet.changeDynamics(self.cube, -1, **skin, physicsClientId=self.client)
+            pybullet.changeDynamics(self.cube, -1, **skin, **self._here)
         turning = np.asarray(start.cube_angular_velocity)
         linear = np.asarray(start.cube_linear_velocity) + np.cross(turning, arm)
-        pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), physicsClientId=self.client)
+        pybullet.resetBaseVelocity(self.cube, linear.tolist(), turning.tolist(), **self._here)
 
     def _shape_of(self, constants: EpisodeConstants) -> int:
         """The shape of the last object if it had this kind, size and centre of mass, else a new one.
@@ -267,7 +255,7 @@ class BulletEngine:
             else:
                 place = {"collisionFramePosition": (-com).tolist()} if com.any() else {}
                 geometry = _geometry(kind, size) | place
-            shape = pybullet.createCollisionShape(**geometry, physicsClientId=self.client)
+            shape = pybullet.createCollisionShape(**geometry, **self._here)
             self._cube_shape, self._cube_kind = int(shape), kind
             self._cube_size, self._cube_com = size.copy(), com.copy()
         return self._cube_shape
@@ -283,7 +271,7 @@ class BulletEngine:
                     "spinningFriction": constants.tip_spinning_friction if tip else 0.0,
                     "localInertiaDiagonal": spinning,
                 }
-                pybullet.changeDynamics(body, link, **numbers, physicsClientId=self.client)
+                pybullet.changeDynamics(body, link, **numbers, **self._here)
 
     def _forget_contacts(self) -> None:
         """Registers every finger anew with the broadphase; cube and table are new themselves.
@@ -295,7 +283,7 @@ class BulletEngine:
             group = _FIRST_FINGER_GROUP << k
             mask = _ALL_GROUPS & ~group
             for link in (one for one in self._links if one not in self._bare[k]):
-                pybullet.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=self.client)
+                pybullet.setCollisionFilterGroupMask(body, link, group, mask, **self._here)
 
 
 def _refuse_tilted_inertia(mesh: ObjectMesh, size: Array) -> None:

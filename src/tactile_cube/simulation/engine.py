@@ -126,11 +126,7 @@ class SimulationOptions:
 
     @property
     def single_engine(self) -> Literal["bullet", "mujoco"]:
-        """The engine of one world.
-
-        Raises:
-            InputError: The options name several.
-        """
+        """The engine of one world. Raises InputError: The options name several."""
         if self.engine == "mixed":
             raise InputError(
                 "simulation.engine is 'mixed', which needs several worlds; choose bullet or mujoco for one"

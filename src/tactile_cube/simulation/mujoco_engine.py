@@ -21,7 +21,6 @@ class MujocoEngine:
         self._control, self._memory = drive.plant.kernel.control_step, drive.memory
 
     def place(self, constants: EpisodeConstants, start: Start, q: Array, v: Array) -> None:
-        """See `Engine.place`."""
         self._model = self._spec.compile(constants)
         self._data = mujoco.MjData(self._model)
         x, y, z, w = np.asarray(start.cube_quaternion)
@@ -37,11 +36,9 @@ class MujocoEngine:
         self.q, self.v = (joints.reshape(q.shape) for joints in self._driven[:2])
 
     def set_gravity(self, acceleration: Array) -> None:
-        """See `Engine.set_gravity`."""
         self._model.opt.gravity[:] = acceleration
 
     def run(self, steps: int, wrench: Array | None, record: bool) -> Array | None:
-        """See `Engine.run`."""
         self._data.body("cube").xfrc_applied[:] = 0.0 if wrench is None else wrench
         states = np.empty((steps + 1, OBJECT_STATE)) if record else None
         for i in range(steps):
@@ -54,7 +51,6 @@ class MujocoEngine:
         return states
 
     def cube_state(self) -> Array:
-        """See `Engine.cube_state`."""
         state, pose, velocity = np.empty(OBJECT_STATE), *self._free_joint
         state[:3], state[3:6], state[6] = pose[:3], pose[4:], pose[3]  # wxyz in MuJoCo
         state[7:10] = velocity[:3]
@@ -62,12 +58,10 @@ class MujocoEngine:
         return state
 
     def gaps(self) -> list[float]:
-        """See `Engine.gaps`."""
         gaps: list[float] = self._data.contact.dist.tolist()
         return gaps
 
     def contacts(self) -> list[Contact]:
-        """See `Engine.contacts`."""
         found = []
         for index in range(self._data.ncon):
             contact, wrench = self._data.contact[index], np.zeros(6)
@@ -79,7 +73,6 @@ class MujocoEngine:
         return found
 
     def normal_forces(self) -> Array:
-        """See `Engine.normal_forces`."""
         force, wrench = np.zeros((2, len(self._hand.fingers))), np.zeros(6)
         for index, (first, second) in enumerate(self._data.contact.geom.tolist()):
             finger = self._fingers[first] or self._fingers[second]

@@ -132,7 +132,12 @@ class HandSpec:
         size, mass = np.asarray(constants.cube_size), constants.cube_mass
         kind = constants.object_shape
         if isinstance(kind, ObjectMesh):
-            self._set_mesh(kind, size)
+            self._mesh = self._mesh or self.spec.add_mesh(name="object")
+            self._mesh.uservert, self._mesh.userface = (
+                (kind.vertices * size).ravel().tolist(),
+                kind.faces.ravel().tolist(),
+            )
+            shape.type, shape.meshname = mujoco.mjtGeom.mjGEOM_MESH, "object"
         else:
             shape.meshname, body.fullinertia = "", UNSAID  # of a mesh before
             shape.type, shape.size = _geometry(kind, 0.5 * size)
@@ -145,14 +150,6 @@ class HandSpec:
             body.inertia = mass * np.diag(unit_inertia(kind, size))
         height = -1e3 if constants.table_height is None else constants.table_height
         self._table.pos = [0.0, 0.0, height - TABLE_HALF_SIZE[2]]
-
-    def _set_mesh(self, mesh: ObjectMesh, size: Array) -> None:
-        if self._mesh is None:
-            self._mesh = self.spec.add_mesh(name="object")
-        self._mesh.uservert = (mesh.vertices * size).ravel().tolist()
-        self._mesh.userface = mesh.faces.ravel().tolist()
-        _, shape = self._cube
-        shape.type, shape.meshname = mujoco.mjtGeom.mjGEOM_MESH, "object"
 
 
 def _geometry(kind: NamedShape, half: Array) -> tuple[Any, Array]:

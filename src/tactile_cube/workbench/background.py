@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from threading import Thread
@@ -20,79 +20,39 @@ from tactile_cube.identification.fitting.intervals import Fitted
 from tactile_cube.measurement.recordings.recording import Recording
 
 BEST = "best so far: "
-PHASES = (
-    ("steps of simulation a sample", 0.05), ("base refitted", 0.15), ("starts of", 0.25), (BEST, 0.5),
-    ("  held-out error", 0.75), ("verdict", 0.9),
-)  # fmt: skip
-"""What lines of a diagnosis begin with or contain, and which share of its time has gone by then, about."""
+PHASES = {
+    "steps of simulation a sample": 0.05, "base refitted": 0.15, "starts of": 0.25, BEST: 0.5,
+    "  held-out error": 0.75, "verdict": 0.9,
+}  # fmt: skip
+"""What lines of a diagnosis contain -> which share of its time has gone by then, about."""
+LOOK = 2.0  # [s] between two looks at the clock while it says nothing
 
 
 class Found(NamedTuple):
-    """What a diagnosis answered.
+    """What a diagnosis answered."""
 
-    Attributes:
-        text: in plain words.
-        effects: what is missing, NAME@JOINT; of sets that do as well the first; where not all was found, that part.
-        fitted: the model that it recommends.
-        over_noise: error of its segments of untouched trials, in units of the sensor noise.
-        left_out: whether it masked intervals of the trials, so that its errors are of fewer samples than others.
-    """
-
-    text: str
-    effects: list[str]
-    fitted: Fitted
-    over_noise: float
-    left_out: bool
-
-
-@dataclass
-class Progress:
-    """How far a diagnosis is.
-
-    Attributes:
-        lines: everything that it said.
-        share: done, about.
-        best: best answer so far, in its words.
-    """
-
-    lines: list[str] = field(default_factory=list)
-    share: float = 0.0
-    best: str = ""
-    began: float = field(default_factory=time.monotonic)
-
-    def add(self, line: str) -> None:
-        """Take a line."""
-        self.lines = [*self.lines, line]
-        reached = max((share for words, share in PHASES if words in line), default=0.0)
-        self.share = max(self.share, reached)
-        if line.startswith(BEST):
-            self.best = line.removeprefix(BEST)
-        elif line.startswith("base refitted: "):
-            self.best = f"nothing yet; the refitted model leaves {line.rpartition('error ')[2]}"
-
-    @property
-    def left(self) -> float:
-        """Seconds, about."""
-        return (time.monotonic() - self.began) * (1.0 - self.share) / max(self.share, 0.01)
+    text: str  # in plain words
+    effects: list[str]  # what is missing, NAME@JOINT; of sets that do as well the first; a part where not all was found
+    fitted: Fitted  # the model that it recommends
+    over_noise: float  # error of its segments of untouched trials, in units of the sensor noise
+    left_out: bool  # whether it masked intervals of trials: its errors are of fewer samples than others
 
 
 class Diagnosing:
-    """A diagnosis that runs; `lines` waits for its progress, `stop` ends it, `found` is the answer."""
+    """A diagnosis that runs.
+
+    Attributes:
+        said: everything that it said; `share`: how much of it is done, about; `best`: its best answer so far, in words.
+        found: its answer; None: it runs, was stopped or failed.
+    """
 
     def __init__(
         self, recording: Recording, model: ModelFile | None, own_effects: Sequence[str], seed: int, folder: Path
     ) -> None:
-        """Start it.
-
-        Args:
-            recording: what was measured.
-            model: to begin with; None: what the recording states.
-            own_effects: dotted paths of the user's own classes.
-            seed: which trials are held out.
-            folder: where its files go.
-        """
+        """Start it beside a model (None: what the recording states); its files go to a folder."""
+        self.said: list[str] = []
+        self.share, self.best, self._began = 0.0, "nothing yet", time.monotonic()
         self.found: Found | None = None
-        self.progress = Progress()
         self.stopped = False
         context = multiprocessing.get_context("spawn")
         self._receiver, sender = context.Pipe(duplex=False)
@@ -101,15 +61,22 @@ class Diagnosing:
         self._process.start()
         sender.close()
 
+    @property
+    def progress(self) -> str:
+        """The share that is done, what it took, and the time that is left."""
+        taken = time.monotonic() - self._began
+        left = f", about {taken * (1.0 - self.share) / self.share:.0f} s left" if self.share else ""
+        return f"about {100 * self.share:.0f} % done in {taken:.0f} s{left}"
+
     def lines(self) -> Iterator[str]:
-        """Progress, line by line, until it ends.
+        """Progress, line by line, until it ends; nothing is said for a while: an empty line.
 
         Raises:
             InputError: what `diagnose` raises, or the process died.
         """
         while True:
             try:
-                said = self._receiver.recv()
+                said = self._receiver.recv() if self._receiver.poll(LOOK) else ""
             except (EOFError, OSError):
                 break
             if isinstance(said, InputError):
@@ -117,11 +84,19 @@ class Diagnosing:
             if isinstance(said, Found):
                 self.found = said
             else:
-                self.progress.add(str(said))
-                yield str(said)
+                self._add(said)
+                yield said
         self._process.join()
         if self.found is None and not self.stopped:
             raise InputError(f"diagnose ended with status {self._process.exitcode}; the terminal says why")
+
+    def _add(self, line: str) -> None:
+        self.said += [line] if line else []
+        self.share = max([self.share, *(share for words, share in PHASES.items() if words in line)])
+        if line.startswith(BEST):
+            self.best = line.removeprefix(BEST)
+        elif line.startswith("base refitted: "):
+            self.best = f"nothing yet; the refitted model leaves {line.rpartition('error ')[2]}"
 
     def wait(self) -> Found | None:
         """Return the answer when it has come; None: stopped."""
@@ -149,18 +124,14 @@ def _diagnose(
     parent = multiprocessing.parent_process()
     assert parent is not None, "this is a process of a workbench"
     Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-    def say(line: str) -> None:
-        sender.send(line)
-
     try:
-        found = diagnose(recording, seed=seed, effects=effects, model=model, say=say)
+        found = diagnose(recording, seed=seed, effects=effects, model=model, say=lambda line: sender.send(line))
         found.write(folder)
         assert found.free is not None  # a workbench has free motion
         fitted, known = found.free.fitted, found.free.known
-        light = replace(fitted.fit, columns=np.zeros(0), residual=np.zeros(0))
+        light = replace(fitted, fit=replace(fitted.fit, columns=np.zeros(0), residual=np.zeros(0)))
         new = [term.label for term in fitted.model.terms if term.label not in known]
         over_noise = found.data["error_over_noise"]["with_effects"]
-        sender.send(Found(found.text, new, replace(fitted, fit=light), over_noise, bool(found.data["left_out"])))
+        sender.send(Found(found.text, new, light, over_noise, bool(found.data["left_out"])))
     except InputError as error:
         sender.send(error)

@@ -20,7 +20,7 @@ from tactile_cube.identification.search.residual_shape import Missing
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.usage_error import usage_error
-from tactile_cube.workbench.background import Diagnosing, Found, Progress
+from tactile_cube.workbench.background import Diagnosing, Found
 from tactile_cube.workbench.importing import Preview, Waiting, import_logs, kept, settings_of
 from tactile_cube.workbench.state import Look, Workbench
 
@@ -28,44 +28,29 @@ LABEL = 60  # characters of a wrong name that an error repeats
 
 
 class Desk:
-    """One state and one worker for all windows.
-
-    Attributes:
-        bench: the state; None until a recording is loaded.
-        version: grows with every change of the model or the recording.
-        busy: what is being done, in words.
-        problem: what went wrong last, in words; `notes`: what was understood and what is odd, a line each.
-        waiting: files that wait to be imported; `preview`: what is in the first.
-        looks: a look at the candidates, joint -> best first, those that look alike together, of this version.
-        explainable: joint -> part of the missing torque that any law could explain, of this version.
-        chosen: the candidate looked at, NAME@JOINT; `signature`: the torque that it would supply; `promised`: the error
-            over noise that it would leave.
-        progress: of the diagnosis that runs or ran last; `outcome`: how it ended; `found`: its answer.
-        experiment: proposed; `commands`: its file as text.
-    """
+    """One state and one worker for all windows."""
 
     def __init__(self, folder: Path, own_effects: Sequence[str] = (), seed: int = 0, model: str | None = None) -> None:
         self.folder, self.own_effects, self.seed, self.model = folder, tuple(own_effects), seed, model
-        self.bench: Workbench | None = None
-        self.version, self.ended = 0, False
-        self.busy = self.problem = self.commands = ""
-        self.notes: list[str] = []
-        self.waiting = Waiting()
-        self.preview: Preview | None = None
-        self.diagnosing: Diagnosing | None = None
+        self.bench: Workbench | None = None  # until a recording is loaded
+        self.version, self.ended = 0, False  # version grows with every change of the model or the recording
+        self.busy = self.problem = ""  # what is being done, and what went wrong last, in words
+        self.notes: list[str] = []  # what was understood and what is odd, a line each
+        self.waiting = Waiting()  # files that wait to be imported
+        self.preview: Preview | None = None  # of the first
+        self.diagnosing: Diagnosing | None = None  # that runs or ran last
+        self.outcome = self.commands = ""  # how it ended, empty while it runs; the proposed experiment's file as text
         self.listeners: list[Callable[[], None]] = []
         self._worker, self._queued = ThreadPoolExecutor(1), 0
-        self.signature: Missing | None
         self._forget()
 
     def _forget(self) -> None:
-        self.looks: dict[str, list[list[Look]]] = {}
-        self.explainable: dict[str, float] = {}
-        self.chosen, self.signature, self.promised = "", None, 0.0
-        self.progress: Progress | None = None
-        self.outcome = ""
-        self.found: Found | None = None
-        self.experiment: Experiment | None = None
+        """What was seen beside a model that is no longer in force."""
+        self.looks: dict[str, list[list[Look]]] = {}  # joint -> candidates, best first, those that look alike together
+        self.explainable: dict[str, float] = {}  # joint -> part of the missing torque that any law could explain
+        self.chosen, self.promised = "", 0.0  # candidate looked at, NAME@JOINT; error over noise that it would leave
+        self.signature: Missing | None = None  # the torque that it would supply
+        self.experiment: Experiment | None = None  # proposed
 
     def changed(self) -> None:
         """Tell every window."""
@@ -77,7 +62,7 @@ class Desk:
         self.busy = words
         self.changed()
 
-    def do(self, words: str, work: Callable[[], None], asked: bool = True) -> None:
+    def do(self, words: str, work: Callable[[], object], asked: bool = True) -> None:
         """Work while the windows stay usable, one thing after another; what goes wrong is shown until more is asked."""
         self._queued += asked
 
@@ -99,23 +84,22 @@ class Desk:
 
         self._worker.submit(run)
 
+    def beside(self, words: str, work: Callable[[Workbench], object], asked: bool = True) -> None:
+        """Work with the state as it will be then, if there is one."""
+        self.do(words, lambda: work(self.bench) if self.bench is not None else None, asked)
+
     def change(self, words: str, work: Callable[[Workbench], object]) -> None:
         """Change the model; afterwards everything that was seen beside the old one is forgotten."""
 
-        def run() -> None:
-            if self.bench is not None:
-                work(self.bench)
-                self._renewed(self.bench)
+        def run(bench: Workbench) -> None:
+            work(bench)
+            self._renewed(bench)
 
-        self.do(words, run)
+        self.beside(words, run)
 
     def _renewed(self, bench: Workbench) -> None:
-        kept = self.found, self.progress, self.outcome
         self._forget()
-        self.notes = []
-        if bench is self.bench:
-            self.found, self.progress, self.outcome = kept
-        self.bench, self.version = bench, self.version + 1
+        self.bench, self.version, self.notes = bench, self.version + 1, []
 
     def open(self, text: str) -> None:
         """Take what somebody named: a recording's folder, a model.yaml, logs (a pattern too) or a URDF."""
@@ -133,29 +117,26 @@ class Desk:
                 files = [Path(name) for name in sorted(glob(str(path)))]
                 if not files:
                     raise InputError(f"{path}: no recording's folder (with {DESCRIPTION}) and no file")
-                self._wait_for_import(files)
+                self._wait(self.waiting.with_files(files))
 
         self.do(f"opening {text}", run)
 
     def take(self, names: Sequence[str], contents: Sequence[bytes]) -> None:
         """Take files that were dropped onto the page."""
-        place = self.folder / "dropped"
 
         def run() -> None:
-            self._wait_for_import([kept(place, *one) for one in zip(names, contents, strict=True)])
+            files = [kept(self.folder / "dropped", *one) for one in zip(names, contents, strict=True)]
+            self._wait(self.waiting.with_files(files))
 
         self.do(f"reading {', '.join(names)}", run)
-
-    def _wait_for_import(self, files: Sequence[Path]) -> None:
-        self._wait(self.waiting.with_files(files))
-
-    def _wait(self, waiting: Waiting) -> None:
-        self.waiting, self.preview = waiting, None
-        self.preview = waiting.preview()
 
     def choose_robot(self, robot: str) -> None:
         """Take one joint of unknown lever in the place of a URDF."""
         self.do(f"a {robot}", lambda: self._wait(replace(self.waiting, urdf=None, robot=robot)))
+
+    def _wait(self, waiting: Waiting) -> None:
+        self.waiting, self.preview = waiting, None
+        self.preview = waiting.preview()
 
     @property
     def same_rig(self) -> Recording | None:
@@ -166,10 +147,8 @@ class Desk:
     def import_waiting(self, typed: dict[str, str], columns: dict[str, Any], together: bool = False) -> None:
         """Import the logs that wait and load what they make; they wait on where something is wrong.
 
-        Args:
-            typed: settings of `record source=csv`, as typed: "controller.kp", "read", ...
-            columns: as `source.columns`; none: as guessed.
-            together: with the trials of the recording that is loaded, if the URDF is its own.
+        `typed`: settings of `record source=csv` such as "controller.kp"; `columns`: as `source.columns`, none: as
+        guessed; `together`: with the trials of the recording that is loaded, if the URDF is its own.
         """
         waiting, before = self.waiting, self.same_rig if together else None
 
@@ -177,16 +156,20 @@ class Desk:
             given = settings_of(typed) | waiting.settings | {"columns": columns or None}
             if waiting.lacks:
                 raise InputError(f"still needed: {' and '.join(waiting.lacks)}")
-            out = self.folder / f"recording_{self.version}_{len(list(self.folder.glob('recording_*')))}"
-            recording, understood = import_logs(out, given, before)
+            recording, understood = import_logs(self._place("recording"), given, before)
             self._load(recording.folder)
             self.notes = [*understood, *self.notes]
 
         self.do("importing", run)
 
+    def _place(self, what: str) -> Path:
+        """A folder that is not there yet."""
+        return self.folder / f"{what}_{self.version}_{len(list(self.folder.glob(f'{what}_*')))}"
+
     def _load(self, folder: Path) -> None:
         self.stop()
         bench = Workbench(folder, self.model, self.own_effects, self.seed, self.say)
+        self.diagnosing, self.outcome = None, ""
         self._renewed(bench)
         warnings = [line.replace(f"{folder / DESCRIPTION}: ", "") for line in bench.opened.warnings]
         self.notes = [f"warning: {line}" for line in warnings]
@@ -195,96 +178,96 @@ class Desk:
     def look(self, joint: str) -> None:
         """Look at the candidates of a joint, unless that was done."""
 
-        def run() -> None:
-            if self.bench is None or joint not in self.bench.recording.joints or joint in self.looks:
+        def work(bench: Workbench) -> None:
+            if joint not in bench.recording.joints or joint in self.looks:
                 return
-            found = self.bench.candidates(joint, stop=lambda: self._queued > 0)
+            found = bench.candidates(joint, stop=lambda: self._queued > 0)
             if found is None:
                 self.look(joint)  # after what somebody is waiting for
             else:
-                self.explainable[joint] = self.bench.explainable(joint)
+                self.explainable[joint] = bench.explainable(joint)
                 self.looks[joint] = found
 
-        self.do(f"looking at what may be missing at {joint}", run, asked=False)
+        self.beside(f"looking at what may be missing at {joint}", work, asked=False)
 
     def draw(self, look: Look, label: str) -> None:
         """Find the torque that a candidate would supply, and what it would leave."""
-        bench, version = self.bench, self.version
+        version = self.version
 
-        def run() -> None:
-            if bench is not None and version == self.version:
+        def work(bench: Workbench) -> None:
+            if version == self.version:
                 self.signature, self.promised = bench.signature(look), bench.promised(look)
                 self.chosen = label
 
-        self.do(f"what {label} would supply", run)
+        self.beside(f"what {label} would supply", work)
+
+    @property
+    def running(self) -> bool:
+        """Whether a diagnosis runs."""
+        return self.diagnosing is not None and not self.outcome
+
+    @property
+    def found(self) -> Found | None:
+        """The answer of the last diagnosis."""
+        return self.diagnosing.found if self.diagnosing is not None and self.outcome else None
 
     def diagnose(self) -> None:
         """Start a diagnosis beside the model in force."""
 
-        def run() -> None:
-            if self.bench is None or self.diagnosing is not None:
-                return
-            self.found, self.outcome = None, ""
-            folder = self.folder / f"diagnosis_{self.version}_{len(list(self.folder.glob('diagnosis_*')))}"
-            folder.mkdir(parents=True)
-            self.diagnosing = self.bench.diagnose(folder)
-            self.progress = self.diagnosing.progress
-            Thread(target=self._watch, args=(self.diagnosing,), daemon=True).start()
+        def work(bench: Workbench) -> None:
+            if not self.running:
+                folder = self._place("diagnosis")
+                folder.mkdir(parents=True)
+                self.diagnosing, self.outcome = bench.diagnose(folder), ""
+                Thread(target=self._watch, args=(self.diagnosing,), daemon=True).start()
 
-        self.do("starting a diagnosis", run)
+        self.beside("starting a diagnosis", work)
 
     def _watch(self, running: Diagnosing) -> None:
-        end = "stopped"
         try:
             for _ in running.lines():
                 self.changed()
-            end = "stopped" if running.found is None else "done"
+            outcome = "stopped" if running.found is None else "done"
         except InputError as error:
-            end = str(error)
-        self.outcome, self.found, self.diagnosing = end, running.found, None
+            outcome = str(error)
+        if self.diagnosing is running:
+            self.outcome = outcome
         self.changed()
-
-    def end(self) -> None:
-        """Stop the diagnosis that runs; what else is being done ends with the program."""
-        self.ended = True
-        self.stop()
 
     def stop(self) -> None:
         """Stop the diagnosis that runs."""
         if self.diagnosing is not None:
             self.diagnosing.stop()
 
+    def end(self) -> None:
+        """Stop the diagnosis that runs; what else is being done ends with the program."""
+        self.ended = True
+        self.stop()
+
     def propose(self) -> None:
         """Find the commands that would show whether the last effect is there."""
 
-        def run() -> None:
-            if self.bench is not None:
-                self.experiment = self.bench.propose()
-                self.folder.mkdir(parents=True, exist_ok=True)
-                self.commands = self.experiment.write(self.folder).read_text(encoding="utf-8")
+        def work(bench: Workbench) -> None:
+            self.experiment = bench.propose()
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self.commands = self.experiment.write(self.folder).read_text(encoding="utf-8")
 
-        self.do("looking for commands that decide, within the limits", run)
+        self.beside("looking for commands that decide, within the limits", work)
 
     def save(self, folder: str) -> None:
         """Write model.yaml and report.html."""
 
-        def run() -> None:
-            if self.bench is not None:
-                self.bench.save(_path(folder))
-                model = _path(folder) / "model.yaml"
-                self.notes = [f"saved {model} and report.html"]
-                if _is_hand(self.bench.recording.joints):
-                    self.notes += [f"train in it: python -m tactile_cube.train +experiment=adapt model={model}"]
+        def work(bench: Workbench) -> None:
+            path = _path(folder)
+            bench.save(path)
+            self.notes = [f"saved {path / 'model.yaml'} and report.html"]
+            if _is_hand(bench.recording.joints):
+                self.notes += [f"train in it: python -m tactile_cube.train +experiment=adapt model={path}/model.yaml"]
 
-        self.do("saving", run)
+        self.beside("saving", work)
 
 
 def _path(text: str) -> Path:
-    """What somebody typed, as a path.
-
-    Raises:
-        InputError: no file can have this name.
-    """
     try:
         path = Path(text.strip()).expanduser()
         path.lstat()
@@ -301,15 +284,3 @@ def _is_hand(joints: Sequence[str]) -> bool:
     hand = DLR_HAND2.joint_names
     known = [one for joint in joints for one in hand if one == joint or one.endswith(f"_{joint}")]
     return sorted(known) == sorted(hand)
-
-
-def number(key: str, text: str) -> float:
-    """Return what somebody typed as a number.
-
-    Raises:
-        InputError: it is none.
-    """
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"{key}: '{text}' is no number") from None

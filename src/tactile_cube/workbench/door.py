@@ -1,21 +1,35 @@
-"""Who may ask the workbench's server for what, and what a browser may do with its answers."""
+"""The page's server: an address that nobody guesses; who may ask it for what, and what a browser may do with it."""
 
 from __future__ import annotations
 
 import secrets
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from bokeh.application import Application
+from bokeh.application.handlers.function import FunctionHandler
+from bokeh.document import Document
+from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
+from bokeh.server.util import bind_sockets
+from jinja2 import Template
+from tornado.httpserver import HTTPServer
 from tornado.httputil import HTTPHeaders, HTTPServerRequest
+from tornado.ioloop import IOLoop
 from tornado.web import OutputTransform, RequestHandler
 
+from tactile_cube.errors import InputError
+from tactile_cube.workbench import page
 from tactile_cube.workbench.desk import Desk
 
+HOST, ENTER, COMMANDS = "127.0.0.1", "/enter", "/next_experiment.csv"
 NONCE = secrets.token_urlsafe(16)
 """Stands in the page where each answer puts a nonce of its own, of the same length."""
-ENTER, COMMANDS = "/enter", "/next_experiment.csv"
+MESSAGE = 280_000_000
+"""Bytes of a message from the page: two files of `importing.LARGEST` as base64; more closes the connection."""
+BODY = 100_000
+"""Bytes of a request; the page sends its files as messages."""
 OURS = ("/", "/ws", COMMANDS, "/favicon.ico")
 POLICY = (
     "default-src 'none'; script-src 'nonce-{nonce}'; connect-src 'self' ws://{host}; img-src 'self' data: blob:; "
@@ -24,15 +38,36 @@ POLICY = (
 REFUSAL = "<!DOCTYPE html><title>workbench</title>Open the address that the workbench printed."
 
 
-class Door(BokehTornado):  # type: ignore[misc]
-    """Bokeh's application behind a token: the address has it, and gives a cookie for it; all else needs the cookie.
+def start(desk: Desk, port: int = 0) -> tuple[BaseServer, str]:
+    """Serve a desk on 127.0.0.1 and return the server, not yet running, and its address with the token.
 
-    Attributes:
-        token: nobody guesses it.
+    Raises:
+        InputError: a port that is taken.
     """
+    template = Template(resources.files(__package__).joinpath("page.html.jinja").read_text(encoding="utf-8"))
 
-    def __init__(self, application: Application, desk: Desk, port: int, largest: int) -> None:
-        self.token, self._host = secrets.token_urlsafe(24), f"127.0.0.1:{port}"
+    def window(document: Document) -> None:
+        document.title, document.template, document.template_variables["nonce"] = "workbench", template, NONCE
+        page.Page(document, desk)
+
+    try:
+        sockets, port = bind_sockets(HOST, port)
+    except OSError as error:
+        said = f"port={port}: {error.strerror or error}; choose another one, or 0 for any that is free"
+        raise InputError(said) from None
+    door = Door(Application(FunctionHandler(window)), desk, port)
+    http = HTTPServer(door, max_body_size=BODY)
+    http.add_sockets(sockets)
+    server = BaseServer(IOLoop.current(), door, http)
+    server.start()
+    return server, f"http://{HOST}:{port}{ENTER}?token={door.token}"
+
+
+class Door(BokehTornado):  # type: ignore[misc]
+    """Bokeh's application behind a token: the address has it, and gives a cookie for it; all else needs the cookie."""
+
+    def __init__(self, application: Application, desk: Desk, port: int) -> None:
+        self.token, self._host = secrets.token_urlsafe(24), f"{HOST}:{port}"
         self.cookie = f"workbench-{port}"  # browsers do not tell ports apart
         super().__init__(
             application,
@@ -40,7 +75,7 @@ class Door(BokehTornado):  # type: ignore[misc]
             extra_patterns=[(ENTER, Enter), (COMMANDS, Commands, {"desk": desk})],
             include_headers=[],  # Bokeh would write the cookie into the page
             include_cookies=[],
-            websocket_max_message_size_bytes=largest,
+            websocket_max_message_size_bytes=MESSAGE,
             transforms=[Guarded],
             log_function=lambda handler: None,  # an access line would hold the token
         )
@@ -48,9 +83,10 @@ class Door(BokehTornado):  # type: ignore[misc]
     def find_handler(self, request: HTTPServerRequest, **more: Any) -> Any:
         """Return what answers a request: without the cookie nothing of Bokeh's, with it what the page uses."""
         cookie = request.cookies.get(self.cookie)
-        known = cookie is not None and secrets.compare_digest(cookie.value.encode(), self.token.encode())
+        given = request.query_arguments.get("token", [b""])[-1] if request.path == ENTER else b""
         used = request.path in OURS or request.path.startswith("/static/js/")
-        if request.host == self._host and (request.path == ENTER or (known and used)):
+        known = given if cookie is None or not used else cookie.value.encode()
+        if request.host == self._host and secrets.compare_digest(known, self.token.encode()):
             return super().find_handler(request, **more)
         return self.get_handler_delegate(request, Refused)
 
@@ -74,22 +110,6 @@ class Guarded(OutputTransform):  # type: ignore[misc]
         return status_code, headers, chunk
 
 
-class Enter(RequestHandler):  # type: ignore[misc]
-    """Exchange the token for a cookie, and show the page at an address without it."""
-
-    application: Door
-
-    def get(self) -> None:
-        """Answer."""
-        given = self.get_query_argument("token", "")
-        if not secrets.compare_digest(given.encode(), self.application.token.encode()):
-            self.set_status(403)
-            self.finish(REFUSAL)
-            return
-        self.set_cookie(self.application.cookie, self.application.token, httponly=True, samesite="Lax")
-        self.redirect("/")
-
-
 class Refused(RequestHandler):  # type: ignore[misc]
     """Say what to do, whatever was asked."""
 
@@ -97,6 +117,17 @@ class Refused(RequestHandler):  # type: ignore[misc]
         """Answer."""
         self.set_status(403)
         self.finish(REFUSAL)
+
+
+class Enter(RequestHandler):  # type: ignore[misc]
+    """Exchange the token for a cookie, and show the page at an address without it."""
+
+    application: Door
+
+    def get(self) -> None:
+        """Answer."""
+        self.set_cookie(self.application.cookie, self.application.token, httponly=True, samesite="Lax")
+        self.redirect("/")
 
 
 class Commands(RequestHandler):  # type: ignore[misc]

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
-from bokeh.models import Button, Div, Row, Select, SVGIcon, TextInput, Toggle
+from bokeh.models import Row, SVGIcon, Toggle
 
-from tactile_cube.measurement.recordings.columns import SIGNALS
+from tactile_cube.measurement.sources import units
 from tactile_cube.measurement.sources.column_map import NEEDED
 from tactile_cube.measurement.sources.lever import ROBOTS
 from tactile_cube.measurement.sources.servo import servos
-from tactile_cube.measurement.sources.units import (
-    ANGLE_UNITS,
-    LENGTH_UNITS,
-    RANGE,
-    TIME_UNITS,
-    TORQUE_UNITS,
-    USUAL_TICKS,
-)
 from tactile_cube.workbench.desk import Desk
 from tactile_cube.workbench.importing import Preview
-from tactile_cube.workbench.text import Html, choose, html, listed, plain, show
-from tactile_cube.workbench.widgets import NONE, YELLOW, button, column_of, row_of, text_of
+from tactile_cube.workbench.tables import CELL, HEAD, ROW, TABLE
+from tactile_cube.workbench.text import choose, html, listed, show
+from tactile_cube.workbench.widgets import NONE, YELLOW, button, column_of, field, row_of, select, text_of
 
 AUTO, BEFORE = "by name, values", "before its command"
 TOGETHER, ALONE = "together with these", "left out"
-MODE, READ = "controller.mode", "read"
 ONE_JOINT = {"mass": "its mass [kg], if known", "lever": "its lever [m], if known"}
+MOTOR = {"controller.kt": "kt [N m/A]", "controller.R": "R [ohm]"}
 CONTROLLER = {
     "controller.kp": "K_P [N m/rad]", "controller.kd": "K_D [N m s/rad]",
-    "controller.torque_limit": "torque limit [N m]", "controller.kt": "kt [N m/A]", "controller.R": "R [ohm]",
+    "controller.torque_limit": "torque limit [N m]",
 }  # fmt: skip
 SERVO = {"gain": "its firmware's gain"}
 MORE = {
@@ -39,8 +33,8 @@ MORE = {
     "length": "cut into trials of [s]", "initialisation": "initialisation of each file",
 }  # fmt: skip
 UNITS = {
-    "time_unit": [*TIME_UNITS], "angle_unit": [*ANGLE_UNITS, RANGE, str(USUAL_TICKS)],
-    "length_unit": [*LENGTH_UNITS], "torque_unit": [*TORQUE_UNITS],
+    "time_unit": [*units.TIME_UNITS], "angle_unit": [*units.ANGLE_UNITS, units.RANGE, str(units.USUAL_TICKS)],
+    "length_unit": [*units.LENGTH_UNITS], "torque_unit": [*units.TORQUE_UNITS],
 }  # fmt: skip
 ICON = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 48 48" fill="none" stroke="#000" stroke-width="3">{}</svg>'
 ICONS = {
@@ -51,48 +45,42 @@ ICONS = {
 
 
 class ImportForm:
-    """What waits to be imported, and everything that may be said of it.
-
-    Attributes:
-        whole: its widgets.
-    """
+    """What waits to be imported, and everything that may be said of it; `whole` has all widgets."""
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
-        self.waiting, self.columns = text_of(), column_of()
+        self.seen: Preview | None = None  # as long as its columns stay, choices do
+        self.waiting, self.said, self.columns = text_of(), text_of(), column_of()
         self.table = text_of(styles={"overflow-x": "auto"})
-        self.seen: Preview | None = None  # as long as columns and joints stay, choices do
-        self.robots = {robot: self._robot(robot) for robot in ROBOTS}
-        self.said = text_of()
-        self.texts = {
-            key: TextInput(title=plain(title), width=150)
-            for key, title in (ONE_JOINT | CONTROLLER | SERVO | MORE).items()
-        }
-        self.servo = Select(title="servo", options=[NONE, *map(plain, servos())], value=NONE, width=110)
-        self.mode = Select(title="commands are", options=[*NEEDED], value="position", width=110)
-        self.mode.on_change("value", lambda attr, old, new: self._show_motor())
-        self.read = Select(title="a position is read", options=[BEFORE, "after"], value=BEFORE, width=170)
-        self.units = {
-            key: Select(
-                title=plain(f"{key.removesuffix('_unit')} in"),
-                options=[AUTO, *map(plain, units)],
-                value=AUTO,
-                width=150,
+        self.robots = {
+            robot: button(
+                robot,
+                partial(desk.choose_robot, robot),
+                icon=SVGIcon(svg=ICON.format(svg), size=40),
+                width=130,
+                height=52,
             )
-            for key, units in UNITS.items()
+            for robot, svg in ICONS.items()
         }
-        self.before = Select(title="trials of this recording", options=[TOGETHER, ALONE], value=TOGETHER, width=200)
+        self.texts = {key: field(title) for key, title in (ONE_JOINT | CONTROLLER | MOTOR | SERVO | MORE).items()}
+        self.mode = select("commands are", *NEEDED, width=110)
+        self.mode.on_change("value", lambda attr, old, new: self._show_motor())
+        self.servo = select("servo", NONE, *servos(), width=110)
+        self.read = select("a position is read", BEFORE, "after", width=170)
+        self.units = {
+            key: select(f"{key.removesuffix('_unit')} in", AUTO, *known, width=150) for key, known in UNITS.items()
+        }
+        self.before = select("trials of this recording", TOGETHER, ALONE, width=200)
         more = Toggle(label="More: units, drive, trials", width=200, align="end")
-        fold = row_of(*self.units.values(), *(self.texts[key] for key in MORE), visible=False)
+        fold = row_of(*self.units.values(), *self._texts(MORE), visible=False)
         more.on_change("active", lambda attr, old, new: fold.update(visible=new))
-        self.one_joint = [self.texts[key] for key in ONE_JOINT]
         self.whole = column_of(
             self.waiting,
             self.said,
-            row_of(*self.robots.values(), *self.one_joint),
+            row_of(*self.robots.values(), *self._texts(ONE_JOINT)),
             self.table,
             self.columns,
-            row_of(self.mode, self.read, *(self.texts[key] for key in CONTROLLER), self.servo, self.texts["gain"]),
+            row_of(self.mode, self.read, *self._texts(CONTROLLER | MOTOR), self.servo, *self._texts(SERVO)),
             fold,
             row_of(button("Import", self._import, "primary"), more, self.before),
             name="importing",
@@ -100,15 +88,12 @@ class ImportForm:
         )
         self._show_motor()
 
-    def _robot(self, robot: str) -> Button:
-        icon = SVGIcon(svg=ICON.format(ICONS[robot]), size=40)
-        made = Button(label=plain(robot), icon=icon, width=130, height=52)
-        made.on_click(lambda: self.desk.choose_robot(robot))
-        return made
+    def _texts(self, keys: dict[str, str]) -> list[Any]:
+        return [self.texts[key] for key in keys]
 
     def _show_motor(self) -> None:
-        for key in ("kt", "R"):
-            self.texts[f"controller.{key}"].visible = self.mode.value == "voltage"
+        for text in self._texts(MOTOR):
+            text.visible = self.mode.value == "voltage"
 
     def show(self) -> None:
         """Show what waits."""
@@ -121,79 +106,57 @@ class ImportForm:
             text += f", calibrated by {waiting.calibration.name}"
         if desk.same_rig is not None:
             text += "; together with the trials of this recording, its gains hold where you state none"
-        lacks = waiting.lacks
-        show(self.waiting, listed([text]), listed([f"still needed: {' and '.join(lacks)}"] if lacks else [], YELLOW))
-        self._show_robots(waiting.robot)
-        if _names(desk.preview) != _names(self.seen):
-            self._show_preview(desk.preview)
-
-    def _show_robots(self, chosen: str | None) -> None:
+        lacks = [f"still needed: {' and '.join(waiting.lacks)}"] if waiting.lacks else []
+        show(self.waiting, listed([text]), listed(lacks, YELLOW))
+        chosen = waiting.robot
         words = f"One joint without a URDF: it {ROBOTS[chosen]}." if chosen else "No URDF? One joint is a"
         show(self.said, words)
         for robot, made in self.robots.items():
             made.button_type = "primary" if robot == chosen else "default"
-        for text in self.one_joint:
-            text.visible = chosen is not None
+        for one in self._texts(ONE_JOINT):
+            one.visible = chosen is not None
+        seen, self.seen = self.seen, desk.preview
+        if _names(seen) != _names(self.seen):
+            self._show_preview()
 
-    def _show_preview(self, seen: Preview | None) -> None:
-        self.seen = seen
+    def _show_preview(self) -> None:
+        seen = self.seen
         show(self.table)
         self.columns.children = []
         if seen is None:
             return
-        rows = [html(*(Html("<td>{:.6g}</td>").format(value) for value in row)) for row in seen.rows]
-        head = html(*(Html("<th>{}</th>").format(name) for name in seen.columns))
+        rows = [html(*map(HEAD.format, seen.columns))]
+        rows += [html(*(CELL.format(f"{value:.6g}") for value in row)) for row in seen.rows]
         doubt = listed([seen.doubt] if seen.doubt else [], YELLOW)
-        lines = html(*(Html("<tr>{}</tr>").format(row) for row in (head, *rows)))
-        show(self.table, doubt, Html('<table cellpadding="4">{}</table>').format(lines))
+        show(self.table, doubt, TABLE.format("", html(*map(ROW.format, rows))))
         self.mode.value = seen.mode
-        guess = _columns(seen)
-        self.columns.children = [
-            _columns_row("" if name == "time" else name, name, entry, seen.columns) for name, entry in guess.items()
-        ]
+        self.columns.children = [self._columns_of(*one, seen.columns) for one in seen.guess.items()]
+
+    def _columns_of(self, name: str, guess: dict[str, str], columns: list[str]) -> Row:
+        """A select of columns for each signal of a joint, or for the time."""
+        selects = [select(signal, width=140) for signal in guess]
+        for one, column in zip(selects, guess.values(), strict=True):
+            choose(one, [NONE, *columns], column)
+        return row_of(text_of("" if name == "time" else name, sizing_mode="fixed", width=80), *selects, name=name)
 
     def _chosen_columns(self) -> dict[str, Any]:
         """As `source.columns`; nothing where they are as guessed."""
         chosen = {
-            row.name: {select.title: select.value for select in row.children[1:]} for row in self.columns.children
+            row.name: {one.title: "" if one.value == NONE else one.value for one in row.children[1:]}
+            for row in self.columns.children
         }
-        if self.seen is None or chosen == _columns(self.seen):
+        if self.seen is None or chosen == self.seen.guess:
             return {}
-        known = {
-            name: {signal: column for signal, column in entry.items() if column != NONE}
-            for name, entry in chosen.items()
-        }
-        time = known.pop("time")
-        return time | {joint: entry for joint, entry in known.items() if entry}
+        known = {name: {signal: column for signal, column in one.items() if column} for name, one in chosen.items()}
+        return known.pop("time") | {joint: entry for joint, entry in known.items() if entry}
 
     def _import(self) -> None:
-        shown = {key: text.value.strip() for key, text in self.texts.items() if text.visible}
-        typed = {key: text for key, text in shown.items() if text}
-        typed |= {key: select.value for key, select in self.units.items() if select.value != AUTO}
+        typed = {key: text.value.strip() for key, text in self.texts.items() if text.visible and text.value.strip()}
+        typed |= {key: one.value for key, one in self.units.items() if one.value != AUTO}
         typed |= {} if self.servo.value == NONE else {"servo": self.servo.value}
-        typed |= {MODE: self.mode.value, READ: "before" if self.read.value == BEFORE else "after"}
+        typed |= {"controller.mode": self.mode.value, "read": "before" if self.read.value == BEFORE else "after"}
         self.desk.import_waiting(typed, self._chosen_columns(), self.before.value == TOGETHER)
 
 
 def _names(seen: Preview | None) -> tuple[list[str], list[str]] | None:
-    return None if seen is None else (seen.columns, seen.joints)
-
-
-def _columns(seen: Preview) -> dict[str, dict[str, str]]:
-    """Joint, and before them `time` -> signal -> column as guessed."""
-    joints = seen.guess.joints if seen.guess else {}
-    time = (seen.guess.time if seen.guess else None) or NONE
-    return {"time": {"time": time}} | {
-        joint: {signal: joints.get(joint, {}).get(signal, NONE) for signal in SIGNALS} for joint in seen.joints
-    }
-
-
-def _columns_row(label: str, name: str, chosen: dict[str, str], columns: list[str]) -> Row:
-    """A select of columns for each signal, with the column that is chosen."""
-    selects = []
-    for signal, value in chosen.items():
-        selects.append(Select(title=plain(signal), width=140))
-        choose(selects[-1], [NONE, *columns], value)
-    name_of = Div(width=80, disable_math=True, styles={"overflow-wrap": "anywhere"})
-    show(name_of, label)
-    return row_of(name_of, *selects, name=name)
+    return None if seen is None else (seen.columns, [*seen.guess])

@@ -13,19 +13,14 @@ from typing import Any
 
 from tactile_cube.api.job import as_input_errors
 from tactile_cube.errors import InputError
-from tactile_cube.measurement.recordings.columns import pick_columns
+from tactile_cube.measurement.recordings.columns import SIGNALS, pick_columns
 from tactile_cube.measurement.recordings.description import ControllerChange, TrialEntry
 from tactile_cube.measurement.recordings.reading import read_recording
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.rig import read_rig
 from tactile_cube.measurement.recordings.tables import read_table
-from tactile_cube.measurement.recordings.writing import (
-    RecordingTables,
-    TrialTable,
-    require_free,
-    write_recordings,
-)
-from tactile_cube.measurement.sources.column_map import ColumnMap, map_columns
+from tactile_cube.measurement.recordings.writing import RecordingTables, TrialTable, require_free, write_recordings
+from tactile_cube.measurement.sources.column_map import map_columns
 from tactile_cube.measurement.sources.csv_files import kinds_of
 from tactile_cube.measurement.sources.lever import Lever
 from tactile_cube.measurement.sources.log_file import LEROBOT, READERS, read_logs
@@ -41,66 +36,44 @@ LOGS, RIGS = tuple(READERS), (".urdf", ".xml")
 BAGS = (".mcap", ".bag", ".db3")
 SHOWN = 5  # rows
 FREE = "no column of commands: free swings? If torques are commanded or logged, say which column it is"
-GAINS = tuple(ControllerChange.model_fields)
 WORDS = ("servo", "controller.mode", "read", "time_unit", "angle_unit", "length_unit", "torque_unit")
 """Settings of `record source=csv` that are no numbers."""
 
 
 @dataclass(frozen=True)
 class Preview:
-    """What is in a log.
+    """What is in a log."""
 
-    Attributes:
-        joints: of the rig, those that may be actuated.
-        columns: their names.
-        rows: the first ones.
-        guess: which column is what; None where the names leave it open.
-        doubt: what they leave open.
-        mode: of the controller, `free` without a column of commands.
-    """
-
-    joints: list[str]
     columns: list[str]
-    rows: list[list[float]]
-    guess: ColumnMap | None
-    doubt: str
-    mode: str = "position"
+    rows: list[list[float]]  # the first ones
+    guess: dict[str, dict[str, str]]  # `time`, and each joint that may be actuated -> signal -> column, "" where open
+    doubt: str  # what the names leave open
+    mode: str = "position"  # of the controller, `free` without a column of commands
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """What waits to be imported.
+    """What waits to be imported."""
 
-    Attributes:
-        logs: files, or folders of LeRobot.
-        urdf: of their rig.
-        robot: pendulum, wheel or slide in its place.
-        calibration: LeRobot's, of the arm.
-    """
-
-    logs: tuple[Path, ...] = ()
-    urdf: Path | None = None
-    robot: str | None = None
-    calibration: Path | None = None
+    logs: tuple[Path, ...] = ()  # files, or folders of LeRobot
+    urdf: Path | None = None  # of their rig
+    robot: str | None = None  # pendulum, wheel or slide in its place
+    calibration: Path | None = None  # LeRobot's, of the arm
 
     def with_files(self, files: Sequence[Path]) -> Waiting:
-        """Return it with more files, each by what it is; new logs take the place of old ones.
-
-        Raises:
-            InputError: a file that is none of these.
-        """
-        kinds = {file: kind_of(file) for file in files}
-        logs = tuple(file for file, kind in kinds.items() if kind == "log")
-        rigs = [file for file, kind in kinds.items() if kind == "rig"]
-        known = [file for file, kind in kinds.items() if kind == "calibration"]
-        changed = replace(self, logs=logs or self.logs, calibration=known[-1] if known else self.calibration)
-        return replace(changed, urdf=rigs[-1], robot=None) if rigs else changed
+        """Return it with more files, each by what it is; new logs take the place of old ones."""
+        of = {kind: [file for file in files if kind_of(file) == kind] for kind in ("log", "rig", "calibration")}
+        changed = replace(
+            self,
+            logs=tuple(of["log"]) or self.logs,
+            calibration=of["calibration"][-1] if of["calibration"] else self.calibration,
+        )
+        return replace(changed, urdf=of["rig"][-1], robot=None) if of["rig"] else changed
 
     @property
     def lacks(self) -> list[str]:
         """What is still needed, in words."""
-        rig = self.urdf or self.robot
-        needed = {"a log": self.logs, "the URDF of the rig, or a choice of one joint": rig}
+        needed = {"a log": self.logs, "the URDF of the rig, or a choice of one joint": self.urdf or self.robot}
         return [what for what, there in needed.items() if not there]
 
     @property
@@ -111,34 +84,29 @@ class Waiting:
 
     @as_input_errors
     def preview(self) -> Preview | None:
-        """Return what the first log holds and which column seems to be what; None: something is still needed.
-
-        Raises:
-            InputError: a file that cannot be read.
-        """
+        """Return what the first log holds and which column seems to be what; None: something is still needed."""
         if self.lacks:
             return None
         table = read_logs(self.logs[0])[0].table
         rig = read_rig(self.urdf) if self.urdf else Lever(str(self.robot)).rig()
         joints = [name for name, joint in rig.joints.items() if joint.mimics is None]
-        count = min(SHOWN, len(next(iter(table.values()))))
+        names, count = list(table), min(SHOWN, len(next(iter(table.values()))))
         rows = [[float(column[k]) for column in table.values()] for k in range(count)]
-        names, guess, mode, doubt = list(table), None, "position", ""
+        guess, mode, doubt = None, "position", ""
         try:
             guess = map_columns(names, joints, {})
         except InputError as error:
             doubt = str(error)
             with contextlib.suppress(InputError):
                 guess, mode, doubt = map_columns(names, joints, {}, "free"), "free", FREE
-        return Preview(joints, names, rows, guess, doubt, mode)
+        known = guess.joints if guess else {}
+        chosen = {joint: {signal: known.get(joint, {}).get(signal, "") for signal in SIGNALS} for joint in joints}
+        time = {"time": {"time": (guess.time if guess else None) or ""}}
+        return Preview(names, rows, time | chosen, doubt, mode)
 
 
 def kept(folder: Path, name: str, content: bytes) -> Path:
-    """Write a file that a browser handed over and return its path; of its name only the last part counts.
-
-    Raises:
-        InputError: it is too large, neither a log nor a URDF, or has a name that no file can have here.
-    """
+    """Write a log or URDF that a browser handed over and return its path; of its name only the last part counts."""
     name = Path(name.replace("\\", "/")).name
     if not name.isprintable() or len(os.fsencode(name)) > NAME:
         raise InputError(f"{name[:NAME]!r}: no name of a file here; give it one of at most {NAME} printable characters")
@@ -152,27 +120,18 @@ def kept(folder: Path, name: str, content: bytes) -> Path:
 
 
 def kind_of(file: Path) -> str:
-    """Return what a file is: log, rig, calibration, or what LeRobot says of its columns (description).
-
-    Raises:
-        InputError: none of these; for a bag with the command that imports it.
-    """
+    """Return what a file is: log, rig, calibration, or what LeRobot says of its columns (description)."""
     if (file / LEROBOT).is_file():
         return "log"
     _require_known(file)
-    if file.suffix.lower() == ".json":
-        if file.parts[-2:] == LEROBOT.parts:
-            return "description"
-        return "calibration" if _is_calibration(file) else "log"
-    return "rig" if file.suffix.lower() in RIGS else "log"
-
-
-def _is_calibration(file: Path) -> bool:
-    try:
-        read = json.loads(file.read_text(encoding="utf-8"))
-        return bool(read) and all("range_max" in one for one in read.values())
-    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
-        return False  # whoever reads it as a log says why
+    if file.parts[-2:] == LEROBOT.parts:
+        return "description"
+    if file.suffix.lower() in RIGS:
+        return "rig"
+    with contextlib.suppress(OSError, ValueError, TypeError, AttributeError, RecursionError):  # its reader says why
+        read = json.loads(file.read_text(encoding="utf-8")) if file.suffix.lower() == ".json" else {}
+        return "calibration" if read and all("range_max" in one for one in read.values()) else "log"
+    return "log"
 
 
 def _require_known(file: Path) -> None:
@@ -194,9 +153,6 @@ def settings_of(typed: Mapping[str, str]) -> dict[str, Any]:
     Example:
         >>> settings_of({"controller.kp": "25, 12", "read": "after", "initialisation": "0"})
         {'controller': {'kp': [25.0, 12.0]}, 'read': 'after', 'initialisation': [0]}
-
-    Raises:
-        InputError: a text that is no number, or for a key that needs one several.
     """
     settings: dict[str, Any] = {}
     for key, text in typed.items():
@@ -206,12 +162,17 @@ def settings_of(typed: Mapping[str, str]) -> dict[str, Any]:
     return settings
 
 
-def _numbers(key: str, text: str) -> float | int | list[float] | list[int]:
-    """One number, or one for each of several joints or files."""
+def number(key: str, text: str) -> float:
+    """Return what somebody typed as a number; `key` names it where it is none."""
     try:
-        numbers = [float(part) for part in re.split(r"[\s,;]+", text.strip(" ,;[]\t\n"))]
+        return float(text)
     except ValueError:
         raise InputError(f"{key}: '{text}' is no number") from None
+
+
+def _numbers(key: str, text: str) -> float | int | list[float] | list[int]:
+    """One number, or one for each of several joints or files."""
+    numbers = [number(key, part) for part in re.split(r"[\s,;]+", text.strip(" ,;[]\t\n"))]
     whole = [int(one) for one in numbers if one.is_integer()]
     if key == "initialisation" and len(whole) == len(numbers):
         return whole
@@ -222,16 +183,13 @@ def _numbers(key: str, text: str) -> float | int | list[float] | list[int]:
 
 @as_input_errors
 def import_logs(out: Path, given: Mapping[str, Any], before: Recording | None = None) -> tuple[Recording, list[str]]:
-    """Write logs as a recording, as `record source=csv` does, and read it back.
+    """Write logs as a recording, as `record source=csv` does; return it and what was understood, a line each.
 
     Args:
         out: folder to write.
         given: settings of `record source=csv`.
         before: a recording of the same rig to whose trials they are added, as trials of one more initialisation. Where
             `given` says nothing of the controller its gains hold; what its owner believes stays.
-
-    Returns:
-        The recording, and what was understood and what is odd, a line each.
 
     Raises:
         InputError: what cannot be used: file, column or row, the value, what to do.
@@ -241,38 +199,37 @@ def import_logs(out: Path, given: Mapping[str, Any], before: Recording | None = 
     known = {} if before is None else before.description.controller.model_dump(exclude_none=True)
     settings = source_settings("csv", {**given, "controller": {**controller, **known}})
     made = recording_tables(settings, "csv", 0)[""]
-    understood = [_in_a_line(*row) for row in made.understood]
     write_recordings(out, {"": made if before is None else _added(before, made, controller)})
-    return read_recording(out), understood
+    return read_recording(out), [_in_a_line(*row) for row in made.understood]
 
 
 def _added(before: Recording, made: RecordingTables, controller: Mapping[str, Any]) -> RecordingTables:
     """The trials of a recording, and after them those of another one of the same rig."""
-    joints = before.joints
+    joints, described = before.joints, before.description
     if tuple(made.description.joints) != joints:
         raise InputError(f"{before.folder}: has joints {', '.join(joints)}; say columns of all of them in the new logs")
     old = []
-    for entry in before.description.trials:
+    for entry in described.trials:
         path = below(before.folder, entry.file, "trials.file")
         columns, _ = pick_columns(read_table(path), joints, path)
         old.append(TrialTable(entry, columns.time, columns.command, columns.position, columns.torque, path))
     both = [*old, *made.tables]
-    initialisation = 1 + max(entry.initialisation for entry in before.description.trials)
-    gains = ControllerChange(**{key: value for key, value in controller.items() if key in GAINS})
     groups = kinds_of([Path(one.entry.file).stem for one in both], [one.command for one in both], before.step)
     kinds = {group: one.entry.kind for group, one in zip(groups, old, strict=False)}
+    again = 1 + max(entry.initialisation for entry in described.trials)
+    gains = ControllerChange(**{key: controller[key] for key in ControllerChange.model_fields if key in controller})
     new = []
     for group, table in zip(groups[len(old) :], made.tables, strict=True):
         entry = TrialEntry(
-            file=f"trials/{initialisation}_{Path(table.entry.file).name}",
-            initialisation=initialisation,
-            kind=kinds.get(group, f"{group}_{initialisation}"),
+            file=f"trials/{again}_{Path(table.entry.file).name}",
+            initialisation=again,
+            kind=kinds.get(group, f"{group}_{again}"),
             controller=gains if gains.model_fields_set else None,
             note=table.entry.note,
         )
         new.append(replace(table, entry=entry))
-    doubts = [*before.description.doubts, *made.description.doubts]
-    return RecordingTables(before.description.model_copy(update={"doubts": doubts}), before.urdf, [*old, *new])
+    doubts = [*described.doubts, *made.description.doubts]
+    return RecordingTables(described.model_copy(update={"doubts": doubts}), before.urdf, [*old, *new])
 
 
 def _in_a_line(what: str, how: str, by: str) -> str:

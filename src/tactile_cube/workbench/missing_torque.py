@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tactile_cube.drivetrain.effects import Effect, Stage
 from tactile_cube.identification.fitting.intervals import NORMAL_95
 from tactile_cube.identification.fitting.problem import Problem
 from tactile_cube.identification.search.residual_shape import MANY, PARABOLA, Missing, missing_torques, shapes
@@ -18,24 +17,6 @@ Array = NDArray[np.float64]
 VISIBLE = 0.05  # noise of the missing torque over the usual torque of the drive: a law of less is not seen by eye
 BINS = 16
 FEWEST = 3  # segments in a bin, from which on their scatter is known
-BY_STAGE = {
-    Stage.COMMAND: "velocity", Stage.VELOCITY_SENSOR: "torque", Stage.MOTOR_TORQUE: "torque",
-    Stage.DEFLECTION: "torque", Stage.POSITION_SENSOR: "torque", Stage.JOINT_TORQUE: "position",
-    Stage.FRICTION: "velocity", Stage.MECHANISM: "position",
-}  # fmt: skip
-BY_NAME = {
-    "viscous_friction": "velocity", "nonlinear_drag": "velocity", "velocity_feedforward": "velocity",
-    "back_emf": "velocity", "velocity_filter_lag": "velocity", "load_dependent_friction": "torque",
-    "elasticity": "torque", "transmission_error": "position", "position_offset": "position",
-    "gravity_compensation": "position", "reflected_inertia": "acceleration", "friction_drift": "time",
-    "torque_bias": "time", "integral_action": "time",
-}  # fmt: skip
-"""Effects whose torque follows another signal than that of most of their stage."""
-
-
-def signal_of(effect: type[Effect]) -> str:
-    """Return what the torque of an effect is a law of: position, velocity, acceleration, torque or time."""
-    return BY_NAME.get(effect.name, BY_STAGE[effect.stage])
 
 
 def missing_torque(
@@ -53,7 +34,7 @@ def missing_torque(
 
 
 def signals(missing: Missing) -> list[str]:
-    """Return the signals of a missing torque, the one that explains most first."""
+    """Return the signals of a torque, the one that explains most of it first; a candidate's is a law of that one."""
     return list(dict.fromkeys(one.against.partition(", moving")[0] for one in shapes(missing)))
 
 

@@ -15,35 +15,21 @@ Bounds = tuple[float, float]
 
 @dataclass(frozen=True)
 class Value:
-    """A number of the model that a fit may change.
+    """A number of the model that a fit may change."""
 
-    Attributes:
-        key: `CONSTANT@JOINT` or `NAME@JOINT.PARAMETER`.
-        value: in the model in force.
-        interval: its 95 % interval within the bounds; None where it was set by hand or not fitted.
-        unit: SI unit.
-        unknown: its bounds; `put` gives a model, which `simulate` takes, with another value.
-        fixed: whether refits leave it as it is.
-    """
-
-    key: str
-    value: float
-    interval: Bounds | None
-    unit: str
-    unknown: Unknown
-    fixed: bool
+    key: str  # `CONSTANT@JOINT` or `NAME@JOINT.PARAMETER`
+    value: float  # in the model in force
+    interval: Bounds | None  # 95 %, within the bounds; None where it was set by hand or not fitted
+    unit: str  # SI
+    unknown: Unknown  # its bounds; `put` gives a model, which `simulate` takes, with another value
+    fixed: bool  # whether refits leave it as it is
 
 
 class BoundedSearch(Search):
-    """A search whose refits keep to the user's bounds.
-
-    Attributes:
-        bounds: key of a number -> smallest and largest value; both alike: it is fixed.
-    """
+    """A search whose refits keep to the user's bounds; arguments are those of `Search`."""
 
     def __init__(self, *given: Any, **more: Any) -> None:
-        """Begin without any; arguments are those of `Search`."""
-        self.bounds: dict[str, Bounds] = {}
+        self.bounds: dict[str, Bounds] = {}  # key of a number -> smallest and largest value; both alike: it is fixed
         super().__init__(*given, **more)
 
     def key(self, unknown: Unknown, model: Model) -> str:
@@ -52,10 +38,10 @@ class BoundedSearch(Search):
             return f"{unknown.key}@{self.fitted.joints[unknown.place]}"
         return f"{model.terms[unknown.place].label}.{unknown.key}" if unknown.kind == "effect" else ""
 
-    def numbers(self, model: Model) -> dict[str, Unknown]:
+    def numbers(self, model: Model, bounded: bool = True) -> dict[str, Unknown]:
         """Return what may be changed by name, the fixed numbers among it, within the user's bounds."""
         every = {self.key(one, model): one for one in super().unknowns(model)}
-        return {key: self._bounded(key, one) for key, one in every.items() if key}
+        return {key: self._bounded(key, one) if bounded else one for key, one in every.items() if key}
 
     def unknowns(self, model: Model) -> tuple[Unknown, ...]:
         """Return everything that a refit of the model may change."""
@@ -70,20 +56,15 @@ class BoundedSearch(Search):
     def within_bounds(self, model: Model) -> Model:
         """Return the model with every bounded number within its bounds."""
         for key, unknown in self.numbers(model).items():
-            if key in self.bounds:
-                low, high = self.bounds[key]
-                model = unknown.put(model, min(max(unknown.of(model), low), high))
+            low, high = self.bounds.get(key, (unknown.low, unknown.high))
+            model = replace(unknown, low=low, high=high).put(model, unknown.of(model))
         return model
 
     def bound(self, model: Model, key: str, low: float, high: float) -> None:
-        """Keep a number within bounds from now on; both alike fix it.
-
-        Raises:
-            InputError: no such number, or bounds the wrong way round or outside of what it may be.
-        """
-        widest = {self.key(one, model): one for one in super().unknowns(model)}
+        """Keep a number within bounds from now on; both alike fix it. Refuses bounds that it cannot have."""
+        widest = self.numbers(model, bounded=False)
         if key not in widest:
-            raise InputError(f"{key}: no number of the model; it has {', '.join(filter(None, widest))}")
+            raise InputError(f"{key}: no number of the model; it has {', '.join(widest)}")
         if not widest[key].low <= low <= high <= widest[key].high:
             raise InputError(
                 f"{key}: bounds {low:g} to {high:g}; give the smaller one first, both within {widest[key].low:g} to "
@@ -92,7 +73,5 @@ class BoundedSearch(Search):
         self.bounds[key] = low, high
 
     def _bounded(self, key: str, unknown: Unknown) -> Unknown:
-        if key not in self.bounds or self.fixed(key):
-            return unknown
-        low, high = self.bounds[key]
-        return replace(unknown, low=low, high=high)
+        low, high = self.bounds.get(key, (unknown.low, unknown.high))
+        return replace(unknown, low=low, high=high) if low < high else unknown

@@ -1,4 +1,4 @@
-"""The server of a workbench: one machine, one user, an address that nobody guesses."""
+"""The command: a workbench for one user of one machine, until Ctrl-C or SIGTERM."""
 
 from __future__ import annotations
 
@@ -9,66 +9,13 @@ import signal
 import sys
 import webbrowser
 from collections.abc import Iterator
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tactile_cube.api.job import Job
 from tactile_cube.errors import InputError
 from tactile_cube.whole_file import write_whole
 
-if TYPE_CHECKING:
-    from bokeh.document import Document
-    from bokeh.server.server import BaseServer
-
-    from tactile_cube.workbench.desk import Desk
-
-HOST = "127.0.0.1"
-MESSAGE = 280_000_000
-"""Bytes of a message from the page: two files of `importing.LARGEST` as base64; more closes the connection."""
-BODY = 100_000
-"""Bytes of a request; the page sends its files as messages."""
 REDIRECT = '<!DOCTYPE html><meta http-equiv="refresh" content="0;url={}">'
-
-
-def start(desk: Desk, port: int = 0) -> tuple[BaseServer, str]:
-    """Serve a desk on 127.0.0.1 and return the server, not yet running, and its address with the token.
-
-    Raises:
-        InputError: a port that is taken, or Bokeh is not installed.
-    """
-    try:
-        from bokeh.application import Application
-        from bokeh.application.handlers.function import FunctionHandler
-        from bokeh.server.server import BaseServer
-        from bokeh.server.util import bind_sockets
-    except ModuleNotFoundError:
-        raise InputError("the workbench needs Bokeh: pip install 'tactile-cube[workbench]'") from None
-    from jinja2 import Template
-    from tornado.httpserver import HTTPServer
-    from tornado.ioloop import IOLoop
-
-    from tactile_cube.workbench.door import ENTER, NONCE, Door
-    from tactile_cube.workbench.page import Page
-
-    template = Template(resources.files(__package__).joinpath("page.html.jinja").read_text(encoding="utf-8"))
-
-    def window(document: Document) -> None:
-        document.title, document.template, document.template_variables["nonce"] = "workbench", template, NONCE
-        Page(document, desk)
-
-    try:
-        sockets, port = bind_sockets(HOST, port)
-    except OSError as error:
-        raise InputError(
-            f"port={port}: {error.strerror or error}; choose another one, or 0 for any that is free"
-        ) from None
-    door = Door(Application(FunctionHandler(window)), desk, port, MESSAGE)
-    http = HTTPServer(door, max_body_size=BODY)
-    http.add_sockets(sockets)
-    server = BaseServer(IOLoop.current(), door, http)
-    server.start()
-    return server, f"http://{HOST}:{port}{ENTER}?token={door.token}"
 
 
 def serve(job: Job) -> None:
@@ -76,6 +23,10 @@ def serve(job: Job) -> None:
 
     What it writes is its user's alone, and the token stands in no log and no command line.
     """
+    try:
+        from tactile_cube.workbench.door import start
+    except ModuleNotFoundError:
+        raise InputError("the workbench needs Bokeh: pip install 'tactile-cube[workbench]'") from None
     from tactile_cube.workbench.desk import Desk
 
     logging.getLogger("bokeh").setLevel(logging.ERROR)

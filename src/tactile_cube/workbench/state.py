@@ -51,6 +51,7 @@ from tactile_cube.workbench.parameters import BoundedSearch, Value
 
 Array = NDArray[np.float64]
 STATED, REFITTED, BY_HAND = "stated", "refitted", "by hand"
+BEGUN = 2  # stages of a model to which nothing was added: stated, refitted
 AT_ONCE = 24  # candidates that are screened between two looks at who waits
 RANKED = 10  # effects that a look shows
 ALIKE = 0.95  # correlation of what two laws change, beside all constants, from which on these trials do not part them
@@ -61,44 +62,26 @@ COMMAND = "python -m tactile_cube.workbench recording={}"
 
 @dataclass(frozen=True)
 class ModelStage:
-    """One model on the way, and how it does on the trials that are untouched.
+    """One model on the way, and how it does on the trials that are untouched."""
 
-    Attributes:
-        label: `stated`, `refitted`, `+ NAME@JOINT`, `- NAME@JOINT` or `by hand`.
-        fit: what it was fitted by; of the stated model, and of values set by hand, the fit that came before.
-        model: with the joint offsets of every initialisation.
-        judgement: on the held-out trials, in segments; the missing torque comes from its residual.
-        over_noise: the error: of segments of untouched trials, in units of the sensor noise. `diagnose` states it too.
-        errors: RMS of free runs there [rad].
-        half_width: (P,) of the fit's unknowns: what noise and misfit leave unsure, 95 %; zero where nothing was fitted.
-        final: the fit of a diagnosis on all windows, as it is saved.
-    """
-
-    label: str
-    fit: Fit
-    model: Model
-    judgement: Judgement
-    over_noise: float
-    errors: ErrorSummary
-    half_width: Array
-    final: Fitted | None = None
+    label: str  # `stated`, `refitted`, `+ NAME@JOINT`, `- NAME@JOINT` or `by hand`
+    fit: Fit  # what it was fitted by; of the stated model, and of values set by hand, the fit that came before
+    model: Model  # with the joint offsets of every initialisation
+    judgement: Judgement  # on the held-out trials, in segments; the missing torque comes from its residual
+    over_noise: float  # error of segments of untouched trials, in units of the sensor noise, as `diagnose` states it
+    errors: ErrorSummary  # RMS of free runs there [rad]
+    half_width: Array  # (P,) of the fit's unknowns, 95 %; zero where nothing was fitted
+    final: Fitted | None = None  # the fit of a diagnosis on all windows, as it is saved
 
 
 @dataclass(frozen=True)
 class Look:
-    """An effect beside the model in force, after a few steps of its own numbers.
+    """An effect beside the model in force, after a few steps of its own numbers."""
 
-    Attributes:
-        candidate: the effect in the form that does best.
-        model: with it.
-        change: (G, R) that it makes to the weighted prediction of the windows looked at.
-        share: part of the squared error there that it takes away.
-    """
-
-    candidate: Candidate
-    model: Model
-    change: Array
-    share: float
+    candidate: Candidate  # the effect in the form that does best
+    model: Model  # with it
+    change: Array  # (G, R) that it makes to the weighted prediction of the windows looked at
+    share: float  # part of the squared error there that it takes away
 
     @property
     def name(self) -> str:
@@ -133,14 +116,7 @@ class Workbench:
         seed: int = 0,
         say: Callable[[str], None] = lambda line: None,
     ) -> None:
-        """Divide the trials as `diagnose` does, and refit what the model has already.
-
-        Args:
-            recording: what was measured, or its folder; two or more trials of free motion.
-            model: to begin with, or its file; None: what the recording states.
-            own_effects: dotted paths of the user's own classes, which are imported.
-            seed: which trials are never fitted.
-            say: takes lines of progress.
+        """Divide the trials as `diagnose` does, which has these arguments, and refit what the model has already.
 
         Raises:
             InputError: a recording, a model or an effect that cannot be used.
@@ -157,7 +133,6 @@ class Workbench:
         self.untouched = held_out if tested is None else tested
         self.search = BoundedSearch(fitted, held_out, noise_with_links(self.recording), effects, say, self.known)
         self.floor = noise_floor(self.recording)
-        self._kept: tuple[Fit, Fit] | None = None
         self._looks: dict[str, Look] = {}
         self.history: list[tuple[ModelStage, ...]] = []
         self.base = self.search.base
@@ -253,42 +228,32 @@ class Workbench:
 
     @as_input_errors
     def add(self, *names: str) -> ModelStage:
-        """Add effects, NAME@JOINT, one after another, each with a refit of everything on the fitted trials.
-
-        Raises:
-            InputError: an unknown effect or joint, or one that the model has.
-        """
+        """Add effects that the model has not, NAME@JOINT, each with a refit of everything on the fitted trials."""
         stages = self.stages
-        for name in names:
-            for effect, joint in resolve([name], self.recording.joints):
-                label = f"{effect_path(effect)}@{joint}"
-                if label in [term.label for term in stages[-1].model.terms]:
-                    raise InputError(f"{label}: the model has it already")
-                if effect not in self.search.effects:
-                    raise InputError(f"{label}: name it when the workbench starts, own_effects=[{effect_path(effect)}]")
-                self.say(f"refitting with {label}")
-                if stages is self.stages and label in self._looks:
-                    added = self._looks[label].model
-                else:
-                    added = with_effect(self.search, self._frozen(stages[-1].fit), effect, joint).model
-                stages = (*stages, self._refitted(f"+ {label}", added))
+        for effect, joint in (one for name in names for one in resolve([name], self.recording.joints)):
+            label = f"{effect_path(effect)}@{joint}"
+            if label in [term.label for term in stages[-1].model.terms]:
+                raise InputError(f"{label}: the model has it already")
+            if effect not in self.search.effects:
+                raise InputError(f"{label}: name it when the workbench starts, own_effects=[{effect_path(effect)}]")
+            self.say(f"refitting with {label}")
+            if stages is self.stages and label in self._looks:
+                added = self._looks[label].model
+            else:
+                added = with_effect(self.search, self.search.frozen(stages[-1].fit), effect, joint).model
+            stages = (*stages, self._refitted(f"+ {label}", added))
         return self._push(stages)
 
     def adopt(self, found: Found) -> ModelStage:
         """Take the model that a diagnosis recommends, as it is."""
         after, before = [term.label for term in found.fitted.model.terms], self.effects
-        changes = [f"+ {one}" for one in after if one not in before] + [
-            f"- {one}" for one in before if one not in after
-        ]
+        changes = [f"+ {one}" for one in after if one not in before]
+        changes += [f"- {one}" for one in before if one not in after]
         stage = self._stage(" ".join(changes) or REFITTED, found.fitted.fit, final=found.fitted)
         return self._push((*self.stages, stage))
 
     def remove(self, label: str) -> ModelStage:
-        """Take an effect out and refit everything that is left.
-
-        Raises:
-            InputError: the model has no such effect.
-        """
+        """Take an effect that the model has out and refit everything that is left."""
         if label not in self.effects:
             raise InputError(f"{label}: the model has only {', '.join(self.effects) or 'its constants'}")
         model = self.stage.fit.model
@@ -309,9 +274,8 @@ class Workbench:
 
     def values(self, joint: str) -> list[Value]:
         """Return the numbers of the model in force at a joint that a fit may change."""
-        search, model, found = self.search, self.stage.model, []
-        fitted = self.stage.fit
-        widths = {search.key(u, model): w for u, w in zip(fitted.unknowns, self.stage.half_width, strict=True)}
+        search, model, fit, found = self.search, self.stage.model, self.stage.fit, []
+        widths = {search.key(u, model): w for u, w in zip(fit.unknowns, self.stage.half_width, strict=True)}
         for key, unknown in search.numbers(model).items():
             if unknown.kind == "constant":
                 at, unit = self.recording.joints[unknown.place], UNITS[unknown.key]
@@ -319,41 +283,27 @@ class Workbench:
                 term = model.terms[unknown.place]
                 at, unit = term.joint, next(p.unit for p in term.effect.parameters if p.name == unknown.key)
             if at == joint:
-                value, low, high = unknown.of(model), unknown.low, unknown.high
-                width = 0.0 if search.fixed(key) else widths.get(key, 0.0)
-                interval = (max(value - width, low), min(value + width, high)) if width else None
+                value, width = unknown.of(model), 0.0 if search.fixed(key) else widths.get(key, 0.0)
+                interval = (max(value - width, unknown.low), min(value + width, unknown.high)) if width else None
                 unit = of_joint(unit, self.recording.units[joint])
                 found.append(Value(key, value, interval, unit, unknown, search.fixed(key)))
         return found
 
     def set_parameter(self, key: str, value: float) -> ModelStage:
-        """Set a number by hand; nothing is refitted. Several in a row are one stage, each undone alone.
-
-        Raises:
-            InputError: no such number.
-        """
+        """Set a number by hand; nothing is refitted. Several in a row are one stage, each undone alone."""
         known = self.search.numbers(self.stage.model)
         if key not in known:
             raise InputError(f"{key}: no number of the model; it has {', '.join(known)}")
         model = known[key].put(self.stage.fit.model, value)
         stage = self._stage(BY_HAND, replace(self.stage.fit, model=model), fitted=False)
-        stages = self.stages[:-1] if self.stage.label == BY_HAND else self.stages
-        return self._push((*stages, stage))
+        return self._push((*(self.stages[:-1] if self.stage.label == BY_HAND else self.stages), stage))
 
     def bound(self, key: str, low: float, high: float) -> None:
-        """Keep a number within bounds at every refit from now on; both alike fix it.
-
-        Raises:
-            InputError: no such number, or bounds that it cannot have.
-        """
+        """Keep a number within bounds that it may have at every refit from now on; both alike fix it."""
         self.search.bound(self.stage.model, key, low, high)
 
     def propose(self) -> Experiment:
-        """Return the commands that would show whether the last effect is there, within the machine's limits.
-
-        Raises:
-            InputError: no effect was added.
-        """
+        """Return the commands that would show whether the effect added last is there, within the machine's limits."""
         added = [k for k, stage in enumerate(self.stages) if stage.label.startswith("+")]
         if not added:
             raise InputError("add an effect first: an experiment decides between the model with it and without it")
@@ -361,8 +311,8 @@ class Workbench:
         return next_experiment(self.search.shooting, self.recording, fits, self.search.noise, self.seed, extended=True)
 
     def diagnose(self, folder: PathLike) -> Diagnosing:
-        """Start `diagnose` beside the model in force, in a process of its own; its files go to a folder."""
-        model = self.model_file() if self.effects else self.known
+        """Start `diagnose` beside what was added or set so far, in a process of its own; its files go to a folder."""
+        model = self.known if len(self.stages) == BEGUN else self.model_file()
         return Diagnosing(self.opened, model, self.own_effects, self.seed, Path(folder))
 
     @as_input_errors
@@ -426,14 +376,6 @@ class Workbench:
         """Errors of free runs of the untouched trials [rad], and of their segments over the sensor noise."""
         errors, over_noise = test_errors(self.search, self.untouched, {"": model}, USUAL_STEP)
         return errors[""], over_noise[""]
-
-    def _frozen(self, fit: Fit) -> Fit:
-        """A fit with its derivatives, which several refits take alike."""
-        if self._kept is not None and self._kept[0] is fit:
-            self.search.problem.linearise_starts(fit.model)
-        else:
-            self._kept = fit, self.search.frozen(fit)
-        return self._kept[1]
 
     def _as_torque(self, joint: str, residual: Array) -> Missing:
         search, model = self.search, self.stage.judgement.model

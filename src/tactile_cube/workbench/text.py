@@ -52,27 +52,20 @@ def show(pane: Div, *parts: str) -> None:
         pane.text = text
 
 
-def choose(select: Select, options: Options, keep: str = "") -> None:
-    """Give a select other options, (value, label) or both in one; it keeps its value where it still has it."""
-    values, wanted = _offer(select, options), keep or select.value
-    select.value = wanted if wanted in values else (values[0] if values else "")
-
-
-def choose_several(select: MultiSelect, options: Options) -> None:
-    """Give a list other options; of those that are chosen it keeps what it still has."""
-    values = _offer(select, options)
-    select.value = [one for one in select.value if one in values]
-
-
-def _offer(select: Select | MultiSelect, options: Options) -> list[str]:
-    """The values of the options, which the browser tells apart by their labels."""
+def choose(select: Select | MultiSelect, options: Options, keep: str = "") -> None:
+    """Give a select other options, (value, label) or both in one; it keeps of its value what it still has."""
     pairs = [(one, one) if isinstance(one, str) else one for one in options]
     values, labels = [value for value, _ in pairs], [plain(label) for _, label in pairs]
+    # the browser tells options apart by their labels
     shown = [f"{label} ({k})" if label in labels[:k] else label for k, label in enumerate(labels)]
     offered = list(zip(values, shown, strict=True))
     if select.options != offered:
         select.options = offered
-    return values
+    if isinstance(select, MultiSelect):
+        select.value = [one for one in select.value if one in values]
+    else:
+        wanted = keep or select.value
+        select.value = wanted if wanted in values else (values[0] if values else "")
 
 
 def picture(alternative: str, png: bytes) -> Html:

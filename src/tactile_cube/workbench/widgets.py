@@ -1,11 +1,11 @@
-"""Widgets of a window: rows, texts, buttons."""
+"""Widgets of a window: rows, texts, fields, selects, buttons."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from bokeh.models import Button, Column, Div, LayoutDOM, Row
+from bokeh.models import Button, Column, Div, LayoutDOM, Row, Select, TextInput
 
 from tactile_cube.workbench.text import plain, show
 
@@ -26,13 +26,23 @@ def column_of(*parts: LayoutDOM, **more: Any) -> Column:
 def text_of(*parts: str, styles: dict[str, str] | None = None, **more: Any) -> Div:
     """A text as wide as the window allows."""
     wrapped = {"overflow-wrap": "anywhere"} | (styles or {})
-    pane = Div(sizing_mode="stretch_width", disable_math=True, styles=wrapped, **more)
+    pane = Div(disable_math=True, styles=wrapped, **{"sizing_mode": "stretch_width"} | more)
     show(pane, *parts)
     return pane
 
 
-def button(label: str, work: Callable[[], object], kind: str = "default") -> Button:
+def field(title: str, width: int = 150, **more: Any) -> TextInput:
+    """A text to type."""
+    return TextInput(title=plain(title), width=width, **more)
+
+
+def select(title: str, *values: str, width: int = 190) -> Select:
+    """A choice of values, the first of them chosen."""
+    return Select(title=plain(title), options=[*map(plain, values)], value=values[0] if values else "", width=width)
+
+
+def button(label: str, work: Callable[[], object], kind: str = "default", **more: Any) -> Button:
     """A button that does something."""
-    made = Button(label=plain(label), button_type=kind, width=150, align="end")
+    made = Button(label=plain(label), button_type=kind, **{"width": 150, "align": "end"} | more)
     made.on_click(lambda: work())
     return made

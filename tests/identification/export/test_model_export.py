@@ -11,11 +11,11 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tactile_cube.export import main
 
 import tactile_cube
 from tactile_cube.drivetrain.model_file import ModelFile, write_model
 from tactile_cube.errors import InputError
+from tactile_cube.export import main
 from tactile_cube.hand.mjcf import read_mjcf
 from tactile_cube.identification.export.joint_drive import drives_of
 from tactile_cube.measurement.recordings.recording import Recording

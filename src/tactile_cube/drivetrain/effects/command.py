@@ -56,7 +56,6 @@ class CommandDeadZone(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the command [rad]."""
         command = x[COMMAND, j]
         if s[1] == 0.0:
             s[0] = command
@@ -77,7 +76,6 @@ class CommandDeadZone(Effect):
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         if abs(x[TORQUE, j]) < p[4]:
             x[DAMPING, j] = 0.0
         return x[TORQUE, j] - min(max(x[TORQUE, j], -p[4]), p[4])
@@ -115,7 +113,6 @@ class RateLimit(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the command [rad]."""
         if s[1] == 0.0:
             s[0] = x[COMMAND, j]
             s[1] = 1.0
@@ -151,7 +148,6 @@ class CommandDelay(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the command [rad]."""
         length = len(s) - 2
         if s[0] == 0.0:
             s[:] = x[COMMAND, j]
@@ -238,7 +234,6 @@ class GravityCompensation(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the torque asked for [N m]."""
         return x[CONTROLLER_TORQUE, j] + p[0] * x[WEIGHT, j]
 
 

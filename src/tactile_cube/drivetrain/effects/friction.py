@@ -22,7 +22,6 @@ class CoulombFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the friction limit [N m]."""
         return x[FRICTION, j] + p[0]
 
 
@@ -50,7 +49,6 @@ class StribeckFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the friction limit [N m]."""
         speed = abs(x[VELOCITY, j] / p[1])
         return x[FRICTION, j] + p[0] * exp(-(speed * speed if p[2] == 2.0 else speed ** p[2]))
 
@@ -73,7 +71,6 @@ class LoadDependentFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the friction limit [N m]."""
         return x[FRICTION, j] + p[0] * abs(x[TORQUE, j])
 
 
@@ -100,7 +97,6 @@ class AsymmetricFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the friction limit [N m]."""
         return (x[FRICTION, j] + p[2] + 0.5 * p[0] * x[DIRECTION, j]) * (1.0 + p[1] * x[DIRECTION, j])
 
 
@@ -130,7 +126,6 @@ class FrictionDrift(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the friction limit [N m]."""
         if p[0] == 0.0 and p[2] == 0.0:
             return x[FRICTION, j]
         return max(x[FRICTION, j] + p[2] + p[0] * (1.0 - exp(-x[TIME, 0] / p[1])), 0.0)

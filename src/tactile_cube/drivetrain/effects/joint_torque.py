@@ -28,7 +28,6 @@ class ViscousFriction(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the joint torque [N m]."""
         damping = p[0] + (0.5 * p[1] if x[VELOCITY, j] > 0.0 else -0.5 * p[1])
         x[DAMPING, j] += damping
         return x[JOINT_TORQUE, j] - damping * x[VELOCITY, j]
@@ -63,7 +62,6 @@ class NonlinearDrag(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the joint torque [N m]."""
         slope = p[0] * abs(x[VELOCITY, j])
         if p[1] != 2.0:
             slope *= (abs(x[VELOCITY, j]) / p[2]) ** (p[1] - 2.0) if x[VELOCITY, j] != 0.0 else 0.0
@@ -109,7 +107,6 @@ class PositionTorque(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the joint torque [N m]."""
         place = min(max((x[ANGLE, j] - p[2]) / (p[3] - p[2]) * (KNOTS - 1), 0.0), KNOTS - 1.000001)
         knot = int(place)
         u = place - knot
@@ -166,7 +163,6 @@ class JointCoupling(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the joint torque [N m]."""
         n = x.shape[1]
         a, b = (j - 1) % n, (j + 1) % n
         torque = x[JOINT_TORQUE, j] + p[0] * x[VELOCITY, a] + p[1] * x[VELOCITY, b]
@@ -238,7 +234,6 @@ class JointStop(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the joint torque [N m]."""
         over = x[ANGLE, j] - p[0]
         under = p[1] - x[ANGLE, j]
         deep = max(over, under)

@@ -27,7 +27,6 @@ class TorqueGain(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         x[DAMPING, j] *= 1.0 + p[0]
         return x[TORQUE, j] * (1.0 + p[0])
 
@@ -66,7 +65,6 @@ class TorqueCurve(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         if p[0] == 0.0 and p[1] == 0.0:
             return x[TORQUE, j]
         load = abs(x[TORQUE, j]) / p[2]
@@ -91,7 +89,6 @@ class TorqueBias(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         return x[TORQUE, j] + p[0]
 
 
@@ -121,7 +118,6 @@ class TorqueCrosstalk(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         n = x.shape[1]
         return x[TORQUE, j] + p[0] * x[TORQUE, (j - 1) % n] + p[1] * x[TORQUE, (j + 1) % n]
 
@@ -171,7 +167,6 @@ class Cogging(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the joint torque [N m]."""
         angle = p[2] * x[ANGLE, j]
         if p[3] == 0.0 and p[4] == 0.0:
             return x[JOINT_TORQUE, j]
@@ -181,7 +176,6 @@ class Cogging(Effect):
 
     @staticmethod
     def torque_law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         angle = p[2] * x[ANGLE, j]
         ripple = p[0] * sin(angle) + p[1] * cos(angle)
         if p[3] == 0.0 and p[4] == 0.0:
@@ -275,7 +269,6 @@ class TorqueSaturation(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         if p[1] > HARD:
             asked = 1.0 + abs(x[TORQUE, j] / p[0]) ** (1.0 / p[1])
             x[DAMPING, j] *= asked ** -(p[1] + 1.0)
@@ -318,7 +311,6 @@ class BackEmf(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor torque [N m]."""
         if p[0] >= UNLIMITED:
             return x[TORQUE, j]
         slope = p[0] / p[1]

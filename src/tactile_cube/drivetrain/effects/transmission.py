@@ -177,7 +177,6 @@ class TransmissionError(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor position [rad]."""
         angle = p[2] * x[ANGLE, j]
         return x[MOTOR_POSITION, j] + p[0] * sin(angle) + p[1] * cos(angle)
 
@@ -199,7 +198,6 @@ class PositionOffset(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor position [rad]."""
         return x[MOTOR_POSITION, j] + p[0]
 
 
@@ -308,7 +306,6 @@ class Backlash(Effect):
 
     @staticmethod
     def law(x: Array, j: int, p: Array, s: Array, dt: float) -> float:
-        """Return the motor position [rad]."""
         reading = x[MOTOR_POSITION, j]
         if p[0] > 0.0:
             half = 0.5 * p[0]

@@ -101,11 +101,7 @@ def check_nominal(nominal: dict[str, Array], joints: tuple[str, ...]) -> None:
 
 
 def check_inertia(recording: Recording) -> None:
-    """Refuse a joint that has nothing to move.
-
-    Raises:
-        InputError: neither its links nor its rotor have inertia.
-    """
+    """Refuse a joint that has nothing to move. Raises InputError: neither its links nor its rotor have inertia."""
     tree, middle = recording.rigid_body(), np.mean([trial.position.mean(axis=0) for trial in recording.trials], axis=0)
     moved = tree.actuated_mass_matrix(middle).diagonal() + recording.nominal.get("reflected_inertia", 0.0)
     if not (moved > 0.0).all():

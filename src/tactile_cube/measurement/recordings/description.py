@@ -137,6 +137,7 @@ class Description(Strict):
     source: str = ""  # where the data come from
     # what nobody states; the numbers given for it are guesses, and identification begins with them
     unknown: list[Literal["kp", "kd", "reflected_inertia", "mass"]] = Field(default_factory=list)
+    shown_in: dict[str, Literal["deg"]] = Field(default_factory=dict)  # joints whose log is in degrees
     doubts: list[str] = Field(default_factory=list)  # what the import could not prove, and what it left out
 
     @model_validator(mode="after")

@@ -95,6 +95,12 @@ class Recording:
         """Joint -> unit of its position: `rad` where it turns, `m` where it slides; torques are N m or N likewise."""
         return {joint: SLIDES if self.rig.joints[joint].prismatic else TURNS for joint in self.joints}
 
+    @property
+    def shown(self) -> dict[str, str]:
+        """Joint -> unit in which people read its position: `deg` where its log has degrees, else as `units`."""
+        said = self.description.shown_in
+        return {joint: said.get(joint, unit) if unit == TURNS else unit for joint, unit in self.units.items()}
+
     def stated(self, constant: str, joint: str) -> float | None:
         """What the owner states of a constant of one joint, or None."""
         values: Array | None = getattr(self.gains, constant, self.nominal.get(constant))
@@ -103,11 +109,7 @@ class Recording:
         return float(values[self.joints.index(joint)])
 
     def rigid_body(self) -> rigid_body.RigidBodyTree:
-        """The mechanism.
-
-        Raises:
-            InputError: the URDF and the joints of recording.yaml make none.
-        """
+        """The mechanism. Raises InputError: the URDF and the joints of recording.yaml make none."""
         coupled = {name: rigid_body.Mimic(c.joint, c.ratio, c.offset) for name, c in self.coupled.items()}
         try:
             return rigid_body.RigidBodyTree.from_urdf(self.urdf, self.joints, coupled)

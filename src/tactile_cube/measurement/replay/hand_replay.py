@@ -14,7 +14,7 @@ from tactile_cube.errors import InputError
 from tactile_cube.hand import DLR_HAND2, Hand
 from tactile_cube.measurement.recordings.reading import DESCRIPTION
 from tactile_cube.measurement.recordings.recording import Recording
-from tactile_cube.measurement.recordings.trial import Array, Load, Trial
+from tactile_cube.measurement.recordings.trial import Array, Trial
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.simulator import Simulated
 from tactile_cube.simulation import EpisodeConstants, SimulationOptions, Start, World
@@ -100,7 +100,10 @@ class HandReplay:
         held: dict[str, Any] = {"cube_size": load.size, "cube_mass": load.mass, "cube_com": load.com}
         held |= {"gravity_onset": round(load.released * self.recording.rate), "joint_offset": offset[self._order]}
         constants = contact.apply(replace(self._nominal, **held))
-        self._world.reset(constants, self._start(trial, load, offset, np.asarray(constants.stiffness)))
+        measured = trial.position[:START].mean(axis=0)
+        twist = (trial.gains.kp * (trial.command[0] - measured))[self._order] / np.asarray(constants.stiffness)
+        angles, place = (measured - offset)[self._order] - twist, to_world(self.hand, load.position, load.quaternion)
+        self._world.reset(constants, Start(angles, *place, target=trial.command[0, self._order]))
         rows = min(len(trial.time), round(min(until, trial.duration + trial.step) * self.recording.rate))
         position, torque = np.zeros((2, rows, len(self._order)))
         before = self.recording.read == "before"
@@ -128,13 +131,6 @@ class HandReplay:
             static_friction=own["static_friction"],
             reflected_inertia=np.where(inertia < LEAST_INERTIA, default, inertia),
         )
-
-    def _start(self, trial: Trial, load: Load, offset: Array, stiffness: Array) -> Start:
-        position = trial.position[:START].mean(axis=0)
-        twist = (trial.gains.kp * (trial.command[0] - position))[self._order] / stiffness
-        place, quaternion = to_world(self.hand, load.position, load.quaternion)
-        angles = (position - offset)[self._order] - twist
-        return Start(angles, place, quaternion, target=trial.command[0, self._order])
 
 
 def _require_hand(recording: Recording, hand: Hand) -> None:

@@ -10,19 +10,23 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from tactile_cube.compiled import compiled_once
 from tactile_cube.drivetrain import DrivetrainConstants, Plant
 from tactile_cube.drivetrain.effects.catalogue import catalogue
+from tactile_cube.drivetrain.effects.command import IntegralAction
 from tactile_cube.drivetrain.effects.effect import Effect, Stage
 from tactile_cube.drivetrain.effects.transmission import Backlash, smooth_lead
 from tactile_cube.drivetrain.plant import TREE_KEYS
 from tactile_cube.drivetrain.signals import COMMAND, LEAD, LOOP_GAIN, MOTOR_POSITION, POSITION, TORQUE
+from tactile_cube.errors import InputError
+from tactile_cube.hand.rigid_body import RigidBodyTree
 from tactile_cube.measurement.comparing.noise_floor import LEAST, sensor_noise
 from tactile_cube.measurement.joint_scales import joint_scales
+from tactile_cube.measurement.recordings.description import KnownForce
 from tactile_cube.measurement.recordings.recording import Recording
 from tactile_cube.measurement.recordings.trial import Array, Trial
-from tactile_cube.measurement.replay.integrals import integrating_joints, wind_up
-from tactile_cube.measurement.replay.known_force import force_torque
 from tactile_cube.measurement.replay.model import Model
 from tactile_cube.measurement.replay.read_out import before_steps, free_way, gaps, jump_ratio, read_out, simulated_jumps
 from tactile_cube.measurement.replay.windows import SMOOTHING, START_SPEED, Windows, asks_for_much, whole_trials
@@ -302,3 +306,87 @@ def _zero_links(shown: Array, windows: Windows, joints: int) -> None:
         for k in range(len(motors)):
             if np.isfinite(part := known[own, :, k]).any():
                 shown[own, :, joints + k] += np.nanmean(part)
+
+
+def force_torque(tree: RigidBodyTree, force: KnownForce, position: Array) -> Array:
+    """Torques (joints,) [N m] that a force on a link puts on the actuated joints at `position` (joints,) [rad].
+
+    Raises:
+        InputError: the force names a joint that the rig does not have.
+    """
+    if force.joint not in tree.dof_names:
+        raise InputError(f"trials: key 'force.joint': '{force.joint}' is not a joint of the rig {list(tree.dof_names)}")
+    dof, frames = tree.dof_names.index(force.joint), link_frames(tree, position)
+    rotation, origin = frames[dof]
+    point, vector = origin + rotation @ np.asarray(force.point), np.asarray(force.vector)
+    torque = np.zeros(len(tree.joint_names))
+    while dof >= 0:
+        rotation, origin = frames[dof]
+        axis = rotation @ tree.axis[dof]
+        lever = axis if tree.prismatic[dof] else np.cross(axis, point - origin)
+        torque[tree.follow[dof]] += tree.ratio[dof] * float(lever @ vector)
+        dof = int(tree.parent[dof])
+    return torque
+
+
+def link_frames(tree: RigidBodyTree, position: Array) -> list[tuple[Array, Array]]:
+    """Rotation (3, 3) and origin (3,) [m] of every link in the base frame, at actuated `position` (joints,)."""
+    angles = tree.ratio * position[tree.follow] + tree.offset
+    frames: list[tuple[Array, Array]] = []
+    for dof in range(tree.dofs):
+        parent = int(tree.parent[dof])
+        rotation, origin = frames[parent] if parent >= 0 else (np.eye(3), np.zeros(3))
+        placed = rotation @ tree.placement_rotation[dof]
+        origin = origin + rotation @ tree.placement_translation[dof]
+        if tree.prismatic[dof]:
+            frames.append((placed, origin + placed @ tree.axis[dof] * angles[dof]))
+        else:
+            frames.append((placed @ Rotation.from_rotvec(tree.axis[dof] * angles[dof]).as_matrix(), origin))
+    return frames
+
+
+def integrating_joints(model: Model, joints: tuple[str, ...]) -> list[int]:
+    """Joints whose controller integrates its error in a model."""
+    return [joints.index(t.joint) for t in model.terms if t.effect is IntegralAction and t.values["ki"] > 0.0]
+
+
+def wind_up(plant: Plant, model: Model, windows: Windows, memory: Array) -> None:
+    """Give integrals in memory (S, size) the value that they have as each window begins.
+
+    As a trial begins they balance the load, but for the `wound` of its windows; from there on the logged error counts.
+    """
+    joints = integrating_joints(model, plant.joint_names)
+    if not joints:
+        return
+    count, later = len(windows), windows.time > 0.0
+    state = plant.view(memory, f"state:{IntegralAction.name}")
+    state[:, joints, 1] = windows.wound[:, joints]
+    if not later.any():
+        return
+    position, command, speed = np.moveaxis(windows.trial_start[:, :, None], 1, 0).copy()
+    begun, unmoved = memory.copy(), np.zeros((count, 2 * position.shape[2]))
+    plant.reset(begun, position[:, 0], speed[:, 0])
+    which, lengths, starts = np.arange(count), np.ones(count, dtype=np.int64), (position, speed, unmoved, unmoved)
+    out, no_path = np.zeros((count, 1, 1, position.shape[2])), np.zeros((count, 1))
+    rows = np.array([TORQUE])
+    plant.kernel.segments_batch(command, which, lengths, 0, 1, 1, *starts, begun, no_path, rows, 0, count, out)
+    balance = plant.view(begun, f"state:{IntegralAction.name}")[:, :, 1]
+    values = {t.joint: t.values for t in model.terms if t.effect is IntegralAction}
+    for j in joints:
+        own = values[plant.joint_names[j]]
+        for k in np.flatnonzero(later):
+            start = balance[k, j] + windows.wound[k, j]
+            errors = windows.errors[k][:, 0, j] - own.get("lag", 0.0) * windows.errors[k][:, 1, j]
+            state[k, j, 1] = integrated(errors, start, own["ki"], own.get("limit", 0.0))
+        state[later, j, 0] = 2.0
+
+
+@compiled_once
+def integrated(errors: Array, start: float, gain: float, limit: float) -> float:
+    """Integral [N m] after errors (T,) [rad s], kept within a limit unless that is zero."""
+    value = start
+    for error in errors:
+        value += gain * error
+        if limit > 0.0:
+            value = min(max(value, -limit), limit)
+    return value

@@ -142,7 +142,7 @@ def cut(
     links = np.unique(np.concatenate([trial.linked for trial in trials]))
     joints = len(recording.joints)
     noise = noise[[*range(joints), *(joints + links)]]
-    return _windows(recording, trials, rows, forward, segment, history, noise, time, speed, substeps, links)
+    return _windows(recording, trials, Cut(rows, forward, segment, history, noise, time, speed, substeps, links))
 
 
 def whole_trials(
@@ -163,46 +163,36 @@ def whole_trials(
     noise = np.broadcast_to(noise, len(recording.joints))
     if not _tells(recording.step, _usual(recording.step, time), noise, speed):
         speed = np.inf  # more samples than usual would misread a start that moves
-    return _windows(recording, trials, longest, longest, longest, history, noise, time, speed, substeps, NO_LINKS)
+    sizes = (longest, longest, longest, history)
+    return _windows(recording, trials, Cut(*sizes, noise, time, speed, substeps, NO_LINKS))
 
 
-def _windows(
-    recording: Recording,
-    trials: Sequence[Trial],
-    rows: int,
-    forward: int,
-    segment: int,
-    history: int,
-    noise: Array,
-    time: float,
-    speed: Array | float,
-    substeps: int,
-    links: Rows,
-) -> Windows:
-    sizes = (rows, forward, segment, history, noise, time, speed, substeps, links)
-    pieces = [piece for k, trial in enumerate(trials) for piece in _pieces(recording, trial, k, *sizes)]
+class Cut(NamedTuple):
+    """Rows of a window, from one to the next, of a segment and of the past; see `cut` for the rest."""
+
+    rows: int
+    forward: int
+    segment: int
+    history: int
+    noise: Array
+    time: float
+    speed: Array | float
+    substeps: int
+    links: Rows
+
+
+def _windows(recording: Recording, trials: Sequence[Trial], sizes: Cut) -> Windows:
+    pieces = [piece for k, trial in enumerate(trials) for piece in _pieces(recording, trial, k, sizes)]
     columns: dict[str, Any] = {name: np.array([piece[name] for piece in pieces]) for name in ROWS}
     columns |= {key: tuple(piece[key] for piece in pieces) for key in ("forces", "errors")}
-    joint_of = np.concatenate([np.arange(len(recording.joints)), links])
-    return Windows(**columns, joint_of=joint_of, history=history, segment=segment, substeps=substeps)
+    joint_of = np.concatenate([np.arange(len(recording.joints)), sizes.links])
+    return Windows(**columns, joint_of=joint_of, history=sizes.history, segment=sizes.segment, substeps=sizes.substeps)
 
 
-def _pieces(
-    recording: Recording,
-    trial: Trial,
-    index: int,
-    rows: int,
-    forward: int,
-    segment: int,
-    history: int,
-    noise: Array,
-    time: float,
-    speed_known: Array | float,
-    substeps: int,
-    links: Rows,
-) -> Iterator[dict[str, object]]:
+def _pieces(recording: Recording, trial: Trial, index: int, sizes: Cut) -> Iterator[dict[str, object]]:
+    rows, forward, segment, history, every, time, speed_known, substeps, links = sizes
     measured, seen = _shown(trial, links)
-    noise, every = noise[: trial.position.shape[1]], noise
+    noise = every[: trial.position.shape[1]]
     fine, jump = _as_simulated(recording, trial, substeps)
     command, after = _around(_as_positions(recording, trial), recording.read)
     errors = trial.step * (after[:-1] - 0.5 * (trial.position[:-1] + trial.position[1:]))

@@ -105,7 +105,8 @@ class CsvFiles:
         understood = [*_steps(pieces), *_rows(columns, units, stamps, rate), ("kinds", repeats, by)]
         understood += rig.understood(list(columns.joints))
         tables = [piece for trial in trials for piece in cut_trial(trial, self.length)]
-        description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts))})
+        degrees = {joint: "deg" for joint, one in units.items() if one["position"].name.split()[0] == "deg"}
+        description = description.model_copy(update={"doubts": list(dict.fromkeys(doubts)), "shown_in": degrees})
         return {"": RecordingTables(description, rig.text, tables, [row for row in understood if row[1]])}
 
     @property
