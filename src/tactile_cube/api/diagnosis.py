@@ -66,32 +66,32 @@ class DiagnosisResult:
         units = {"shown_in": self.recording.shown}
         return answer(self.data | units, self.free.experiment if self.free else None, constants)
 
-    def write(self, folder: PathLike) -> None:
-        """Write model.yaml, diagnosis.json, report.html and, of free motion, diagnosis.rrd and the next experiment."""
-        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report
-        from tactile_cube.visualization.report import write_report
-
-        path = str(Path(folder) / "model.yaml")
+    def write(self, folder: PathLike, report: bool = True) -> None:
+        """Write model.yaml, diagnosis.json and the next experiment; with `report`, report.html and diagnosis.rrd."""
         with written_together(Path(folder), "diagnosis.json") as aside:
             write_model(self.model, aside / "model.yaml")
             write_json(aside / "diagnosis.json", self.data)
-            if self.free is None:
-                page = contact_diagnosis_report(self.data, self.recording, self.job.command, path)
-            else:
-                page = self._free_page(aside, path, self.free)
-            write_report(page, aside / "report.html")
+            if self.free is not None:
+                write_experiment(self.free, aside)
+            if report:
+                self._write_report(aside, str(Path(folder) / "model.yaml"))
 
-    def _free_page(self, folder: Path, path: str, found: Diagnosis) -> Any:
+    def _write_report(self, folder: Path, path: str) -> None:
         from tactile_cube.visualization.comparison_episode import write_comparison
-        from tactile_cube.visualization.diagnosis_report import diagnosis_report
+        from tactile_cube.visualization.diagnosis_report import contact_diagnosis_report, diagnosis_report
+        from tactile_cube.visualization.report import write_report
 
-        write_experiment(found, folder)
-        config, recording = self.job.config, without_touches(self.recording)
+        config, found = self.job.config, self.free
+        if found is None:
+            page = contact_diagnosis_report(self.data, self.recording, self.job.command, path)
+            return write_report(page, folder / "report.html")
+        recording = without_touches(self.recording)
         before = compare_recording(recording, self.known, config.step, floor=found.floor)
         after = compare_recording(recording, self.model, config.step, floor=found.floor)
         write_comparison(after, folder / "diagnosis.rrd")
         shapes = [shape for one in found.unexplained for shape in one.shapes[:SHAPES]]
-        return diagnosis_report(self.data, before, after, self.job.command, path, shapes, found.experiment)
+        page = diagnosis_report(self.data, before, after, self.job.command, path, shapes, found.experiment)
+        return write_report(page, folder / "report.html")
 
 
 @as_input_errors
