@@ -242,54 +242,37 @@ class Safety:
         return within_limits(self.reached, self.limits, self.margin)
 
 
-@dataclass(frozen=True)
 class PossibleMotions:
-    """What a command may make of a machine.
+    """What a command may make of a machine in models that may be true.
 
-    Attributes:
-        shooting: simulates the models.
-        recording: of the machine.
-        fits: models as fitted, simulated from every start.
-        ends: of each fit the models with numbers at either end of their intervals, simulated from the last start.
-        limits: of the machine.
-        margin: part of each stated limit that is kept free.
+    Fitted models are simulated from every start, those with numbers at either end of their intervals from the last.
     """
 
-    shooting: Shooting
-    recording: Recording
-    fits: list[Model]
-    ends: list[list[Model]]
-    limits: Limits
-    margin: float
-
-    @classmethod
-    def of_fits(cls, shooting: Shooting, recording: Recording, fits: Sequence[Fit], margin: float) -> PossibleMotions:
-        """The motions in models that may be true."""
-        zero = no_offsets(recording)
-        models = [fit.model.with_offsets(zero) for fit in fits]
-        ends = [[model.with_offsets(zero) for model in interval_ends(fit)] for fit in fits]
-        return cls(shooting, recording, models, ends, limits_of(recording), margin)
+    def __init__(self, shooting: Shooting, recording: Recording, fits: Sequence[Fit], margin: float) -> None:
+        """Simulates nothing yet; `margin` is the part of each stated limit that is kept free."""
+        self.shooting, self.recording, self.margin = shooting, recording, margin
+        zero, self.limits = no_offsets(recording), limits_of(recording)
+        self.fits = [fit.model.with_offsets(zero) for fit in fits]
+        self.ends = [[model.with_offsets(zero) for model in interval_ends(fit)] for fit in fits]
 
     def safe_trials(self, seed: int) -> list[tuple[Trial, Safety]]:
-        """Each excitation, scaled down until it stays within the limits, or as far as that goes."""
-        designed = excitations(self.recording, seed, self.shooting.time)
-        return [self._scaled(kind, commands) for kind, commands in designed.items()]
+        """Each excitation at the largest scale at which it stays within the limits, or the least of all.
 
-    def _scaled(self, kind: str, commands: Array) -> tuple[Trial, Safety]:
-        """The largest scale that is safe; where the least is not, those in between are not asked for."""
-        middle = middle_command(self.recording)
+        Where the least is not safe, those in between are not asked for.
+        """
+        middle, found = middle_command(self.recording), []
+        for kind, commands in excitations(self.recording, seed, self.shooting.time).items():
 
-        def at(scale: float) -> tuple[Trial, Safety]:
-            less = middle + scale * (commands - middle)
-            trial = trials_from_rest(self.recording, kind, less)[-1]
-            return replace(trial, initialisation=0), self.safety(kind, less, scale)
+            def at(scale: float, kind: str = kind, commands: Array = commands) -> tuple[Trial, Safety]:
+                less = middle + scale * (commands - middle)
+                trial = trials_from_rest(self.recording, kind, less)[-1]
+                return replace(trial, initialisation=0), self.safety(kind, less, scale)
 
-        largest, *between, least = SCALES
-        if (designed := at(largest))[1].safe:
-            return designed
-        smallest = at(least)
-        between = between if smallest[1].safe else []
-        return next((one for one in map(at, between) if one[1].safe), smallest)
+            largest, *between, least = SCALES
+            if not (one := at(largest))[1].safe and (one := at(least))[1].safe:
+                one = next((safe for safe in map(at, between) if safe[1].safe), one)
+            found.append(one)
+        return found
 
     def safety(self, kind: str, commands: Array, scale: float = 1.0) -> Safety:
         """What commands (T, n) do from rest, simulated freely until they end or a model leaves the limits."""
