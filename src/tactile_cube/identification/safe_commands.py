@@ -145,7 +145,7 @@ def excitations(recording: Recording, seed: int, unit: float = 1.0) -> dict[str,
 
     Args:
         recording: what has been played so far.
-        seed: of phases and postures.
+        seed: of phases and levels.
         unit: what a second of a finger stands for [s].
     """
     everything, middle = np.concatenate([trial.command for trial in recording.trials]), middle_command(recording)
@@ -182,7 +182,7 @@ def _waves(time: Array, recording: Recording, rng: np.random.Generator) -> dict[
         middle, _ = limits_of(recording).largest.middle_and_half
         phases = 0.5 * np.pi * np.where(recording.trials[-1].position[0] < middle, 1.0, -1.0)
     growing = time / time[-1]
-    postures = rng.uniform(-0.9, 0.9, (round(float(time[-1, 0])) + 1, joints))
+    levels = rng.uniform(-0.9, 0.9, (round(float(time[-1, 0])) + 1, joints))
 
     def triangle(turns: Array) -> Array:
         """With the signs and peaks of a sine."""
@@ -196,7 +196,7 @@ def _waves(time: Array, recording: Recording, rng: np.random.Generator) -> dict[
         "tiny triangles": 0.05 * triangle(time / 2.0),
         "growing steps": (0.1 + 0.9 * growing) * np.sign(np.sin(2 * np.pi * time / 1.6 + phases)),
         "rising frequency": 0.4 * np.sin(2 * np.pi * (0.2 * time + 0.3 * time**2) + phases),
-        "holds with small moves": postures[np.minimum(time[:, 0].astype(int), len(postures) - 1)],
+        "holds with small moves": levels[np.minimum(time[:, 0].astype(int), len(levels) - 1)],
     }
 
 

@@ -164,10 +164,6 @@ class Grasps(Problem):
         """Minus what is left (G, R), in rad and m."""
         return self._padded([-np.r_[left[::EVERY].ravel(), unknown] for unknown, left in self._fitted(model)])
 
-    def predictions(self, models: Sequence[Model], near: Model | None = None) -> Array:
-        """The same of several models (models, G, R)."""
-        return np.stack([self.prediction(model) for model in models])
-
     def linearise_starts(self, model: Model) -> None:
         """Take each segment's weight from this model from now on."""
         squares = np.sum((self.prediction(model) * self.weight) ** 2, axis=1)

@@ -314,16 +314,7 @@ def diagnose_contact(
     say: Say = print,
     criteria: Criteria = STANDARD,
 ) -> ContactDiagnosis:
-    """Find out which contact effect a model lacks, the drivetrain taken as known.
-
-    Args:
-        recording: trials without an object are left aside.
-        model: of the drivetrain; None: as recording.yaml states it.
-        step: longest physics step [s].
-        seed: which trials are held out.
-        say: takes progress lines.
-        criteria: what decides.
-    """
+    """Find out by some criteria which contact effect a model lacks; arguments as in `identify_contact`."""
     with open_grasps(recording, model, step, seed) as grasps:
         return diagnosed(grasps, recording.joints, criteria, say)
 
