@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactile_cube.api.diagnosis import DiagnosisResult
+from tactile_cube.api.job import called_job
 from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFile, Provenance
 from tactile_cube.errors import InputError
 from tactile_cube.identification.contact.grasps import compare_contact
@@ -22,6 +24,7 @@ from tactile_cube.measurement.recordings.writing import write_recording
 from tactile_cube.simulation.contact_effects import ContactEffect, contact_catalogue
 from tests.identification.easy_grasps import JOINTS, Values, easy_grasps
 from tests.measurement.replay.test_hand_replay import source
+from tests.measurement.small_rig import write
 
 NAMES = [f"j{k}" for k in range(JOINTS)]
 LATERAL: Values = {"lateral_friction": {"coefficient": 0.5}}
@@ -100,6 +103,20 @@ def test_the_model_file_tells_which_trials_judged() -> None:
 
 def test_an_adequate_contact_adds_nothing_to_the_model() -> None:
     assert diagnosis({}).into(ModelFile(joints=["a"]), alone=False).effects == []
+
+
+@pytest.mark.parametrize(("report", "files"), [(True, {"report.html"}), (False, set())])
+def test_a_report_is_written_where_it_is_asked_for(report: bool, files: set[str], tmp_path: Path) -> None:
+    recording, found = read_recording(write(tmp_path / "r")), diagnosis(LATERAL)
+    model = found.into(ModelFile(joints=list(recording.joints)), alone=True)
+    data = found.as_json() | {"known_effects": [], "seconds": 1.0}
+    job = called_job("diagnose", {"recording": tmp_path / "r"})
+    DiagnosisResult(recording, None, None, found, model, data, job).write(tmp_path / "out", report)
+    assert {one.name for one in (tmp_path / "out").iterdir()} == {"model.yaml", "diagnosis.json"} | files
+    if report:
+        page = (tmp_path / "out" / "report.html").read_text()
+        assert "effects=[lateral_friction]" in page
+        assert "takes" in page
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from math import inf, isfinite
 from typing import Any
 
@@ -13,48 +13,33 @@ from tactile_cube.drivetrain.model_file import EffectEstimate, Estimate, ModelFi
 from tactile_cube.errors import InputError
 
 
+def _said(silent: float, unit: str) -> Any:
+    """A number that may be left out: the value that says nothing, and what it is in."""
+    return field(default=silent, metadata={"unit": unit})
+
+
 @dataclass(frozen=True)
 class JointDrive:
-    """The drive of one joint: torque = gain of the loop and limits, then bias, less friction.
-
-    Attributes:
-        kp: [N m/rad].
-        kd: of the controller [N m s/rad].
-        torque_limit: [N m].
-        armature: rotor seen from the joint [kg m^2].
-        friction: dry, while the joint moves [N m].
-        damping: viscous friction [N m s/rad].
-        bias: torque that nobody commands [N m].
-        delay: of commands [s].
-        rate: fastest change of the command that the drive follows [rad/s].
-        stall: largest torque at rest of a motor whose supply is limited [N m].
-        no_load: speed at which such a motor has no torque left [rad/s].
-        excess: dry friction at rest beyond `friction` [N m], which falls by exp(-|v / velocity|^exponent).
-        velocity: [rad/s].
-        exponent: [1].
-        stiffness: of the gear between motor and link [N m/rad].
-        gain: of the torque, which kp, kd and torque_limit have in them [1].
-        beyond: what none of these hold: name -> its numbers.
-    """
+    """The drive of one joint: torque = gain of the loop and limits, then bias, less friction."""
 
     name: str
-    kp: float = 0.0
-    kd: float = 0.0
-    torque_limit: float = inf
-    armature: float = 0.0
-    friction: float = 0.0
-    damping: float = 0.0
-    bias: float = 0.0
-    delay: float = 0.0
-    rate: float = inf
-    stall: float = inf
-    no_load: float = inf
-    excess: float = 0.0
-    velocity: float = 0.0
+    kp: float = _said(0.0, "N m/rad")
+    kd: float = _said(0.0, "N m s/rad")  # of the controller
+    torque_limit: float = _said(inf, "N m")
+    armature: float = _said(0.0, "kg m^2")  # rotor seen from the joint
+    friction: float = _said(0.0, "N m")  # dry, while the joint moves
+    damping: float = _said(0.0, "N m s/rad")  # viscous friction
+    bias: float = _said(0.0, "N m")  # torque that nobody commands
+    delay: float = _said(0.0, "s")  # of commands
+    rate: float = _said(inf, "rad/s")  # fastest change of the command that the drive follows
+    stall: float = _said(inf, "N m")  # largest torque at rest of a motor whose supply is limited
+    no_load: float = _said(inf, "rad/s")  # speed at which such a motor has no torque left
+    excess: float = _said(0.0, "N m more friction at rest (stribeck_friction)")  # falls by exp(-|v/velocity|^exponent)
+    stiffness: float = _said(inf, "N m/rad")  # of the gear between motor and link
+    velocity: float = 0.0  # [rad/s]
     exponent: float = 2.0
-    stiffness: float = inf
-    gain: float = 1.0
-    beyond: Mapping[str, str] = field(default_factory=dict)
+    gain: float = 1.0  # of the torque, which kp, kd and torque_limit have in them
+    beyond: Mapping[str, str] = field(default_factory=dict)  # what none of these hold: name -> its numbers
 
     def at_link(self) -> JointDrive:
         """Return the drive with the gains that a link feels through the gear, which a rigid drive would have."""
@@ -63,30 +48,13 @@ class JointDrive:
 
     def not_in(self, held: Collection[str]) -> list[str]:
         """Return what a format does not hold that holds these attributes and effects, a line each."""
-        own = [
-            f"{self.name}: {name} {getattr(self, name):.6g} {unit}"
-            for name, (unsaid, unit) in SILENT.items()
-            if name not in held and getattr(self, name) != unsaid
-        ]
-        return [*own, *(f"{self.name}: {name} {text}" for name, text in self.beyond.items() if name not in held)]
+        own = {one.name: one for one in fields(self) if "unit" in one.metadata and one.name not in held}
+        values = {name: getattr(self, name) for name in own}
+        said = {name: f"{values[name]:.6g} {own[name].metadata['unit']}" for name in own}
+        said = {name: text for name, text in said.items() if values[name] != own[name].default}
+        return [f"{self.name}: {name} {text}" for name, text in {**said, **self.beyond}.items() if name not in held]
 
 
-SILENT = {
-    "kp": (0.0, "N m/rad"),
-    "kd": (0.0, "N m s/rad"),
-    "torque_limit": (inf, "N m"),
-    "armature": (0.0, "kg m^2"),
-    "friction": (0.0, "N m"),
-    "damping": (0.0, "N m s/rad"),
-    "bias": (0.0, "N m"),
-    "delay": (0.0, "s"),
-    "rate": (inf, "rad/s"),
-    "stall": (inf, "N m"),
-    "no_load": (inf, "rad/s"),
-    "excess": (0.0, "N m more friction at rest (stribeck_friction)"),
-    "stiffness": (inf, "N m/rad"),
-}
-"""Attributes that may be left out, the values that say nothing, and units."""
 CONSTANTS = {
     "kp": "kp",
     "kd": "kd",
